@@ -1,0 +1,104 @@
+"""Everything that can go wrong, as data: a place, a message, a hint, and the exit code it leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar, Literal
+
+Severity = Literal["error", "warning", "note"]
+
+
+class ExitCode(IntEnum):
+    """What the command line returns. The numbers are public and do not change."""
+
+    PASSED = 0
+    FAILED = 1
+    INTERRUPTED = 2
+    INTERNAL = 3
+    USAGE = 4
+    NOTHING_TO_RUN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a file the user wrote something. Lines and columns count from 1."""
+
+    file: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing to tell about an input file."""
+
+    code: str
+    message: str
+    place: Place | None = None
+    hint: str | None = None
+    severity: Severity = "error"
+
+    def __str__(self) -> str:
+        where = f"{self.place}: " if self.place is not None else ""
+        return f"{where}{self.severity}[{self.code}]: {self.message}"
+
+
+class ManipcliError(Exception):
+    """Base of the family; caught once, in `cli/app.py`."""
+
+    exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
+    code: ClassVar[str] = "INT000"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The error as findings, for every renderer alike."""
+        return (Finding(code=self.code, message=str(self)),)
+
+
+class InvalidInput(ManipcliError):
+    """A file or an argument cannot be used; carries every finding of the file at once."""
+
+    exit_code = ExitCode.USAGE
+    code = "USE000"
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        self._findings = tuple(findings)
+        super().__init__("\n".join(str(finding) for finding in self._findings))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        return self._findings
+
+
+class NotPlannable(ManipcliError):
+    """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits."""
+
+    exit_code = ExitCode.FAILED
+    code = "PLAN100"
+
+    def __init__(self, cause: str, *, step: str | None = None, hint: str | None = None) -> None:
+        self.cause = cause
+        self.step = step
+        self.hint = hint
+        super().__init__(f"step '{step}': {cause}" if step is not None else cause)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        return (Finding(code=self.code, message=str(self), hint=self.hint),)
+
+
+class SimulationFailed(ManipcliError):
+    """The physics left the plausible: NaN, an explosion, a body in free fall, a bad start."""
+
+    exit_code = ExitCode.FAILED
+    code = "SIM100"
+
+    def __init__(self, cause: str, *, time: float) -> None:
+        self.cause = cause
+        self.time = time
+        super().__init__(f"{cause} at t = {time:.3f} s")

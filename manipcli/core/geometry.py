@@ -1,0 +1,158 @@
+"""Rigid transforms and quaternions, single or batched, in numpy.
+
+Notation is monogram: `X_AB` is the pose of frame B in frame A, so that adjacent letters cancel in a product:
+`X_AC = X_AB @ X_BC`. Quaternions are `quat_xyzw`, unit, real part last.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def frozen(values: npt.ArrayLike) -> Array:
+    """A read-only float64 copy of `values`."""
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
+
+
+def quat_from_matrix(R: npt.ArrayLike) -> Array:
+    """Unit quaternion (4,) xyzw of a rotation matrix (3, 3); Shepperd's method, w >= 0."""
+    m = np.asarray(R, dtype=np.float64)
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    candidates = np.array([m[0, 0], m[1, 1], m[2, 2], trace])
+    k = int(np.argmax(candidates))
+    q = np.empty(4)
+    if k == 3:
+        q[:] = (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1.0 + trace)
+    else:
+        i, j, l = k, (k + 1) % 3, (k + 2) % 3  # noqa: E741  (the axes in cyclic order)
+        q[i] = 1.0 + m[i, i] - m[j, j] - m[l, l]
+        q[j] = m[j, i] + m[i, j]
+        q[l] = m[l, i] + m[i, l]
+        q[3] = m[l, j] - m[j, l]
+    q /= np.linalg.norm(q)
+    return q if q[3] >= 0.0 else -q
+
+
+def matrix_from_quat(quat_xyzw: npt.ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4) xyzw."""
+    q = np.asarray(quat_xyzw, dtype=np.float64)
+    x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    R = np.empty((*q.shape[:-1], 3, 3))
+    R[..., 0, 0] = 1 - 2 * (y * y + z * z)
+    R[..., 0, 1] = 2 * (x * y - z * w)
+    R[..., 0, 2] = 2 * (x * z + y * w)
+    R[..., 1, 0] = 2 * (x * y + z * w)
+    R[..., 1, 1] = 1 - 2 * (x * x + z * z)
+    R[..., 1, 2] = 2 * (y * z - x * w)
+    R[..., 2, 0] = 2 * (x * z - y * w)
+    R[..., 2, 1] = 2 * (y * z + x * w)
+    R[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    return R
+
+
+def rotate(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:
+    """`R(q) v` for (..., 4) and (..., 3), broadcast: v + 2w(u x v) + 2u x (u x v)."""
+    q = np.asarray(quat_xyzw, dtype=np.float64)
+    v = np.asarray(vector, dtype=np.float64)
+    u = q[..., :3]
+    t = 2.0 * np.cross(u, v)
+    return np.asarray(v + q[..., 3:4] * t + np.cross(u, t))
+
+
+def rotate_inverse(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:
+    """`R(q)^T v` for (..., 4) and (..., 3), broadcast."""
+    q = np.array(quat_xyzw, dtype=np.float64)
+    q[..., :3] *= -1.0
+    return rotate(q, vector)
+
+
+def matrix_from_axis_angle(axis: npt.ArrayLike, angle: float) -> Array:
+    """Rotation by `angle` [rad] about a unit `axis` (3,): Rodrigues' formula."""
+    x, y, z = np.asarray(axis, dtype=np.float64)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K))
+
+
+def matrix_from_rpy(rpy: npt.ArrayLike) -> Array:
+    """URDF's fixed-axis roll, pitch, yaw [rad]: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    r, p, y = (float(v) for v in np.asarray(rpy, dtype=np.float64))
+    cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_from_matrix(R: npt.ArrayLike) -> Array:
+    """Roll, pitch, yaw (3,) [rad] of a rotation matrix; yaw is 0 at the pitch singularity."""
+    m = np.asarray(R, dtype=np.float64)
+    cp = math.hypot(m[0, 0], m[1, 0])
+    if cp < 1e-9:
+        return np.array([math.atan2(-m[1, 2], m[1, 1]), math.atan2(-m[2, 0], cp), 0.0])
+    return np.array([math.atan2(m[2, 1], m[2, 2]), math.atan2(-m[2, 0], cp), math.atan2(m[1, 0], m[0, 0])])
+
+
+@dataclass(frozen=True, eq=False)
+class Transform:
+    """A rigid transform `X_AB`: rotation `R` (3, 3) and translation `p` (3,) [m]."""
+
+    R: Array
+    p: Array
+
+    @staticmethod
+    def identity() -> Transform:
+        return Transform(R=frozen(np.eye(3)), p=frozen(np.zeros(3)))
+
+    @staticmethod
+    def of(
+        *,
+        xyz: npt.ArrayLike = (0.0, 0.0, 0.0),
+        rpy: npt.ArrayLike | None = None,
+        quat_xyzw: npt.ArrayLike | None = None,
+        R: npt.ArrayLike | None = None,
+    ) -> Transform:
+        """From a translation [m] and at most one of `rpy` [rad], `quat_xyzw`, `R`."""
+        if R is None:
+            if quat_xyzw is not None:
+                q = np.asarray(quat_xyzw, dtype=np.float64)
+                R = matrix_from_quat(q / np.linalg.norm(q))
+            else:
+                R = matrix_from_rpy(rpy) if rpy is not None else np.eye(3)
+        return Transform(R=frozen(R), p=frozen(xyz))
+
+    def __matmul__(self, other: Transform) -> Transform:
+        return Transform(R=frozen(self.R @ other.R), p=frozen(self.R @ other.p + self.p))
+
+    def inverse(self) -> Transform:
+        return Transform(R=frozen(self.R.T), p=frozen(-self.R.T @ self.p))
+
+    def apply(self, points: npt.ArrayLike) -> Array:
+        """Points (..., 3) given in B, expressed in A."""
+        return np.asarray(np.asarray(points, dtype=np.float64) @ self.R.T + self.p)
+
+    @cached_property
+    def quat_xyzw(self) -> Array:
+        return frozen(quat_from_matrix(self.R))
+
+    @cached_property
+    def rpy(self) -> Array:
+        return frozen(rpy_from_matrix(self.R))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """Homogeneous (4, 4)."""
+        M = np.eye(4)
+        M[:3, :3], M[:3, 3] = self.R, self.p
+        return frozen(M)

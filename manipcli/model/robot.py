@@ -1,0 +1,214 @@
+"""What a robot is: links, joints, groups, named poses, transmissions. Immutable; built once from a description.
+
+Frames: L link, J joint (coincides with its child link), P parent link, B robot base, W world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from manipcli.core.geometry import Array, Transform
+
+JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Centred at its frame; `size` (3,) [m]: full edge lengths along x, y, z."""
+
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """`radius` [m], centred at its frame."""
+
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Axis along z, centred at its frame; `radius` and `length` [m]."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A mesh file: `uri` as the user wrote it, `path` where it was found, `scale` per axis."""
+
+    uri: str
+    path: Path
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+Shape = Box | Sphere | Cylinder | Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """A shape placed in the frame of a link or an object; `rgba` only matters to what is drawn."""
+
+    X_LS: Transform
+    shape: Shape
+    rgba: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """`mass` [kg]; `X_LI`: inertial frame (origin at the centre of mass) in the link; `inertia` (3, 3) [kg m2] in I."""
+
+    mass: float
+    X_LI: Transform
+    inertia: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    name: str
+    inertial: Inertial | None
+    visuals: tuple[Geometry, ...]
+    collisions: tuple[Geometry, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits:
+    """SI: rad or m, and per second. None is unlimited (`lower`, `upper`) or not stated (the rest)."""
+
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """position = multiplier * position of `joint` + offset."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """`X_PJ`: joint frame in the parent link at zero position; `axis` (3,) unit, in J. Damping N m s/rad or N s/m."""
+
+    name: str
+    type: JointType
+    parent: str
+    child: str
+    X_PJ: Transform
+    axis: Array
+    limits: JointLimits
+    mimic: Mimic | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        return self.type != "fixed"
+
+    @property
+    def independent(self) -> bool:
+        """Moves and follows no other joint: what a controller may command."""
+        return self.moves and self.mimic is None
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Independent joints that are planned and named together. `tip`: the link that poses of the group speak of."""
+
+    name: str
+    joints: tuple[str, ...]
+    base: str | None = None
+    tip: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPose:
+    """Position of some joints, parallel tuples; rad or m."""
+
+    name: str
+    joints: tuple[str, ...]
+    positions: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TransmissionTag:
+    """A `<transmission>` as written, roles resolved: parallel tuples in role order."""
+
+    name: str
+    type: str
+    joints: tuple[str, ...]
+    joint_reductions: tuple[float, ...]
+    joint_offsets: tuple[float, ...]
+    actuators: tuple[str, ...]
+    actuator_reductions: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
+
+    `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
+    `X_WB` places the root link in the world.
+    """
+
+    name: str
+    root: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    groups: tuple[Group, ...]
+    poses: tuple[NamedPose, ...]
+    transmissions: tuple[TransmissionTag, ...]
+    X_WB: Transform
+    urdf: str
+
+    @cached_property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """Every joint that moves, mimics included: the order of all joint vectors (n,) in the program."""
+        return tuple(joint for joint in self.joints if joint.moves)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of `moving_joints`."""
+        return tuple(joint.name for joint in self.moving_joints)
+
+    @cached_property
+    def _joints(self) -> dict[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _links(self) -> dict[str, Link]:
+        return {link.name: link for link in self.links}
+
+    def joint(self, name: str) -> Joint:
+        return self._joints[name]
+
+    def link(self, name: str) -> Link:
+        return self._links[name]
+
+    def group(self, name: str) -> Group:
+        return next(group for group in self.groups if group.name == name)
+
+    def pose(self, name: str) -> NamedPose:
+        return next(pose for pose in self.poses if pose.name == name)
+
+    def indices(self, joints: tuple[str, ...]) -> list[int]:
+        """Where these joints stand in a joint vector."""
+        return [self.joint_names.index(name) for name in joints]
+
+    def descendants(self, link: str) -> frozenset[str]:
+        """Names of `link` and of every link below it."""
+        found = {link}
+        for joint in self.joints:
+            if joint.parent in found:
+                found.add(joint.child)
+        return frozenset(found)

@@ -1,0 +1,66 @@
+"""The state of the world at one instant, or at many: every array may carry leading axes `...` (time).
+
+The same conditions read a live state (no leading axis) and a whole recording (a leading time axis).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class WorldState:
+    """Joint vectors follow `RobotModel.moving_joints` (n); body arrays follow `Scene.movable` (m).
+
+    Attributes:
+        time: (...) [s] of simulated time.
+        position, velocity, effort: (..., n) rad or m, per second, N m or N.
+        body_position: (..., m, 3) [m] of each body's frame O in the world.
+        body_quat_xyzw: (..., m, 4).
+        body_linear: (..., m, 3) [m/s] velocity of O (not of the centre of mass) in the world.
+        body_angular: (..., m, 3) [rad/s] in the world.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    effort: Array
+    body_position: Array
+    body_quat_xyzw: Array
+    body_linear: Array
+    body_angular: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two touching parts. `a` and `b` name a body, or `robot/<link>`; sorted so that a <= b.
+
+    `force` [N]: sum of the normal forces between the two; `distance` [m]: the deepest, negative when penetrating.
+    """
+
+    a: str
+    b: str
+    force: float
+    distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """Pose of a body's frame O in the world, with the leading axes of the state it came from."""
+
+    position: Array
+    quat_xyzw: Array
+
+
+def body_pose(scene: Scene, state: WorldState, name: str) -> BodyPose:
+    """Pose of a body by name; a fixed body's constant pose broadcasts against any state."""
+    body = scene.body(name)
+    if body.fixed:
+        return BodyPose(position=np.asarray(body.X_WO.p), quat_xyzw=np.asarray(body.X_WO.quat_xyzw))
+    k = scene.movable.index(body)
+    return BodyPose(position=state.body_position[..., k, :], quat_xyzw=state.body_quat_xyzw[..., k, :])
