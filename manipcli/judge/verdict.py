@@ -1,0 +1,52 @@
+"""What judging gives: one outcome a step, one an expectation, and the verdict over all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from manipcli.core.errors import Finding
+
+VerdictWord = Literal["passed", "failed", "error"]
+ExpectationWord = Literal["passed", "failed", "not_evaluated"]
+StepWord = Literal["done", "failed", "timeout", "interrupted", "not_run"]
+
+
+@dataclass(frozen=True, slots=True)
+class StepOutcome:
+    """How one step went; times in simulated seconds, None where it never started or ended."""
+
+    id: str
+    verb: str
+    outcome: StepWord
+    started: float | None
+    ended: float | None
+    planned_duration: float
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectationOutcome:
+    """How one expectation was met. `margin` in `unit` is positive when met; `at` [s] is its worst moment."""
+
+    name: str
+    outcome: ExpectationWord
+    margin: float | None
+    unit: str
+    at: float | None
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The judgement of one recording. `errors` is empty unless the verdict is `error`."""
+
+    task: str
+    verdict: VerdictWord
+    seed: int
+    engine: str
+    simulated_time: float
+    steps: tuple[StepOutcome, ...]
+    expectations: tuple[ExpectationOutcome, ...]
+    errors: tuple[Finding, ...] = ()
+    text: str = ""
