@@ -158,7 +158,7 @@ class RobotModel:
     """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
 
     `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
-    `X_WB` places the root link in the world.
+    `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact.
     """
 
     name: str
@@ -170,6 +170,7 @@ class RobotModel:
     transmissions: tuple[TransmissionTag, ...]
     X_WB: Transform
     urdf: str
+    friction: float = 1.0
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:

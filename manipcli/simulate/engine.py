@@ -1,0 +1,69 @@
+"""The contract of engines: a world that can be read, commanded and stepped.
+
+A constructed engine is usable: the robot stands at its start position, the bodies at theirs, time is 0. One engine
+object owns one world; two in one process do not meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from manipcli.control.controller import Interface
+from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact, WorldState
+
+
+@dataclass(frozen=True, slots=True)
+class EngineSettings:
+    """`step` [s]: one physics step; `substeps`: physics steps a control tick; `interfaces`: one a moving joint.
+
+    A joint that mimics another has interface None: nobody commands it.
+    """
+
+    step: float
+    substeps: int
+    interfaces: tuple[Interface | None, ...]
+    start: Array
+
+
+class Engine(Protocol):
+    """Joint vectors follow `RobotModel.moving_joints`, body arrays `Scene.movable`."""
+
+    def read(self) -> WorldState:
+        """The true state now. Its arrays are the engine's own, overwritten by the next read: copy to keep."""
+        ...
+
+    def write(self, command: Array, position: Array, velocity: Array) -> None:
+        """Commands (n), each in its joint's interface, held until the next write; and the references (n) behind
+        them, which only an ideal engine uses."""
+        ...
+
+    def advance(self) -> None:
+        """One control tick: `substeps` physics steps."""
+        ...
+
+    def robot_contacts(self) -> tuple[Contact, ...]:
+        """What the robot touches now."""
+        ...
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Everything that touches now, robot included."""
+        ...
+
+    def close(self) -> None:
+        """Free the world; the engine is unusable afterwards."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EngineMember:
+    """A member of the seam. `physics` tells judges what can be known: "none" leaves objects where they stand."""
+
+    name: str
+    physics: Literal["full", "none"]
+    open: Callable[[RobotModel, Scene, EngineSettings], Engine]
+    version: Callable[[], str]

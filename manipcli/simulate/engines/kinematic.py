@@ -1,0 +1,67 @@
+"""The ideal engine: references come true at once, objects stay where they stand, nothing touches anything."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact, WorldState
+from manipcli.simulate.engine import EngineMember, EngineSettings
+
+
+class KinematicEngine:
+    """Perfect tracking of any interface; mimic joints follow their driver exactly. For fast tests of everything else."""
+
+    def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
+        n, m = len(robot.joint_names), len(scene.movable)
+        self._followers = [
+            (k, robot.joint_names.index(joint.mimic.joint), joint.mimic.multiplier, joint.mimic.offset)
+            for k, joint in enumerate(robot.moving_joints)
+            if joint.mimic is not None
+        ]
+        self._period = settings.step * settings.substeps
+        self._tick = 0
+        self._state = WorldState(
+            time=np.zeros(()),
+            position=np.array(settings.start),
+            velocity=np.zeros(n),
+            effort=np.zeros(n),
+            body_position=np.array([body.X_WO.p for body in scene.movable]).reshape(m, 3),
+            body_quat_xyzw=np.array([body.X_WO.quat_xyzw for body in scene.movable]).reshape(m, 4),
+            body_linear=np.zeros((m, 3)),
+            body_angular=np.zeros((m, 3)),
+        )
+
+    def read(self) -> WorldState:
+        return self._state
+
+    def write(self, command: Array, position: Array, velocity: Array) -> None:
+        self._state.position[:] = position
+        self._state.velocity[:] = velocity
+        for follower, driver, multiplier, offset in self._followers:
+            self._state.position[follower] = multiplier * position[driver] + offset
+            self._state.velocity[follower] = multiplier * velocity[driver]
+
+    def advance(self) -> None:
+        self._tick += 1
+        self._state.time[...] = self._tick * self._period
+
+    def robot_contacts(self) -> tuple[Contact, ...]:
+        return ()
+
+    def contacts(self) -> tuple[Contact, ...]:
+        return ()
+
+    def close(self) -> None:
+        """Holds nothing."""
+
+
+def _version() -> str:
+    from manipcli import __version__
+
+    return __version__
+
+
+MEMBER = EngineMember(name="kinematic", physics="none", open=KinematicEngine, version=_version)

@@ -1,0 +1,331 @@
+"""Bullet through PyBullet's DIRECT mode. The only file that knows PyBullet's indices and tuples."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from types import ModuleType
+from typing import Final, cast
+
+import numpy as np
+
+from manipcli.core.errors import SimulationFailed
+from manipcli.core.geometry import Array
+from manipcli.model.normalise import engine_urdf
+from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
+from manipcli.model.scene import Body, Scene
+from manipcli.model.state import Contact, WorldState
+from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.quiet import stdout_to_stderr
+
+SOLVER_ITERATIONS: Final = 50
+UNLIMITED_EFFORT: Final = 1e6
+"""Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
+MIMIC_ERP: Final = 0.2
+MIMIC_EFFORT: Final = 200.0
+"""What a mimic coupling may carry [N m or N]."""
+
+
+class PybulletEngine:
+    """One PyBullet world."""
+
+    def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
+        with stdout_to_stderr():
+            import pybullet
+
+            self._p: ModuleType = pybullet
+            self._client: int = pybullet.connect(pybullet.DIRECT)
+            try:
+                self._build(robot, scene, settings)
+            except pybullet.error as error:
+                self.close()
+                raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
+
+    def _build(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
+        p, client = self._p, self._client
+        p.setGravity(*scene.gravity, physicsClientId=client)
+        p.setPhysicsEngineParameter(
+            fixedTimeStep=settings.step,
+            numSolverIterations=SOLVER_ITERATIONS,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        self._names: dict[int, str] = {}
+        self._bodies = [self._add_body(body) for body in scene.bodies]
+        self._movable = [k for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed]
+        self._com_offset = [tuple(float(v) for v in body.X_OI.p) for body in scene.movable]
+        self._com_turned = [
+            None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
+            for body in scene.movable
+        ]
+        self._load_robot(robot)
+        self._start(robot, settings)
+        n, m = len(self._joints), len(self._movable)
+        self._state = WorldState(
+            time=np.zeros(()),
+            position=np.zeros(n),
+            velocity=np.zeros(n),
+            effort=np.zeros(n),
+            body_position=np.zeros((m, 3)),
+            body_quat_xyzw=np.zeros((m, 4)),
+            body_linear=np.zeros((m, 3)),
+            body_angular=np.zeros((m, 3)),
+        )
+        self._tick = 0
+        self._substeps = settings.substeps
+        self._period = settings.step * settings.substeps
+
+    def _add_body(self, body: Body) -> int:
+        p, client = self._p, self._client
+        kinds, half, radii, lengths, positions, quats = [], [], [], [], [], []
+        files, scales = [], []
+        for geometry in body.geometries:
+            X_IS = body.X_OI.inverse() @ geometry.X_LS
+            shape = geometry.shape
+            kinds.append(_geometry_kind(p, shape))
+            half.append([s / 2 for s in shape.size] if isinstance(shape, Box) else [0.0, 0.0, 0.0])
+            radii.append(shape.radius if isinstance(shape, Sphere | Cylinder) else 0.0)
+            lengths.append(shape.length if isinstance(shape, Cylinder) else 0.0)
+            files.append(str(shape.path) if isinstance(shape, Mesh) else "")
+            scales.append(list(shape.scale) if isinstance(shape, Mesh) else [1.0, 1.0, 1.0])
+            positions.append(list(X_IS.p))
+            quats.append(list(X_IS.quat_xyzw))
+        collision = p.createCollisionShapeArray(
+            shapeTypes=kinds,
+            halfExtents=half,
+            radii=radii,
+            lengths=lengths,
+            fileNames=files,
+            meshScales=scales,
+            collisionFramePositions=positions,
+            collisionFrameOrientations=quats,
+            physicsClientId=client,
+        )
+        X_WI = body.X_WO @ body.X_OI
+        k = p.createMultiBody(
+            baseMass=0.0 if body.fixed else body.mass,
+            baseCollisionShapeIndex=collision,
+            basePosition=list(X_WI.p),
+            baseOrientation=list(X_WI.quat_xyzw),
+            physicsClientId=client,
+        )
+        p.changeDynamics(
+            k,
+            -1,
+            lateralFriction=body.friction,
+            rollingFriction=body.rolling_friction,
+            spinningFriction=body.spinning_friction,
+            restitution=body.restitution,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            physicsClientId=client,
+        )
+        if not body.fixed:
+            p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
+        self._names[k] = body.name
+        return cast(int, k)
+
+    def _load_robot(self, robot: RobotModel) -> None:
+        p, client = self._p, self._client
+        with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
+            file = Path(folder) / "robot.urdf"
+            file.write_text(engine_urdf(robot), encoding="utf-8")
+            self._robot: int = p.loadURDF(
+                str(file),
+                basePosition=list(robot.X_WB.p),
+                baseOrientation=list(robot.X_WB.quat_xyzw),
+                useFixedBase=True,
+                flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_IGNORE_VISUAL_SHAPES,
+                physicsClientId=client,
+            )
+        count = p.getNumJoints(self._robot, physicsClientId=client)
+        infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
+        by_name = {info[1].decode(): k for k, info in enumerate(infos)}
+        self._joints = [by_name[name] for name in robot.joint_names]
+        self._link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
+        for link in self._link_names:
+            p.changeDynamics(
+                self._robot,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                lateralFriction=robot.friction,
+                physicsClientId=client,
+            )
+        self._names[self._robot] = "robot"
+
+    def _start(self, robot: RobotModel, settings: EngineSettings) -> None:
+        p, client = self._p, self._client
+        for k, position in zip(self._joints, settings.start, strict=True):
+            p.resetJointState(self._robot, k, float(position), 0.0, physicsClientId=client)
+        p.setJointMotorControlArray(
+            self._robot,
+            self._joints,
+            p.VELOCITY_CONTROL,
+            forces=[0.0] * len(self._joints),
+            physicsClientId=client,
+        )
+        for joint in robot.moving_joints:
+            if joint.mimic is not None:
+                self._couple(robot, joint.name, joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
+        self._by_interface = {
+            interface: [k for k, used in enumerate(settings.interfaces) if used == interface]
+            for interface in ("effort", "position", "velocity")
+            if interface in settings.interfaces
+        }
+        limits = [joint.limits for joint in robot.moving_joints]
+        self._efforts = [UNLIMITED_EFFORT if limit.effort is None else limit.effort for limit in limits]
+        self._velocities = [limit.velocity or math.inf for limit in limits]
+        self._applied: list[float] = [0.0] * len(self._by_interface.get("effort", ()))
+
+    def _couple(self, robot: RobotModel, follower: str, driver: str, multiplier: float, offset: float) -> None:
+        """A gear constraint between the two joints' child links: follower - multiplier * driver = offset."""
+        p, client = self._p, self._client
+        constraint = p.createConstraint(
+            self._robot,
+            self._joints[robot.joint_names.index(driver)],
+            self._robot,
+            self._joints[robot.joint_names.index(follower)],
+            jointType=p.JOINT_GEAR,
+            jointAxis=list(robot.joint(follower).axis),
+            parentFramePosition=[0, 0, 0],
+            childFramePosition=[0, 0, 0],
+            physicsClientId=client,
+        )
+        p.changeConstraint(
+            constraint,
+            gearRatio=-multiplier,
+            relativePositionTarget=-offset,
+            erp=MIMIC_ERP,
+            maxForce=MIMIC_EFFORT,
+            physicsClientId=client,
+        )
+
+    def read(self) -> WorldState:
+        p, client, state = self._p, self._client, self._state
+        states = p.getJointStates(self._robot, self._joints, client)
+        state.position[:] = [s[0] for s in states]
+        state.velocity[:] = [s[1] for s in states]
+        state.effort[:] = [s[3] for s in states]
+        state.effort[self._by_interface.get("effort", [])] = self._applied
+        for row, k in enumerate(self._movable):
+            position, quat = p.getBasePositionAndOrientation(k, client)
+            linear, angular = p.getBaseVelocity(k, client)
+            turned = self._com_turned[row]
+            if turned is not None:
+                _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
+            r = _rotated(quat, self._com_offset[row])
+            state.body_position[row] = (position[0] - r[0], position[1] - r[1], position[2] - r[2])
+            state.body_quat_xyzw[row] = quat
+            wx, wy, wz = angular
+            state.body_linear[row] = (
+                linear[0] - (wy * r[2] - wz * r[1]),
+                linear[1] - (wz * r[0] - wx * r[2]),
+                linear[2] - (wx * r[1] - wy * r[0]),
+            )
+            state.body_angular[row] = angular
+        return state
+
+    def write(self, command: Array, position: Array, velocity: Array) -> None:
+        p = self._p
+        for interface, rows in self._by_interface.items():
+            joints = [self._joints[k] for k in rows]
+            values = command[rows].tolist()
+            if interface == "effort":
+                p.setJointMotorControlArray(
+                    self._robot, joints, p.TORQUE_CONTROL, forces=values, physicsClientId=self._client
+                )
+                self._applied = values
+            elif interface == "velocity":
+                p.setJointMotorControlArray(
+                    self._robot,
+                    joints,
+                    p.VELOCITY_CONTROL,
+                    targetVelocities=values,
+                    forces=[self._efforts[k] for k in rows],
+                    physicsClientId=self._client,
+                )
+            else:
+                for k, joint, value in zip(rows, joints, values, strict=True):
+                    p.setJointMotorControl2(
+                        self._robot,
+                        joint,
+                        p.POSITION_CONTROL,
+                        targetPosition=value,
+                        force=self._efforts[k],
+                        maxVelocity=self._velocities[k],
+                        physicsClientId=self._client,
+                    )
+
+    def advance(self) -> None:
+        for _ in range(self._substeps):
+            self._p.stepSimulation(self._client)
+        self._tick += 1
+        self._state.time[...] = self._tick * self._period
+
+    def robot_contacts(self) -> tuple[Contact, ...]:
+        return self._merged(self._p.getContactPoints(bodyA=self._robot, physicsClientId=self._client))
+
+    def contacts(self) -> tuple[Contact, ...]:
+        return self._merged(self._p.getContactPoints(physicsClientId=self._client))
+
+    def _merged(self, points: tuple[tuple[object, ...], ...]) -> tuple[Contact, ...]:
+        """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
+        if not points:
+            return ()
+        pairs: dict[tuple[int, int, int, int], tuple[float, float]] = {}
+        for point in points:
+            distance, force = cast(tuple[float, float], point[8:10])
+            if force > 0.0 or distance <= 0.0:
+                key = cast(tuple[int, int, int, int], point[1:5])
+                total, deepest = pairs.get(key, (0.0, math.inf))
+                pairs[key] = (total + force, min(deepest, distance))
+        found = []
+        for (body_a, body_b, link_a, link_b), (force, distance) in pairs.items():
+            a, b = sorted((self._part(body_a, link_a), self._part(body_b, link_b)))
+            found.append(Contact(a=a, b=b, force=force, distance=distance))
+        return tuple(sorted(found, key=lambda contact: (contact.a, contact.b)))
+
+    def _part(self, body: int, link: int) -> str:
+        return f"robot/{self._link_names[link]}" if body == self._robot else self._names[body]
+
+    def close(self) -> None:
+        if self._client >= 0:
+            self._p.disconnect(self._client)
+            self._client = -1
+
+
+def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
+    if isinstance(shape, Box):
+        return cast(int, p.GEOM_BOX)
+    if isinstance(shape, Sphere):
+        return cast(int, p.GEOM_SPHERE)
+    if isinstance(shape, Cylinder):
+        return cast(int, p.GEOM_CYLINDER)
+    return cast(int, p.GEOM_MESH)
+
+
+def _rotated(quat: tuple[float, ...], v: tuple[float, ...]) -> tuple[float, float, float]:
+    """R(quat_xyzw) v in plain floats: numpy costs ten times as much for three numbers."""
+    x, y, z, w = quat
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    for distribution in ("pybullet", "pybullet-arm64"):
+        try:
+            return version(distribution)
+        except PackageNotFoundError:
+            continue
+    return "unknown"
+
+
+MEMBER = EngineMember(name="pybullet", physics="full", open=PybulletEngine, version=_version)
