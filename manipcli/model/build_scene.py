@@ -1,0 +1,314 @@
+"""From what the user wrote under `scene:` and `frames:` to a `Scene`: shapes, mass, places; every finding at once."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model import body_shapes
+from manipcli.model.body_shapes import COLORS, BodyShape
+from manipcli.model.mass import union
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
+from manipcli.model.scene import Body, Frame, Interior, Scene
+from manipcli.model.start_overlap import overlaps
+from manipcli.spec.robot import PoseSpec
+from manipcli.spec.task import BodySpec, TaskSpec
+
+Loc = tuple[str | int, ...]
+Locate = Callable[[Loc], Place | None]
+Resolve = Callable[[str], Path]
+
+SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
+RESERVED = ("world", "robot", "start", "floor")
+FLOOR_SIZE = (10.0, 10.0, 0.1)
+
+
+def build_scene(spec: TaskSpec, *, place: Locate | None = None, resolve: Resolve | None = None) -> Scene:
+    """The scene of a task: the floor first (when there is one), then the bodies as written.
+
+    Args:
+        spec: the task; `scene`, `frames`, `floor` and `simulation.gravity` are read.
+        place: where in the file the value at a path such as `("scene", "cup", "inside")` stands.
+        resolve: finds a file that the task names (mesh, urdf); default: the path as it stands.
+
+    Raises:
+        InvalidInput: with every finding: no or several shapes, no or several placements, a body, parent or container
+            that is not there, a missing mass, a wall thicker than its container, bodies that start inside each other.
+    """
+    return _Builder(spec, place or (lambda _: None), resolve or Path).build()
+
+
+class _Builder:
+    """One use: collects findings on the way, so that a faulty body does not hide the faults of the others."""
+
+    def __init__(self, spec: TaskSpec, place: Locate, resolve: Resolve) -> None:
+        self.spec = spec
+        self.place = place
+        self.resolve = resolve
+        self.findings: list[Finding] = []
+        self.shapes: dict[str, BodyShape] = {}
+        self.kinds: dict[str, str] = {}
+        self.poses: dict[str, Transform] = {}
+        self.unplaced: set[str] = set()
+        self.waiting: list[str] = []
+
+    def build(self) -> Scene:
+        bodies: list[Body] = []
+        if self.spec.floor:
+            self._add_shape("floor", "floor", _floor_shape())
+            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -FLOOR_SIZE[2] / 2.0))
+            bodies.append(self._body("floor", BodySpec(fixed=True), self.poses["floor"]))
+        for name, body in self.spec.scene.items():
+            self._shape(name, body)
+        for name in self.spec.scene:
+            X_WO = self._pose(name)
+            if X_WO is not None and name in self.shapes:
+                bodies.append(self._body(name, self.spec.scene[name], X_WO))
+        frames = tuple(self._frames())
+        if not self.findings:
+            for a, b, depth in overlaps(bodies):
+                late = next(name for name in reversed(self.spec.scene) if name in (a, b))
+                self._error(
+                    "TASK226",
+                    f"'{a}' and '{b}' start {depth * 1e3:.1f} mm inside each other",
+                    ("scene", late),
+                    "move one of them; things that only touch are fine",
+                )
+        if self.findings:
+            raise InvalidInput(self.findings)
+        return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
+
+    # -- shapes and mass
+
+    def _shape(self, name: str, spec: BodySpec) -> None:
+        loc: Loc = ("scene", name)
+        if name in RESERVED or "/" in name:
+            self._error(
+                "TASK220",
+                f"a body cannot be called '{name}': "
+                + ("names have no '/'" if "/" in name else "the word means something else in a task"),
+                loc,
+                f"reserved are {', '.join(RESERVED)}",
+            )
+        words = [word for word in SHAPES if getattr(spec, word) is not None]
+        if len(words) != 1:
+            found = f"has {len(words)} shapes ({', '.join(words)})" if words else "has no shape"
+            self._error("TASK221", f"body '{name}' {found}; it needs exactly one of {', '.join(SHAPES)}", loc)
+            return
+        (kind,) = words
+        rgba = spec.color or COLORS["desk" if kind == "box" and spec.fixed else kind]
+        try:
+            shape = self._made(kind, spec, rgba)
+        except ValueError as error:
+            self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
+            return
+        self._add_shape(name, kind, shape)
+        if spec.mass is None and not spec.fixed and shape.inertial is None:
+            self._error(
+                "TASK223", f"body '{name}' can move and has no mass", loc, "say `mass: 150 g`, or `fixed: true`"
+            )
+
+    def _made(self, kind: str, spec: BodySpec, rgba: body_shapes.Rgba) -> BodyShape:
+        """Raises ValueError when the numbers contradict each other or a file cannot be used."""
+        if spec.box is not None:
+            return body_shapes.box(spec.box, rgba)
+        if spec.sphere is not None:
+            return body_shapes.sphere(spec.sphere, rgba)
+        if spec.cylinder is not None:
+            return body_shapes.cylinder(spec.cylinder, rgba)
+        if spec.cup is not None:
+            if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
+                raise ValueError(f"a wall of {spec.cup.wall:g} m leaves no hollow in the cup")
+            return body_shapes.cup(spec.cup, rgba)
+        if spec.tray is not None:
+            x, y, z = spec.tray.size
+            if spec.tray.wall >= min(x / 2.0, y / 2.0, z):
+                raise ValueError(f"a wall of {spec.tray.wall:g} m leaves no hollow in the tray")
+            return body_shapes.tray(spec.tray, rgba)
+        raise ValueError(f"'{kind}' cannot be used here")
+
+    def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
+        self.shapes[name] = shape
+        self.kinds[name] = kind
+
+    def _body(self, name: str, spec: BodySpec, X_WO: Transform) -> Body:
+        shape = self.shapes[name]
+        # A fixed body's inertia is never asked for; its inertial frame still says where its middle is.
+        mass = spec.mass or (shape.inertial.mass if shape.inertial is not None else 1.0)
+        inertial = shape.inertial or union(shape.geometries, mass)
+        scale = mass / inertial.mass
+        inertial = Inertial(mass=mass, X_LI=inertial.X_LI, inertia=frozen(inertial.inertia * scale))
+        return Body(
+            name=name,
+            kind=self.kinds[name],
+            geometries=shape.geometries,
+            mass=0.0 if spec.fixed else mass,
+            X_OI=inertial.X_LI,
+            inertia=frozen(np.zeros((3, 3))) if spec.fixed else inertial.inertia,
+            friction=spec.friction,
+            rolling_friction=spec.rolling_friction,
+            spinning_friction=spec.spinning_friction,
+            restitution=spec.restitution,
+            fixed=spec.fixed,
+            X_WO=X_WO,
+            interior=shape.interior,
+            size=shape.size,
+            centre=shape.centre,
+        )
+
+    # -- places
+
+    def _pose(self, name: str) -> Transform | None:
+        """X_WO of a body of the task; None when a finding says why not (here or at the body that it depends on)."""
+        if name in self.poses or name in self.unplaced:
+            return self.poses.get(name)
+        if name in self.waiting:
+            circle = " -> ".join((*self.waiting[self.waiting.index(name) :], name))
+            last = self.waiting[-1]
+            word = "inside" if self.spec.scene[last].inside is not None else "rests_on"
+            self._error("TASK225", f"bodies are placed on each other in a circle: {circle}", ("scene", last, word))
+            return None
+        self.waiting.append(name)
+        X_WO = self._placed(name, self.spec.scene[name])
+        self.waiting.pop()
+        if X_WO is None:
+            self.unplaced.add(name)
+        else:
+            self.poses[name] = X_WO
+        return X_WO
+
+    def _placed(self, name: str, spec: BodySpec) -> Transform | None:
+        loc: Loc = ("scene", name)
+        words = [word for word in ("pose", "rests_on", "inside") if getattr(spec, word) is not None]
+        if len(words) != 1:
+            found = f"is placed twice ({', '.join(words)})" if words else "has no place"
+            hint = "`pose: {xyz: [x, y, z]}`, or `rests_on: BODY` with `at: [x, y]`, or `inside: CONTAINER`"
+            self._error("TASK224", f"body '{name}' {found}", (*loc, words[-1]) if words else loc, hint)
+            return None
+        if (spec.at is not None) != (spec.rests_on is not None):
+            message = "needs `at: [x, y]` beside `rests_on`" if spec.at is None else "has `at` without `rests_on`"
+            self._error("TASK224", f"body '{name}' {message}", (*loc, "rests_on" if spec.at is None else "at"))
+            return None
+        if spec.pose is not None:
+            if spec.yaw != 0.0:
+                self._error(
+                    "TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), "say it in the pose: `rpy: [0, 0, yaw]`"
+                )
+            return pose_transform(spec.pose)
+        word = "rests_on" if spec.rests_on is not None else "inside"
+        other = spec.rests_on or spec.inside or ""
+        X_WB = self._other(other, (*loc, word))
+        if X_WB is None or name not in self.shapes or other not in self.shapes:
+            return None
+        if word == "inside":
+            return self._inside(name, spec, other, X_WB)
+        return self._resting(name, spec, other, X_WB)
+
+    def _other(self, name: str, loc: Loc) -> Transform | None:
+        """Where another body stands, or None with a finding."""
+        if name not in self.spec.scene and name not in self.poses:
+            self._unknown("TASK225", name, (*self.spec.scene, *(("floor",) if self.spec.floor else ())), loc)
+            return None
+        return self._pose(name)
+
+    def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """Bottom of the body on the top face of the other, exactly touching: the settling lets it land."""
+        loc: Loc = ("scene", name, "rests_on")
+        support, shape = self.shapes[other], self.shapes[name]
+        assert spec.at is not None
+        if not support.flat_top:
+            hint = f"say `inside: {other}`" if support.interior is not None else "rest it on a box, a cylinder or the floor"
+            self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
+            return None
+        if X_WB.R[2, 2] < 1.0 - 1e-6:
+            self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
+            return None
+        top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
+        X_WO = Transform.of(xyz=(*spec.at, top - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
+        beside = (
+            np.hypot(x, y) > support.radius
+            if support.radius is not None
+            else abs(x) > support.size[0] / 2.0 or abs(y) > support.size[1] / 2.0
+        )
+        if beside:
+            at = f"[{spec.at[0]:g}, {spec.at[1]:g}]"
+            self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"))
+            return None
+        return X_WO
+
+    def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """On the floor of the other's hollow, in its middle, axes along the container's (turned by yaw)."""
+        loc: Loc = ("scene", name, "inside")
+        interior, shape = self.shapes[other].interior, self.shapes[name]
+        if interior is None:
+            containers = [known for known, made in self.shapes.items() if made.interior is not None]
+            hint = f"containers here: {', '.join(containers)}" if containers else "a cup or a tray is a container"
+            self._error("TASK224", f"'{other}' is a {self.kinds[other]} and has no inside", loc, hint)
+            return None
+        lack = _too_big(shape, spec.yaw, interior)
+        if lack > 0.0:
+            self._error("TASK224", f"'{name}' is {lack * 1e3:.1f} mm too wide for the inside of '{other}'", loc)
+            return None
+        floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
+        X_SO = Transform.of(xyz=(0.0, 0.0, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        return X_WB @ interior.X_OS @ X_SO
+
+    # -- frames
+
+    def _frames(self) -> Iterable[Frame]:
+        for name, frame in self.spec.frames.items():
+            if name in self.shapes or name in RESERVED or "/" in name:
+                self._error("TASK227", f"a frame cannot be called '{name}': the name is taken", ("frames", name))
+            known = ("world", *self.spec.scene, *(("floor",) if self.spec.floor else ()))
+            if frame.parent not in known:
+                self._unknown("TASK227", frame.parent, known, ("frames", name, "parent"))
+            yield Frame(name=name, parent=frame.parent, X_PF=pose_transform(frame.pose))
+
+    # -- findings
+
+    def _unknown(self, code: str, name: str, known: tuple[str, ...], loc: Loc) -> None:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+        self._error(code, f"'{name}' is not in the scene", loc, hint)
+
+    def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
+        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+
+
+def pose_transform(spec: PoseSpec) -> Transform:
+    """X_AB of a pose as users write it."""
+    return Transform.of(xyz=spec.xyz, rpy=spec.rpy, quat_xyzw=spec.quat_xyzw)
+
+
+def _floor_shape() -> BodyShape:
+    # A thick box and not PyBullet's plane: the same body for contact, collision checks and drawing.
+    return BodyShape(
+        geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
+        interior=None,
+        size=frozen(FLOOR_SIZE),
+        centre=frozen(np.zeros(3)),
+        flat_top=True,
+    )
+
+
+def _bottom(shape: BodyShape) -> float:
+    """Lowest z [m] of the shape in O."""
+    return float(shape.centre[2] - shape.size[2] / 2.0)
+
+
+def _too_big(shape: BodyShape, yaw: float, interior: Interior) -> float:
+    """By how much [m] the outline of the shape, turned by yaw, is wider than the hollow on one side; <= 0: it fits."""
+    half: Array = shape.size[:2] / 2.0
+    if isinstance(interior.shape, Cylinder):
+        outline = shape.radius if shape.radius is not None else float(np.hypot(*half))
+        return outline - interior.shape.radius
+    if shape.radius is None:
+        c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
+        half = np.array([c * half[0] + s * half[1], s * half[0] + c * half[1]])
+    return float(np.max(half - np.array(interior.shape.size[:2]) / 2.0))
