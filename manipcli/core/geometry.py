@@ -59,13 +59,23 @@ def matrix_from_quat(quat_xyzw: npt.ArrayLike) -> Array:
     return R
 
 
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """`a x b` for (..., 3), broadcast; for single vectors several times as fast as `np.cross`."""
+    return np.asarray(
+        a.take(_NEXT, axis=-1) * b.take(_LAST, axis=-1) - a.take(_LAST, axis=-1) * b.take(_NEXT, axis=-1)
+    )
+
+
 def rotate(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:
     """`R(q) v` for (..., 4) and (..., 3), broadcast: v + 2w(u x v) + 2u x (u x v)."""
     q = np.asarray(quat_xyzw, dtype=np.float64)
     v = np.asarray(vector, dtype=np.float64)
     u = q[..., :3]
-    t = 2.0 * np.cross(u, v)
-    return np.asarray(v + q[..., 3:4] * t + np.cross(u, t))
+    t = 2.0 * cross(u, v)
+    return np.asarray(v + q[..., 3:4] * t + cross(u, t))
 
 
 def rotate_inverse(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.names import did_you_mean
 from manipcli.model import body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
@@ -196,9 +196,8 @@ class _Builder:
             return None
         if spec.pose is not None:
             if spec.yaw != 0.0:
-                self._error(
-                    "TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), "say it in the pose: `rpy: [0, 0, yaw]`"
-                )
+                hint = "say it in the pose: `rpy: [0, 0, yaw]`"
+                self._error("TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), hint)
             return pose_transform(spec.pose)
         word = "rests_on" if spec.rests_on is not None else "inside"
         other = spec.rests_on or spec.inside or ""
@@ -222,7 +221,8 @@ class _Builder:
         support, shape = self.shapes[other], self.shapes[name]
         assert spec.at is not None
         if not support.flat_top:
-            hint = f"say `inside: {other}`" if support.interior is not None else "rest it on a box, a cylinder or the floor"
+            flat = "rest it on a box, a cylinder or the floor"
+            hint = f"say `inside: {other}`" if support.interior is not None else flat
             self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
             return None
         if X_WB.R[2, 2] < 1.0 - 1e-6:
@@ -273,9 +273,7 @@ class _Builder:
     # -- findings
 
     def _unknown(self, code: str, name: str, known: tuple[str, ...], loc: Loc) -> None:
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-        self._error(code, f"'{name}' is not in the scene", loc, hint)
+        self._error(code, f"'{name}' is not in the scene", loc, did_you_mean(name, known))
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from manipcli.core.geometry import Array
+from manipcli.core.names import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
@@ -53,8 +54,8 @@ class Condition(Generic[S]):
         unit: of the margin, SI: "m", "rad", ...
         margin: (spec, world, state) -> (...) signed, positive where the condition holds; the result has the leading
             axes of `state`.
-        bodies: spec -> the names of the bodies whose motion the margin depends on. Without physics movable bodies stay
-            where they are, so there a condition on them is not evaluated (`needs_physics`).
+        bodies: (spec, scene) -> the names of the bodies whose motion the margin depends on. Without physics movable
+            bodies stay where they are, so there a condition on them is not evaluated (`needs_physics`).
         check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know. `margin` may
             only be asked when there is none.
     """
@@ -63,11 +64,19 @@ class Condition(Generic[S]):
     spec: type[S]
     unit: str
     margin: Callable[[S, World, WorldState], Array]
-    bodies: Callable[[S], tuple[str, ...]]
+    bodies: Callable[[S, Scene], tuple[str, ...]]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
 
 
 def needs_physics(condition: Condition[S], spec: S, scene: Scene) -> bool:
     """Whether the condition depends on a body that only physics moves."""
     movable = {body.name for body in scene.movable}
-    return any(name in movable for name in condition.bodies(spec))
+    return any(name in movable for name in condition.bodies(spec, scene))
+
+
+def unknown_body(name: str, loc: tuple[str | int, ...], scene: Scene) -> tuple[Problem, ...]:
+    """The problem that `name` is no body of the scene, or nothing."""
+    known = tuple(body.name for body in scene.bodies)
+    if name in known:
+        return ()
+    return (Problem(loc, f"'{name}' is not in the scene", did_you_mean(name, known)),)
