@@ -1,0 +1,111 @@
+"""The command line as a whole: its commands, and the one place where an error becomes a message and an exit code."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from manipcli import __version__
+from manipcli.cli import check, console, judge, plan, run, schema
+from manipcli.cli import list as list_
+from manipcli.core.errors import ExitCode, Finding, ManipcliError
+
+_INTERRUPTED_BY_TYPER = 130
+"""What Typer returns for Ctrl-C instead of letting KeyboardInterrupt through."""
+
+_EXIT_CODES = (
+    "Exit codes: 0 passed, 1 failed or not plannable, 2 interrupted, 3 internal error, 4 usage or invalid file, "
+    "5 nothing to run."
+)
+
+app = typer.Typer(
+    name="manipcli",
+    help="Manipulation tasks as files: check, plan, simulate, record and judge them.",
+    # Rich help doubles the time of --help; plain help is within 10 % of importing typer.
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+app.command("run")(run.run)
+app.command("check")(check.check)
+app.command("plan")(plan.plan)
+app.command("judge")(judge.judge)
+app.command("list")(list_.list_)
+app.command("schema")(schema.schema)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        console.result(f"manipcli {__version__}")
+        raise typer.Exit()
+
+
+@app.callback(epilog=_EXIT_CODES)
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command line and returns its exit code; shows no traceback unless MANIPCLI_DEBUG is set."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    console.prepare()
+    try:
+        code = app(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
+        if code == _INTERRUPTED_BY_TYPER:
+            raise KeyboardInterrupt
+        return int(code or ExitCode.PASSED)
+    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the last resort: one message and an exit code)
+        return _fail(error, as_json=_wants_json(words))
+
+
+def _fail(error: BaseException, *, as_json: bool) -> ExitCode:
+    """Tells an error: as text on stderr, or as the one JSON object on stdout."""
+    from manipcli.report import json, text
+
+    code, findings = _classify(error)
+    if os.environ.get("MANIPCLI_DEBUG"):
+        console.talk("".join(traceback.format_exception(error)).rstrip())
+    try:
+        if as_json:
+            console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error"))
+        else:
+            console.talk("\n".join(map(text.describe, findings)))
+    except OSError:
+        return ExitCode.INTERNAL  # there is nowhere left to say it
+    return code
+
+
+def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
+    """The exit code of an error, and what to tell of it."""
+    if isinstance(error, ManipcliError):
+        return error.exit_code, error.findings
+    if isinstance(error, TyperException):
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context is not None else "manipcli"
+        finding = Finding(code="USE001", message=error.format_message(), hint=f"`{command} --help` shows the usage")
+        return ExitCode.USAGE, (finding,)
+    if isinstance(error, KeyboardInterrupt):
+        return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
+    if isinstance(error, OSError) and error.filename is not None:
+        return ExitCode.USAGE, (Finding(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
+    finding = Finding(
+        code=ManipcliError.code,
+        message=f"{type(error).__name__}: {error}".replace("\n", " "),
+        hint="this is a bug in manipcli; MANIPCLI_DEBUG=1 shows where",
+    )
+    return ExitCode.INTERNAL, (finding,)
+
+
+def _wants_json(words: Sequence[str]) -> bool:
+    """Whether `--format json` stands in the command line: it holds for usage errors, too."""
+    return "--format=json" in words or any(pair == ("--format", "json") for pair in pairwise(words))

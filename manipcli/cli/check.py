@@ -1,0 +1,34 @@
+"""`manipcli check FILE...`: every finding of every file at once, nothing simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import Format
+from manipcli.core.errors import ExitCode
+
+
+def check(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Task, robot and controllers files.", show_default=False)
+    ],
+    *,
+    format_: Format = "text",
+) -> ExitCode:
+    """Check files: all findings, nothing simulated.
+
+    The kind (task, robot, controllers) is read from each file.
+    """
+    from manipcli import pipeline
+    from manipcli.report import json, text
+
+    findings = pipeline.check_files(tuple(files))
+    names = [str(file) for file in files]
+    render = json.render_findings if format_ == "json" else text.render_findings
+    console.result(render(findings, names))
+    failed = any(finding.severity == "error" for finding in findings)
+    return ExitCode.FAILED if failed else ExitCode.PASSED

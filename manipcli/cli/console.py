@@ -1,0 +1,91 @@
+"""The only file that prints. stdout is the result, stderr is talk.
+
+Text is made safe before it reaches a terminal (control characters escaped, what the encoding lacks written as `\\x..`),
+and coloured only on a terminal that wants it; colour never says what the words do not. A reader that goes away
+(`manipcli list | head`) ends nothing: the exit code stays that of the command.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from typing import TextIO
+
+_COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[": "36", "hint:": "36"}
+_PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
+# C0 without tab and newline, DEL, C1, and the marks that reverse the direction of text.
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+def escape(text: str) -> str:
+    """`text` without anything that a terminal obeys instead of showing."""
+    return _CONTROL.sub(lambda match: match.group().encode("unicode_escape").decode("ascii"), text)
+
+
+def prepare() -> None:
+    """Once at the start: no character may fail to print."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
+
+
+def result(text: str) -> None:
+    """What the command was asked for, to stdout."""
+    _write(sys.stdout, f"{_dressed(text, sys.stdout)}\n")
+
+
+def talk(text: str) -> None:
+    """Everything else, to stderr."""
+    _write(sys.stderr, f"{_dressed(text, sys.stderr)}\n")
+
+
+def is_live() -> bool:
+    """Whether stderr is a terminal whose line can be drawn again."""
+    return _is_terminal(sys.stderr) and os.environ.get("TERM") != "dumb"
+
+
+def redraw(text: str) -> None:
+    """Replaces the current line of a live terminal; `""` clears it."""
+    columns = _columns()
+    _write(sys.stderr, f"\r\x1b[K{escape(text)[: columns - 1]}")
+
+
+def _columns() -> int:
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns or 80
+    except OSError:
+        return 80
+
+
+def _is_terminal(stream: TextIO | None) -> bool:
+    return stream is not None and not stream.closed and stream.isatty()
+
+
+def _dressed(text: str, stream: TextIO | None) -> str:
+    text = escape(text)
+    if not _is_terminal(stream) or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return _PAINTED.sub(lambda match: f"\x1b[{_COLOURS[match.group()]}m{match.group()}\x1b[0m", text)
+
+
+def _write(stream: TextIO | None, text: str) -> None:
+    """Writes through to the end, so that a full disk or a closed pipe is met here and not at exit."""
+    if stream is None or stream.closed:
+        return
+    try:
+        stream.write(text)
+        stream.flush()
+    except BrokenPipeError:
+        _abandon(stream)
+    except OSError:
+        _abandon(stream)
+        raise
+
+
+def _abandon(stream: TextIO) -> None:
+    """Sends what is still buffered nowhere, or the interpreter would try again at exit and change the exit code."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

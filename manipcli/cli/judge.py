@@ -1,0 +1,31 @@
+"""`manipcli judge LOG`: the verdict again, from the log alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import Format
+from manipcli.core.errors import ExitCode
+
+
+def judge(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="An .mcap file of a run.", show_default=False)],
+    *,
+    format_: Format = "text",
+) -> ExitCode:
+    """Judge the log of a run again.
+
+    Nothing but the file is read, and the verdict stored in it is not looked at.
+    """
+    from manipcli import pipeline
+    from manipcli.report import json, text
+    from manipcli.report.run_report import exit_code
+
+    verdict = pipeline.judge_log(log)
+    render = json.render_verdict if format_ == "json" else text.render_verdict
+    console.result(render(verdict, str(log)))
+    return exit_code(verdict)

@@ -1,0 +1,47 @@
+"""`manipcli plan TASK`: the whole task planned, nothing simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, TaskFile
+from manipcli.core.errors import ExitCode
+
+
+def plan(
+    task: TaskFile,
+    *,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="Write every point of every trajectory there.")
+    ] = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    format_: Format = "text",
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+) -> ExitCode:
+    """Plan a task and show its motions.
+
+    How long each takes, and which joint limits it; nothing is simulated.
+    """
+    from manipcli import pipeline
+    from manipcli.report.plan import render_json, render_text, write_csv
+
+    loaded = pipeline.load_task(
+        task,
+        overrides=tuple(overrides or ()),
+        seed=seed,
+        package_path=tuple(package_path or ()),
+        allow_outside=allow_outside,
+    )
+    motions = pipeline.plan_task(loaded).motions
+    if csv is not None:
+        with csv.open("w", encoding="utf-8", newline="") as stream:
+            write_csv(motions, stream)
+    render = render_json if format_ == "json" else render_text
+    console.result(render(loaded.name, motions, loaded.robot))
+    return ExitCode.PASSED

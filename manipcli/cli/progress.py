@@ -1,0 +1,62 @@
+"""How a run shows where it is: a live line on a terminal, one line a step elsewhere. All of it goes to stderr."""
+
+from __future__ import annotations
+
+from typing import Protocol, Self
+
+from manipcli.cli import console
+from manipcli.judge.verdict import StepOutcome
+from manipcli.report.text import describe_step
+
+REDRAW_PERIOD = 0.1
+"""[s] of wall time between two drawings: more would be felt at 1000 ticks a second, and seen by nobody."""
+
+
+class NamedStep(Protocol):
+    """What is told of a step that begins."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def verb(self) -> str: ...
+
+
+class StepProgress:
+    """The progress of one run; a context manager that leaves no half line behind."""
+
+    def __init__(self, *, verbose: bool = False, quiet: bool = False) -> None:
+        self._verbose = verbose
+        self._quiet = quiet
+        self._live = console.is_live() and not quiet
+        self._head = ""
+        self._next_drawing = 0.0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        if self._live:
+            console.redraw("")
+
+    def step_started(self, step: NamedStep, index: int, total: int) -> None:
+        """Step `index` (from 0) of `total` begins."""
+        self._head = f"[{index + 1}/{total}] {step.id}"
+        self._next_drawing = 0.0
+        if self._verbose and not self._live and not self._quiet:
+            console.talk(f"{self._head}: started")
+
+    def tick(self, simulated_time: float, wall: float) -> None:
+        """Called every control tick, so it does nothing unless a drawing is due. Both times in s from the start."""
+        if not self._live or wall < self._next_drawing:
+            return
+        self._next_drawing = wall + REDRAW_PERIOD
+        speed = f"{simulated_time / wall:.1f} x real time" if wall > 0.0 else ""
+        console.redraw(f"{self._head}  {simulated_time:.2f} s  {speed}")
+
+    def step_ended(self, outcome: StepOutcome) -> None:
+        """A step is over, well or not."""
+        if self._live:
+            console.redraw("")
+        if not self._quiet and (self._verbose or not self._live):
+            count = self._head.split(" ", 1)[0]
+            console.talk(f"{count} {describe_step(outcome)}")

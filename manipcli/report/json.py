@@ -1,0 +1,131 @@
+"""The machine's view: one JSON object a command, with names that are documented and kept.
+
+`run` and `judge` give the same object; what only a run knows (`wall_time`, `real_time_factor`, `timing`) is null for
+`judge`. An error gives the same object too, with `errors` filled. Numbers are SI; what is not a finite number is null.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+from manipcli.core.errors import Finding
+from manipcli.judge.verdict import Verdict, VerdictWord
+from manipcli.report.run_report import RunReport
+
+Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
+
+
+def render_run(report: RunReport) -> str:
+    """A run: its verdict, its log and its times."""
+    timing = report.timing
+    return dumps(
+        _object(
+            verdict=report.verdict.verdict,
+            judged=report.verdict,
+            wall_time=report.wall_time,
+            real_time_factor=report.real_time_factor,
+            log=report.log,
+            timing={
+                "load": _number(timing.load),
+                "plan": _number(timing.plan),
+                "simulate": _number(timing.simulate),
+                "judge": _number(timing.judge),
+            },
+            errors=report.verdict.errors,
+        )
+    )
+
+
+def render_verdict(verdict: Verdict, log: str) -> str:
+    """A log, judged."""
+    return dumps(_object(verdict=verdict.verdict, judged=verdict, log=log, errors=verdict.errors))
+
+
+def render_errors(findings: Sequence[Finding], verdict: VerdictWord = "error") -> str:
+    """A command that ended before there was anything to judge."""
+    return dumps(_object(verdict=verdict, errors=findings))
+
+
+def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
+    """Checked files: `failed` where at least one finding is an error."""
+    failed = any(finding.severity == "error" for finding in findings)
+    return dumps(
+        {
+            "verdict": "failed" if failed else "passed",
+            "files": list(files),
+            "findings": [{"severity": finding.severity, **_finding(finding)} for finding in findings],
+        }
+    )
+
+
+def dumps(value: Json) -> str:
+    """JSON text in ASCII: control characters and what a terminal might not know are escaped."""
+    return json.dumps(value, indent=2, allow_nan=False)
+
+
+def _object(
+    *,
+    verdict: VerdictWord,
+    judged: Verdict | None = None,
+    wall_time: float | None = None,
+    real_time_factor: float | None = None,
+    log: str | None = None,
+    timing: Json = None,
+    errors: Sequence[Finding] = (),
+) -> Json:
+    """The one object, its keys always there."""
+    return {
+        "task": judged.task if judged is not None else None,
+        "verdict": verdict,
+        "text": judged.text if judged is not None else "",
+        "seed": judged.seed if judged is not None else None,
+        "engine": judged.engine if judged is not None else None,
+        "simulated_time": _number(judged.simulated_time) if judged is not None else None,
+        "wall_time": _number(wall_time),
+        "real_time_factor": _number(real_time_factor),
+        "log": log,
+        "timing": timing,
+        "steps": [
+            {
+                "id": step.id,
+                "verb": step.verb,
+                "outcome": step.outcome,
+                "started": _number(step.started),
+                "ended": _number(step.ended),
+                "planned_duration": _number(step.planned_duration),
+                "text": step.text,
+            }
+            for step in (judged.steps if judged is not None else ())
+        ],
+        "expectations": [
+            {
+                "name": expectation.name,
+                "outcome": expectation.outcome,
+                "margin": _number(expectation.margin),
+                "unit": expectation.unit,
+                "at": _number(expectation.at),
+                "text": expectation.text,
+            }
+            for expectation in (judged.expectations if judged is not None else ())
+        ],
+        "errors": [_finding(finding) for finding in errors],
+    }
+
+
+def _finding(finding: Finding) -> dict[str, Json]:
+    place = finding.place
+    return {
+        "code": finding.code,
+        "file": place.file if place is not None else None,
+        "line": place.line if place is not None else None,
+        "column": place.column if place is not None else None,
+        "message": finding.message,
+        "hint": finding.hint,
+    }
+
+
+def _number(value: float | None) -> float | None:
+    """Rounded to 1e-9, which drops the dust of binary fractions (4.2 instead of 4.200000000000001)."""
+    return round(float(value), 9) if value is not None and math.isfinite(value) else None

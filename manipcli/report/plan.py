@@ -1,0 +1,136 @@
+"""A plan, rendered: one row a motion with what limits it; and every point as CSV."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TextIO
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.report.json import Json, dumps
+from manipcli.report.table import table
+
+
+class PlannedMotion(Protocol):
+    """What is shown of a motion; `trajectory` is None where only the hand closes."""
+
+    @property
+    def step_id(self) -> str: ...
+    @property
+    def verb(self) -> str: ...
+    @property
+    def label(self) -> str: ...
+    @property
+    def trajectory(self) -> JointTrajectory | None: ...
+    @property
+    def duration(self) -> float: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Limiting:
+    """The joint that comes nearest to a limit in a motion, the quantity that does, and the fraction of it used."""
+
+    joint: str
+    quantity: str
+    fraction: float
+
+
+def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
+    """What a time-optimal motion is limited by: the greatest |v| / v_max or |a| / a_max over all joints and times.
+
+    None where the points carry neither, or no limit is stated.
+    """
+    used: list[Limiting] = []
+    for k, name in enumerate(trajectory.names):
+        limits = robot.joint(name).limits
+        for quantity, values, limit in (
+            ("velocity", trajectory.velocities, limits.velocity),
+            ("acceleration", trajectory.accelerations, limits.acceleration),
+        ):
+            if values is not None and limit:
+                used.append(Limiting(name, quantity, float(np.abs(values[:, k]).max()) / limit))
+    return max(used, key=lambda one: one.fraction, default=None)
+
+
+def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
+    """One row a motion; a step's name stands at its first motion only."""
+    rows = []
+    previous = None
+    for motion in motions:
+        most = limiting(motion.trajectory, robot) if motion.trajectory is not None else None
+        rows.append(
+            (
+                motion.step_id if motion.step_id != previous else "",
+                motion.verb if motion.step_id != previous else "",
+                motion.label,
+                f"{motion.duration:.3f} s",
+                f"{most.quantity} of {most.joint}" if most is not None else "-",
+                f"{100.0 * most.fraction:.1f} %" if most is not None else "-",
+            )
+        )
+        previous = motion.step_id
+    headers = ("step", "verb", "motion", "duration", "limited by", "used")
+    total = sum(motion.duration for motion in motions)
+    summary = f"✓ {task} planned: {len(motions)} motion{'' if len(motions) == 1 else 's'}, {total:.2f} s"
+    return f"{table(headers, rows, right=('duration', 'used'))}\n\n{summary}"
+
+
+def render_json(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) -> str:
+    """The same as one JSON object; durations in s, `used` as a fraction of the limit."""
+    return dumps(
+        {
+            "task": task,
+            "verdict": "passed",
+            "duration": round(sum(motion.duration for motion in motions), 9),
+            "motions": [_motion(motion, robot) for motion in motions],
+            "errors": [],
+        }
+    )
+
+
+def write_csv(motions: Sequence[PlannedMotion], stream: TextIO) -> None:
+    """Every point of every trajectory: one row a point, `time` [s] from the start of its motion, rad or m.
+
+    The columns of a joint that a motion does not move are empty, as are velocities and accelerations not given.
+    """
+    joints = list(dict.fromkeys(name for motion in motions if motion.trajectory for name in motion.trajectory.names))
+    kinds = ("position", "velocity", "acceleration")
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["step", "motion", "time", *(f"{joint}_{kind}" for kind in kinds for joint in joints)])
+    for motion in motions:
+        trajectory = motion.trajectory
+        if trajectory is None:
+            continue
+        columns = [
+            _column(trajectory, values, joint)
+            for values in (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+            for joint in joints
+        ]
+        for time, *row in zip(trajectory.times, *columns, strict=True):
+            writer.writerow([motion.step_id, motion.label, f"{time:.6f}", *row])
+
+
+def _column(trajectory: JointTrajectory, values: Array | None, joint: str) -> list[str]:
+    if values is None or joint not in trajectory.names:
+        return [""] * len(trajectory.times)
+    return [f"{value:.9g}" for value in values[:, trajectory.names.index(joint)]]
+
+
+def _motion(motion: PlannedMotion, robot: RobotModel) -> Json:
+    trajectory = motion.trajectory
+    most = limiting(trajectory, robot) if trajectory is not None else None
+    return {
+        "step": motion.step_id,
+        "verb": motion.verb,
+        "motion": motion.label,
+        "duration": round(motion.duration, 9),
+        "joints": list(trajectory.names) if trajectory is not None else [],
+        "limited_by": None
+        if most is None
+        else {"joint": most.joint, "quantity": most.quantity, "used": round(most.fraction, 6)},
+    }

@@ -1,0 +1,47 @@
+"""What one run gives its caller: the verdict on its log, and how long the run took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from manipcli.core.errors import ExitCode
+from manipcli.judge.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Wall time of each part of a run [s]."""
+
+    load: float
+    plan: float
+    simulate: float
+    judge: float
+
+
+@dataclass(frozen=True, slots=True)
+class RunReport:
+    """One run.
+
+    Attributes:
+        verdict: read from the log alone.
+        wall_time: [s] of the whole run.
+        real_time_factor: simulated time over the wall time of its simulation.
+        log: path of the log, as text.
+        timing: the parts of `wall_time`.
+    """
+
+    verdict: Verdict
+    wall_time: float
+    real_time_factor: float
+    log: str
+    timing: Timing
+
+
+def exit_code(verdict: Verdict) -> ExitCode:
+    """What a command returns that ends with this verdict."""
+    if verdict.verdict == "passed":
+        return ExitCode.PASSED
+    if verdict.verdict == "failed":
+        return ExitCode.FAILED
+    interrupted = any(step.outcome == "interrupted" for step in verdict.steps)
+    return ExitCode.INTERRUPTED if interrupted else ExitCode.INTERNAL

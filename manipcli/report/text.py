@@ -1,0 +1,153 @@
+"""The reader's view: why it failed first, then the steps, the expectations with their margins, and where the log is.
+
+Plain text: every mark stands beside a word that says the same. Colour is for the console to add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manipcli.core.errors import Finding
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.report.quantity import quantity
+from manipcli.report.run_report import RunReport
+from manipcli.report.table import table
+
+PASS, FAIL = "✓", "✗"
+
+
+def render_run(report: RunReport, *, verbose: bool = False) -> str:
+    """A run: the verdict, then how fast it went and where its log is."""
+    speed = (
+        f"{report.verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real "
+        f"({report.real_time_factor:.1f} x real time while simulating)"
+    )
+    lines = [*_verdict(report.verdict, speed), f"log: {report.log}"]
+    if verbose:
+        timing = report.timing
+        lines.append(
+            f"time: load {timing.load:.2f} s, plan {timing.plan:.2f} s, "
+            f"simulate {timing.simulate:.2f} s, judge {timing.judge:.2f} s"
+        )
+    return "\n".join(lines)
+
+
+def render_verdict(verdict: Verdict, log: str) -> str:
+    """A log, judged."""
+    return "\n".join([*_verdict(verdict, f"{verdict.simulated_time:.2f} s simulated"), f"log: {log}"])
+
+
+def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
+    """Every finding of some checked files, then one line that counts them."""
+    errors = sum(finding.severity == "error" for finding in findings)
+    warnings = sum(finding.severity == "warning" for finding in findings)
+    mark, word = (FAIL, "failed") if errors else (PASS, "passed")
+    summary = f"{mark} {word}: {_count(len(files), 'file')} checked, {_count(errors, 'error')}"
+    if warnings:
+        summary += f", {_count(warnings, 'warning')}"
+    return "\n".join([*map(describe, findings), summary])
+
+
+def describe(finding: Finding) -> str:
+    """One finding: where, how grave, what; and below it the hint."""
+    return f"{finding}\n  hint: {finding.hint}" if finding.hint else str(finding)
+
+
+def describe_step(step: StepOutcome) -> str:
+    """One step as one line, for a log that is read while it grows."""
+    line = f"{step.id}: {step.outcome}"
+    if step.started is not None and step.ended is not None:
+        line += f" ({step.started:.2f} s to {step.ended:.2f} s)"
+    return f"{line}: {step.text}" if step.text and step.outcome != "done" else line
+
+
+def _verdict(verdict: Verdict, speed: str) -> list[str]:
+    lines = [*_causes(verdict)]
+    if lines:
+        lines.append("")
+    if verdict.steps:
+        lines += [_steps(verdict.steps), ""]
+    if verdict.expectations:
+        lines += [_expectations(verdict.expectations), ""]
+    mark = PASS if verdict.verdict == "passed" else FAIL
+    lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
+    lines.append(f"{speed}; engine {verdict.engine}, seed {verdict.seed}")
+    return lines
+
+
+def _causes(verdict: Verdict) -> list[str]:
+    """Why it did not pass, the first cause first: errors, then the step that went wrong, then unmet expectations."""
+    if verdict.verdict == "passed":
+        return []
+    causes = [describe(finding) for finding in verdict.errors]
+    causes += [
+        f"{FAIL} step '{step.id}' {_STEP_WORDS[step.outcome]}{f': {step.text}' if step.text else ''}"
+        for step in verdict.steps
+        if step.outcome not in ("done", "not_run")
+    ]
+    causes += [
+        f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
+        for expectation in verdict.expectations
+        if expectation.outcome != "passed"
+    ]
+    return causes
+
+
+_STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
+
+
+def _summary(verdict: Verdict) -> str:
+    done = sum(step.outcome == "done" for step in verdict.steps)
+    text = f"{done} of {_count(len(verdict.steps), 'step')} done"
+    if not verdict.expectations:
+        return f"{text}, nothing expected beyond that"
+    met = sum(expectation.outcome == "passed" for expectation in verdict.expectations)
+    return f"{text}, {met} of {_count(len(verdict.expectations), 'expectation')} met"
+
+
+def _steps(steps: Sequence[StepOutcome]) -> str:
+    rows = [
+        (
+            f"{PASS if step.outcome == 'done' else FAIL} {step.outcome.replace('_', ' ')}",
+            step.id,
+            step.verb,
+            _seconds(step.started),
+            _seconds(step.ended),
+            _seconds(step.planned_duration),
+        )
+        for step in steps
+    ]
+    return table(("step", "id", "verb", "started", "ended", "planned"), rows, right=("started", "ended", "planned"))
+
+
+def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
+    rows = [
+        (
+            f"{PASS if expectation.outcome == 'passed' else FAIL} {expectation.outcome.replace('_', ' ')}",
+            expectation.name,
+            _margin(expectation),
+        )
+        for expectation in expectations
+    ]
+    return table(("expectation", "name", "margin"), rows)
+
+
+def _margin(expectation: ExpectationOutcome) -> str:
+    """`passes with 4.1 mm to spare (closest at 17.32 s)`, `fails by ...`, or why there is no margin."""
+    detail = f": {expectation.text}" if expectation.text else ""
+    if expectation.outcome == "not_evaluated":
+        return f"was never evaluated{detail}"
+    passed = expectation.outcome == "passed"
+    when = "" if expectation.at is None else f" ({'closest' if passed else 'worst'} at {expectation.at:.2f} s)"
+    if expectation.margin is None:
+        return f"{'passes' if passed else 'fails'}{when}{detail}"
+    size = quantity(abs(expectation.margin), expectation.unit)
+    return f"{f'passes with {size} to spare' if passed else f'fails by {size}'}{when}{detail}"
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} s"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
