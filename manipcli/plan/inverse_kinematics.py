@@ -1,0 +1,254 @@
+"""Inverse kinematics of a tool frame: Levenberg-Marquardt inside the joint limits, with seeded restarts.
+
+The error of tool frame T against goal G, both in the world, is e = (p_G - p_T, log(R_G R_T^T)) (6), metres and radians
+weighed alike. One step solves
+
+    (J^T J + lambda I) dq = J^T e,     lambda = e^T e / 2 + 1e-9        (Sugihara, IEEE T-RO 27(5), 2011)
+
+over the joints that are free: a joint at its limit that would be pushed further out is held, and the step is solved
+again. Positions are then clamped to the limits, so every iterate is admissible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.kinematics import Kinematics
+
+POSITION_TOLERANCE = 1e-5  # m
+ANGLE_TOLERANCE = 1e-4  # rad
+_ITERATIONS = 60  # of one try; the median is 6
+_TRIES = 40  # random restarts; past these a pose is called unreachable
+_ENOUGH = 3  # solutions among which the nearest to the seed is taken
+_AT_LIMIT = 1e-6  # rad or m
+_STEP = 0.8  # rad or m: largest change of one joint in one iteration
+_UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """What an attempt ended with.
+
+    Attributes:
+        q: (n) all moving joints of the robot; only the solver's own differ from the seed.
+        position_error: [m] distance from tool to goal.
+        angle_error: [rad].
+        at_limit: the solver's joints that lie at a limit.
+    """
+
+    q: Array
+    position_error: float
+    angle_error: float
+    at_limit: tuple[str, ...]
+
+    @property
+    def converged(self) -> bool:
+        return self.position_error <= POSITION_TOLERANCE and self.angle_error <= ANGLE_TOLERANCE
+
+    def explain(self) -> str:
+        """Why this attempt is no solution, for a message."""
+        off = f"{self.position_error * 1000.0:.1f} mm and {math.degrees(self.angle_error):.1f} deg"
+        text = f"the nearest pose is {off} off"
+        if self.at_limit:
+            return f"{text}, held back by the limits of {', '.join(self.at_limit)}"
+        return f"{text}, out of reach"
+
+
+class InverseKinematics:
+    """Solves for `joints` so that frame T, fixed in `link`, takes a pose in the world."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        joints: Sequence[str],
+        link: str,
+        *,
+        X_LT: Transform | None = None,
+        free_axis: npt.ArrayLike | None = None,
+    ) -> None:
+        """
+        Args:
+            kinematics: of the robot.
+            joints: names of the joints that may move (a group's); all others stay where the seed has them.
+            link: the link L that carries the tool.
+            X_LT: tool frame in L; identity if None.
+            free_axis: (3,) unit, in T: rotation about it does not matter (None: the whole orientation does).
+        """
+        robot = kinematics.robot
+        self.joints = tuple(joints)
+        self.columns = tuple(robot.indices(self.joints))
+        self._kinematics = kinematics
+        self.link = link
+        self._X_LT = Transform.identity() if X_LT is None else X_LT
+        self._free_axis = None if free_axis is None else frozen(free_axis)
+        self._columns = np.array(self.columns, dtype=np.intp)
+        limits = [robot.joint(name).limits for name in self.joints]
+        self._lower = np.array([-np.inf if limit.lower is None else limit.lower for limit in limits])
+        self._upper = np.array([np.inf if limit.upper is None else limit.upper for limit in limits])
+
+    def forward(self, q: npt.ArrayLike) -> Transform:
+        """`X_WT` at `q` (n), all moving joints."""
+        return self._kinematics.forward(np.asarray(q, dtype=np.float64), self.link) @ self._X_LT
+
+    def solve(self, X_WT: Transform, seed: npt.ArrayLike, rng: np.random.Generator) -> Array:
+        """Joint positions (n) with the tool at `X_WT`, near `seed`.
+
+        The first try starts from `seed` and is taken when it converges. Else tries start from uniformly random
+        positions inside the limits, until three converge or 40 are spent; the nearest (Euclidean) to `seed` is taken.
+
+        Args:
+            X_WT: the goal.
+            seed: (n) all moving joints.
+            rng: draws the restarts.
+
+        Raises:
+            NotPlannable: none converges; tells the best error, the distance to the goal, the joints at their limits.
+        """
+        seed = np.asarray(seed, dtype=np.float64)
+        if not (np.isfinite(X_WT.p).all() and np.isfinite(X_WT.R).all() and np.isfinite(seed).all()):
+            raise NotPlannable("the goal pose or the seed of the inverse kinematics is not finite")
+        best = self.track(X_WT, seed)
+        if best.converged:
+            return best.q
+        lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
+        upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
+        found: list[Solution] = []
+        for _ in range(_TRIES):
+            start = seed.copy()
+            start[self._columns] = rng.uniform(lower, upper)
+            attempt = self.track(X_WT, start)
+            if attempt.converged:
+                found.append(attempt)
+                if len(found) == _ENOUGH:
+                    break
+            elif attempt.position_error + attempt.angle_error < best.position_error + best.angle_error:
+                best = attempt
+        if found:
+            return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
+        distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
+        place = ", ".join(f"{value:.3f}" for value in X_WT.p)
+        raise NotPlannable(
+            f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
+            hint="move the goal nearer, or change the orientation of the tool",
+        )
+
+    def track(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:
+        """One try from `seed` (n), without restarts: what a path follows from point to point."""
+        q = np.array(seed, dtype=np.float64)
+        columns, lower, upper = self._columns, self._lower, self._upper
+        q[columns] = np.minimum(np.maximum(q[columns], lower), upper)
+        previous = math.inf
+        stalled = 0
+        for _ in range(_ITERATIONS):
+            error, J, axis_error = self._linearise(X_WT, q)
+            position_error = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+            if position_error <= 0.3 * POSITION_TOLERANCE and axis_error <= 0.3 * ANGLE_TOLERANCE:
+                break
+            cost = 0.5 * float(error @ error)
+            stalled = stalled + 1 if cost > 0.999 * previous else 0
+            if stalled > 4:
+                break
+            previous = cost
+            here = q[columns]
+            step = _damped_step(J, error, cost + 1e-9, here, lower, upper)
+            largest = float(np.max(np.abs(step)))
+            if largest > _STEP:
+                step *= _STEP / largest
+            q[columns] = np.minimum(np.maximum(here + step, lower), upper)
+        return self._solution(X_WT, q)
+
+    def singularity(self, q: npt.ArrayLike) -> str:
+        """The smallest singular value of the tool's Jacobian at `q` (n), as text."""
+        J = self._jacobian(np.asarray(q, dtype=np.float64))
+        return f"smallest singular value {np.linalg.svd(J, compute_uv=False)[-1]:.3f}"
+
+    def _solution(self, X_WT: Transform, q: Array) -> Solution:
+        """Judged by forward kinematics alone."""
+        error, angle = self._error(X_WT, self.forward(q))
+        here = q[self._columns]
+        at_limit = (here <= self._lower + _AT_LIMIT) | (here >= self._upper - _AT_LIMIT)
+        return Solution(
+            q=frozen(q),
+            position_error=float(np.linalg.norm(error[:3])),
+            angle_error=angle,
+            at_limit=tuple(name for name, held in zip(self.joints, at_limit, strict=True) if held),
+        )
+
+    def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
+        """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
+        X_WC = self.forward(q)
+        error, angle = self._error(X_WT, X_WC)
+        J = self._jacobian(q)
+        if self._free_axis is not None:
+            axis = X_WC.R @ self._free_axis
+            J[3:] -= np.outer(axis, axis @ J[3:])
+        return error, J, angle
+
+    def _jacobian(self, q: Array) -> Array:
+        return np.array(self._kinematics.jacobian(q, self.link, offset=self._X_LT)[:, self._columns])
+
+    def _error(self, X_WG: Transform, X_WT: Transform) -> tuple[Array, float]:
+        """Pose error (6) in the world, and its angle [rad]."""
+        error = np.empty(6)
+        error[:3] = X_WG.p - X_WT.p
+        if self._free_axis is None:
+            error[3:] = rotation_vector(X_WG.R @ X_WT.R.T)
+        else:
+            error[3:] = _between(X_WT.R @ self._free_axis, X_WG.R @ self._free_axis)
+        return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+
+
+def rotation_vector(R: Array) -> Array:
+    """log(R) (3,): axis times angle in [0, pi], of a rotation matrix (3, 3)."""
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    sine = 0.5 * math.sqrt(x * x + y * y + z * z)
+    angle = math.atan2(sine, 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0))
+    if sine > 1e-7:
+        return np.array([x, y, z]) * (0.5 * angle / sine)
+    if angle < 1.0:
+        return np.array([x, y, z]) * 0.5
+    # Near pi the antisymmetric part vanishes; the axis stands in the largest column of R + I = 2 a a^T.
+    columns = R + np.eye(3)
+    axis = columns[:, int(np.argmax(np.diag(columns)))]
+    return np.asarray(axis / np.linalg.norm(axis) * angle)
+
+
+def _between(a: Array, b: Array) -> Array:
+    """The rotation vector (3,) that turns unit vector `a` into `b` on the shortest way."""
+    cross = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    sine, cosine = float(np.linalg.norm(cross)), float(a @ b)
+    if sine > 1e-9:
+        return np.asarray(cross * (math.atan2(sine, cosine) / sine))
+    if cosine > 0.0:
+        return cross
+    aside = np.eye(3)[int(np.argmin(np.abs(a)))]
+    normal = aside - (aside @ a) * a
+    return np.asarray(normal * (math.pi / np.linalg.norm(normal)))
+
+
+def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:
+    """The step dq (m) of the joints that are free to take it; the others rest."""
+    n = len(q)
+    H = J.T @ J
+    H.flat[:: n + 1] += damping
+    gradient = J.T @ error
+    step = np.linalg.solve(H, gradient)
+    held = np.zeros(n, dtype=bool)
+    for _ in range(n):
+        outward = ((q <= lower) & (step < 0.0)) | ((q >= upper) & (step > 0.0))
+        if not outward.any():
+            break
+        held |= outward
+        free = np.flatnonzero(~held)
+        step = np.zeros(n)
+        if not len(free):
+            break
+        step[free] = np.linalg.solve(H[np.ix_(free, free)], gradient[free])
+    return np.asarray(step)

@@ -1,0 +1,64 @@
+"""The limits of a set of joints as arrays: what retimers keep and `verify` checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, frozen
+from manipcli.model.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionLimits:
+    """Symmetric bounds per joint, arrays (n) in the order of `names`; infinite where there is none. SI, rad or m.
+
+    Attributes:
+        names: (n) joints.
+        lower, upper: position.
+        velocity, acceleration: finite and positive.
+        jerk: infinite where none is stated.
+    """
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    @staticmethod
+    def of(
+        robot: RobotModel, joints: Sequence[str], *, velocity_scale: float = 1.0, acceleration_scale: float = 1.0
+    ) -> MotionLimits:
+        """The limits of `joints`; the scales (0, 1] slow a motion down (`acceleration_scale` holds for jerk, too).
+
+        Raises:
+            NotPlannable: a joint states no positive velocity or acceleration limit.
+        """
+        limits = [robot.joint(name).limits for name in joints]
+        velocity: list[float] = []
+        acceleration: list[float] = []
+        for name, limit in zip(joints, limits, strict=True):
+            for word, value, into in (
+                ("velocity", limit.velocity, velocity),
+                ("acceleration", limit.acceleration, acceleration),
+            ):
+                if value is None or not 0.0 < value < np.inf:
+                    said = "none" if value is None else f"{value:g}"
+                    raise NotPlannable(
+                        f"joint '{name}' has no usable {word} limit (stated: {said})",
+                        hint=f"state it in the robot file: limits: {{{name}: {{{word}: ...}}}}",
+                    )
+                into.append(value)
+        return MotionLimits(
+            names=tuple(joints),
+            lower=frozen([-np.inf if limit.lower is None else limit.lower for limit in limits]),
+            upper=frozen([np.inf if limit.upper is None else limit.upper for limit in limits]),
+            velocity=frozen(np.array(velocity) * velocity_scale),
+            acceleration=frozen(np.array(acceleration) * acceleration_scale),
+            jerk=frozen([np.inf if limit.jerk is None else limit.jerk * acceleration_scale for limit in limits]),
+        )

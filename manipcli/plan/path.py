@@ -1,0 +1,125 @@
+"""Paths: geometry without time. Joint waypoints, and straight lines of a tool frame in the world.
+
+A straight line of the tool interpolates position linearly and orientation on the shortest arc (slerp: a constant
+rotation vector), and is turned into joint positions point by point: each from the one before, without restarts, so that
+the arm stays on one branch of its inverse kinematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
+from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
+
+LINEAR_STEP = 0.005  # m between two points of a straight line
+ANGULAR_STEP = 0.02  # rad between two points of a straight line
+MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """`waypoints` (k, n) in the order of `names`, k >= 1, rad or m. What lies between them is the retimer's choice."""
+
+    names: tuple[str, ...]
+    waypoints: Array
+
+
+def joint_path(names: Sequence[str], waypoints: npt.ArrayLike) -> JointPath:
+    """A path through `waypoints` (k, n); equal neighbours are merged."""
+    points = np.array(waypoints, dtype=np.float64)
+    keep = np.ones(len(points), dtype=bool)
+    keep[1:] = np.max(np.abs(np.diff(points, axis=0)), axis=1) > 1e-9
+    return JointPath(names=tuple(names), waypoints=frozen(points[keep]))
+
+
+def interpolate(
+    X_WA: Transform, X_WB: Transform, *, step: float = LINEAR_STEP, angle: float = ANGULAR_STEP
+) -> tuple[Transform, ...]:
+    """Poses from A to B, both included: p(u) = p_A + u (p_B - p_A), R(u) = R_A exp(u log(R_A^T R_B)), u in [0, 1].
+
+    Args:
+        X_WA, X_WB: first and last pose.
+        step: at most this far apart [m].
+        angle: at most this much turned from one to the next [rad].
+    """
+    distance = X_WB.p - X_WA.p
+    turn = rotation_vector(X_WA.R.T @ X_WB.R)
+    whole = float(np.linalg.norm(turn))
+    axis = turn / whole if whole > 1e-12 else np.array([0.0, 0.0, 1.0])
+    count = max(1, int(np.ceil(float(np.linalg.norm(distance)) / step - 1e-9)), int(np.ceil(whole / angle - 1e-9)))
+    between = [
+        Transform(
+            R=frozen(X_WA.R @ matrix_from_axis_angle(axis, k / count * whole)),
+            p=frozen(X_WA.p + k / count * distance),
+        )
+        for k in range(1, count)
+    ]
+    return (X_WA, *between, X_WB)
+
+
+def linear_path(
+    solver: InverseKinematics,
+    q: npt.ArrayLike,
+    X_WT: Transform,
+    *,
+    step: float = LINEAR_STEP,
+    angle: float = ANGULAR_STEP,
+    max_jump: float = MAX_JUMP,
+) -> JointPath:
+    """The straight line of the tool from where `q` (n) has it to `X_WT`.
+
+    Raises:
+        NotPlannable: see `follow_poses`.
+    """
+    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT, step=step, angle=angle), max_jump=max_jump)
+
+
+def follow_poses(
+    solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform], *, max_jump: float = MAX_JUMP
+) -> JointPath:
+    """Joint positions that take the tool through `poses`, the first of which `q` (n) already has.
+
+    Args:
+        solver: of the joints that move.
+        q: (n) positions of all moving joints of the robot at the start.
+        poses: `X_WT`, near neighbours (see `interpolate`).
+        max_jump: largest change of one joint between two poses [rad or m].
+
+    Returns:
+        One waypoint a pose, of the solver's joints.
+
+    Raises:
+        NotPlannable: a pose cannot be reached from the one before; names how far along, and why.
+    """
+    q = np.array(q, dtype=np.float64)
+    columns = list(solver.columns)
+    waypoints = [q[columns]]
+    walked = turned = 0.0
+    for before, X_WT in pairwise(poses):
+        walked += float(np.linalg.norm(X_WT.p - before.p))
+        turned += float(np.linalg.norm(rotation_vector(before.R.T @ X_WT.R)))
+        found = solver.track(X_WT, q)
+        where = f"{walked * 1000.0:.0f} mm and {np.degrees(turned):.0f} deg along the line"
+        if not found.converged:
+            raise NotPlannable(
+                f"the straight line ends {where}: {found.explain()}",
+                hint="start the line from another arm configuration, make it shorter, or move `free` instead",
+            )
+        jump = np.abs(found.q[columns] - q[columns])
+        worst = int(np.argmax(jump))
+        if jump[worst] > max_jump:
+            raise NotPlannable(
+                f"the arm would have to jump {where}: joint '{solver.joints[worst]}' by {jump[worst]:.2f} within one "
+                f"point of the line (near singular: {solver.singularity(q)})",
+                hint="start the line from another arm configuration, or move `free` instead",
+            )
+        q = found.q
+        waypoints.append(q[columns])
+    return joint_path(solver.joints, waypoints)

@@ -1,0 +1,164 @@
+"""Time-optimal timing of a joint path, from rest to rest, with TOPP-RA (Pham and Pham, IEEE T-RO 34(3), 2018).
+
+The path q(s) is a cubic spline through the waypoints over their chord length in joint space. With the chain rule
+
+    q' = (dq/ds) s',    q'' = (d2q/ds2) s'^2 + (dq/ds) s''
+
+velocity and acceleration limits bound s'^2 and s'' along the path; TOPP-RA finds the largest s'^2. Between two grid
+points s'' is constant, so s(t) is a parabola there. Jerk is not in that problem: where limits state it, s(t) is
+averaged over a sliding window first, which bounds the slope of s'' and leaves the path as it is. The samples are then
+checked at the control rate and time is stretched by what they still exceed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan.limits import MotionLimits
+from manipcli.plan.path import JointPath
+from manipcli.plan.rest_to_rest import rest_to_rest
+from manipcli.plan.sampling import on_ticks
+from manipcli.plan.trajectory import JointTrajectory
+
+_GRID = 100, 500  # fewest and most grid points; the time found falls by less than 0.1 % beyond
+_PER_WAYPOINT = 4  # grid points between two waypoints, up to the most
+_ROUNDING = 1e-9
+
+
+def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: float | None = None) -> JointTrajectory:
+    """The fastest motion along `path` within `limits`, one point a control tick, at rest at both ends.
+
+    Args:
+        path: one waypoint is a rest; two are a straight line, which `rest_to_rest` times exactly.
+        limits: of the path's joints, in its order.
+        period: control period [s].
+        duration: slow down to this [s], if given.
+
+    Raises:
+        NotPlannable: no timing exists (the path is not smooth enough), or `duration` is too short.
+    """
+    points = path.waypoints
+    if len(points) <= 2:
+        return rest_to_rest(points[0], points[-1], limits, period=period, duration=duration)
+    toppra = _toppra()
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    spline = toppra.SplineInterpolator(np.concatenate(([0.0], np.cumsum(chords))), points)
+    count = int(np.clip(_PER_WAYPOINT * len(points), *_GRID))
+    grid = np.linspace(0.0, float(spline.path_interval[1]), count + 1)
+    scheme = toppra.constraint.DiscretizationType.Interpolation
+    velocity = toppra.constraint.JointVelocityConstraint(np.column_stack((-limits.velocity, limits.velocity)))
+    acceleration = toppra.constraint.JointAccelerationConstraint(
+        np.column_stack((-limits.acceleration, limits.acceleration)), discretization_scheme=scheme
+    )
+    solver = toppra.algorithm.TOPPRA([velocity, acceleration], spline, gridpoints=grid, solver_wrapper="seidel")
+    _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
+    if speeds is None or not np.isfinite(speeds).all():
+        raise NotPlannable("the path has no timing within the velocity and acceleration limits: it is not smooth")
+    progress, nominal = _progress(grid, speeds)
+    if np.isfinite(limits.jerk).any():
+        progress, nominal = _averaged(progress, nominal, float(np.max(limits.acceleration / limits.jerk)), period)
+
+    def curve(times: Array) -> tuple[Array, Array, Array]:
+        s, ds, dds = progress(times)
+        first, second = spline(s, 1), spline(s, 2)
+        return spline(s), first * ds[:, None], second * (ds * ds)[:, None] + first * dds[:, None]
+
+    return on_ticks(curve, nominal, target=points[-1], limits=limits, period=period, duration=duration)
+
+
+Progress = Callable[[Array], tuple[Array, Array, Array]]
+"""times (k,) [s] -> s, s', s'', each (k,)."""
+
+
+def _progress(grid: Array, speeds: Array) -> tuple[Progress, float]:
+    """s(t) with constant s'' between grid points, and its duration [s].
+
+    Over an interval ds with speeds a and b: dt = 2 ds / (a + b), s'' = (b^2 - a^2) / (2 ds).
+    """
+    ds = np.diff(grid)
+    speeds = np.maximum(speeds, 0.0)
+    times = np.concatenate(([0.0], np.cumsum(2.0 * ds / np.maximum(speeds[:-1] + speeds[1:], _ROUNDING))))
+    rates = 0.5 * np.diff(speeds**2) / ds
+
+    def progress(t: Array) -> tuple[Array, Array, Array]:
+        k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(ds) - 1)
+        dt = t - times[k]
+        s = grid[k] + dt * (speeds[k] + 0.5 * dt * rates[k])
+        return np.clip(s, grid[0], grid[-1]), np.maximum(speeds[k] + dt * rates[k], 0.0), rates[k]
+
+    return progress, float(times[-1])
+
+
+def _averaged(progress: Progress, nominal: float, window: float, period: float) -> tuple[Progress, float]:
+    """`progress` averaged over a sliding `window` [s]: |s'''| falls to the jump of s'' over the window; T grows by it.
+
+    s, s', s'' are averaged alike (the average commutes with the derivative), on a fine grid of their common cumulative
+    sums; before the start and after the end the motion rests.
+    """
+    half = max(1, round(window / period))
+    dt = period / 2.0
+    width = 2 * half
+    steps = int(np.ceil(nominal / dt))
+    fine = np.minimum(np.arange(steps + 1) * dt, nominal)
+    s, ds, dds = progress(fine)
+    dds[-1] = 0.0
+    total = steps + width
+    columns = []
+    for values, before, after in ((s, s[0], s[-1]), (ds, 0.0, 0.0), (dds, 0.0, 0.0)):
+        padded = np.concatenate((np.full(width, before), values, np.full(width, after)))
+        summed = np.concatenate(([0.0], np.cumsum(padded)))
+        columns.append((summed[width + 1 :] - summed[: -width - 1])[: total + 1] / (width + 1))
+    at = np.arange(total + 1) * dt
+
+    def smooth(t: Array) -> tuple[Array, Array, Array]:
+        return np.interp(t, at, columns[0]), np.interp(t, at, columns[1]), np.interp(t, at, columns[2])
+
+    return smooth, float(at[-1])
+
+
+def _toppra() -> ModuleType:
+    """The library, without the half of its import time that goes into matplotlib, which only its plots use."""
+    with _late("matplotlib", "matplotlib.pyplot"):
+        import toppra
+    library: ModuleType = toppra
+    return library
+
+
+@contextmanager
+def _late(*names: str) -> Iterator[None]:
+    """While this holds, importing `names` gives stand-ins, which import the real module at the first use."""
+    absent = [name for name in names if name not in sys.modules]
+    if "toppra" in sys.modules or len(absent) < len(names):
+        yield
+        return
+    for name in absent:
+        sys.modules[name] = _Late(name)
+    try:
+        yield
+    finally:
+        for name in absent:
+            if isinstance(sys.modules.get(name), _Late):
+                del sys.modules[name]
+
+
+class _Late(ModuleType):
+    """A module that is imported when it is first used."""
+
+    def __getattr__(self, attribute: str) -> object:
+        if attribute.startswith("__"):
+            raise AttributeError(attribute)
+        import importlib
+
+        if isinstance(sys.modules.get(self.__name__), _Late):
+            child = sys.modules.get(f"{self.__name__}.{attribute}")
+            if child is not None:
+                return child
+            raise AttributeError(attribute)
+        return getattr(importlib.import_module(self.__name__), attribute)

@@ -1,0 +1,79 @@
+"""Does a trajectory keep its limits? Checked point by point, and against differences of its own positions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan.limits import MotionLimits
+from manipcli.plan.trajectory import JointTrajectory
+
+TOLERANCE = 0.005
+"""Relative excess of velocity, acceleration and jerk that is forgiven."""
+
+_POSITION = 1e-9  # rad or m: rounding of a trajectory that touches its limit
+
+
+def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: float = TOLERANCE) -> None:
+    """Refuse a trajectory that leaves a limit of position, velocity, acceleration or (where finite) jerk.
+
+    Velocity and acceleration are checked both as stated by the points and as what the positions do: difference
+    quotients between neighbouring points, (q_k+1 - q_k)/dt and (v_k+1 - v_k)/dt, which are means over the
+    interval, so a motion inside its limits passes them, too.
+
+    Args:
+        trajectory: its names are those of `limits`.
+        limits: infinite entries are not checked.
+        tolerance: relative; position has none.
+
+    Raises:
+        NotPlannable: names the joint, the value, the limit and the time.
+    """
+    q, times = trajectory.positions, trajectory.times
+    for values in (q, trajectory.velocities, trajectory.accelerations):
+        if values is not None and not np.isfinite(values).all():
+            k, i = np.argwhere(~np.isfinite(values))[0]
+            raise NotPlannable(f"joint '{trajectory.names[i]}' has no finite value at t = {times[k]:.3f} s")
+    _position(trajectory, limits)
+    dt = np.diff(times)[:, None]
+    rate = np.diff(q, axis=0) / dt
+    v = trajectory.velocities
+    _bounded("velocity", rate, limits.velocity, times, limits.names, tolerance)
+    if v is None:
+        return
+    _bounded("velocity", v, limits.velocity, times, limits.names, tolerance)
+    _bounded("acceleration", np.diff(v, axis=0) / dt, limits.acceleration, times, limits.names, tolerance)
+    a = trajectory.accelerations
+    if a is None:
+        return
+    _bounded("acceleration", a, limits.acceleration, times, limits.names, tolerance)
+    if np.isfinite(limits.jerk).any():
+        _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits.names, tolerance)
+
+
+def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
+    """The worst position outside its limits, if any."""
+    q = trajectory.positions
+    outside = np.maximum(limits.lower - q, q - limits.upper)
+    k, i = np.unravel_index(int(np.argmax(outside)), outside.shape)
+    if outside[k, i] > _POSITION:
+        below = q[k, i] < limits.lower[i]
+        word, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
+        raise NotPlannable(
+            f"joint '{trajectory.names[i]}' goes to {q[k, i]:.4f} at t = {trajectory.times[k]:.3f} s, "
+            f"beyond its {word} limit {limit:.4f}"
+        )
+
+
+def _bounded(
+    word: str, values: Array, limit: Array, times: Array, names: tuple[str, ...], tolerance: float
+) -> None:
+    """|values| (k, n) <= limit (n) within `tolerance`."""
+    ratio = np.abs(values) / limit
+    k, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    if ratio[k, i] > 1.0 + tolerance:
+        raise NotPlannable(
+            f"joint '{names[i]}' would need {word} {abs(values[k, i]):.4g} at t = {times[k]:.3f} s; "
+            f"its limit is {limit[i]:.4g}"
+        )
