@@ -141,6 +141,14 @@ class NamedPose:
 
 
 @dataclass(frozen=True, slots=True)
+class Tool:
+    """The tool frame T at `X_LT` of `link`: +z is the direction of approach, y the one in which fingers close."""
+
+    link: str
+    X_LT: Transform
+
+
+@dataclass(frozen=True, slots=True)
 class TransmissionTag:
     """A `<transmission>` as written, roles resolved: parallel tuples in role order."""
 
@@ -158,7 +166,8 @@ class RobotModel:
     """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
 
     `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
-    `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact.
+    `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact;
+    `collision_ignore` are pairs of links that planning never checks against each other.
     """
 
     name: str
@@ -170,6 +179,8 @@ class RobotModel:
     transmissions: tuple[TransmissionTag, ...]
     X_WB: Transform
     urdf: str
+    tool: Tool | None = None
+    collision_ignore: tuple[tuple[str, str], ...] = ()
     friction: float = 1.0
 
     @cached_property

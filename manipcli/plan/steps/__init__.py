@@ -1,0 +1,22 @@
+"""The verbs of a task."""
+
+from typing import Any
+
+from manipcli.core.registry import Seam
+from manipcli.plan.step import StepMember
+from manipcli.plan.steps import follow, grasp, lift, move, pick, place, pour, release, wait
+
+STEPS: Seam[StepMember[Any]] = Seam(
+    kind="step",
+    members=(
+        move.MEMBER,
+        follow.MEMBER,
+        grasp.MEMBER,
+        release.MEMBER,
+        wait.MEMBER,
+        pick.MEMBER,
+        lift.MEMBER,
+        pour.MEMBER,
+        place.MEMBER,
+    ),
+)

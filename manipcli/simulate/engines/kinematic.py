@@ -12,7 +12,7 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 
 
 class KinematicEngine:
-    """Perfect tracking of any interface; mimic joints follow their driver exactly. For fast tests of everything else."""
+    """Perfect tracking on any interface; mimic joints follow their driver exactly. Fast, for tests of all the rest."""
 
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         n, m = len(robot.joint_names), len(scene.movable)

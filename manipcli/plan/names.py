@@ -1,0 +1,41 @@
+"""Names in steps that the robot or the scene does not know, each with the nearest one it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from manipcli.core.names import did_you_mean
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+
+Loc = tuple[str | int, ...]
+
+
+def unknown_pose(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if the robot has a pose of this name."""
+    return _unknown(name, (pose.name for pose in robot.poses), f"robot '{robot.name}' has no pose '{name}'", loc)
+
+
+def unknown_joint(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if the robot has an independent joint of this name."""
+    known = (joint.name for joint in robot.joints if joint.independent)
+    return _unknown(name, known, f"joint '{name}' is not one that robot '{robot.name}' can move", loc)
+
+
+def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) -> tuple[Problem, ...]:
+    """Empty if the scene has a (movable) body of this name."""
+    bodies = scene.movable if movable else scene.bodies
+    word = "a movable body of the scene" if movable else "in the scene"
+    return _unknown(name, (body.name for body in bodies), f"'{name}' is not {word}", loc)
+
+
+def unknown_frame(scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if `name` is `world`, `base`, `tool`, a body or a named frame."""
+    known = ["world", "base", "tool", *(body.name for body in scene.bodies), *(frame.name for frame in scene.frames)]
+    return _unknown(name, known, f"there is no frame '{name}'", loc)
+
+
+def _unknown(name: str, known: Iterable[str], message: str, loc: Loc) -> tuple[Problem, ...]:
+    names = tuple(known)
+    return () if name in names else (Problem(loc=loc, message=message, hint=did_you_mean(name, names)),)

@@ -1,0 +1,105 @@
+"""The contract of steps: from the predicted situation before a step to the motions that do it and the one after.
+
+Steps are pure: no engine, no clock; randomness comes from the planner's generator. The pipeline turns Motions into
+controller goals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.collision import Carried
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.base import Model
+
+if TYPE_CHECKING:
+    from manipcli.plan.planner import Planner
+
+S = TypeVar("S", bound=Model)
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a step starts from, predicted or measured.
+
+    Attributes:
+        position: (n) of `RobotModel.moving_joints`.
+        bodies: `X_WO` of every movable body, in the order of `Scene.movable`.
+        carried: what the hand holds.
+    """
+
+    position: Array
+    bodies: tuple[Transform, ...]
+    carried: Carried | None = None
+
+    def moved(self, position: Array) -> Situation:
+        """The same with the robot at `position`."""
+        return replace(self, position=position)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grip:
+    """A goal of the hand: `joints` go to `target` (n) until each finger meets `force` [N] or arrives.
+
+    With `must_hold`, a hand that closed on nothing has failed.
+    """
+
+    joints: tuple[str, ...]
+    target: Array
+    force: float | None
+    must_hold: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What is commanded at once, and when it is done: all its goals reached and `duration` [s] over.
+
+    Attributes:
+        label: the phase of the step ("approach", "close", ...).
+        trajectory: of some joints, or None where they hold.
+        grip: of the hand, or None where it holds.
+        duration: planned [s].
+        awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
+    """
+
+    label: str
+    trajectory: JointTrajectory | None
+    grip: Grip | None
+    duration: float
+    awaits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StepPlan:
+    """The motions of one step, and where they lead."""
+
+    motions: tuple[Motion, ...]
+    end: Situation
+
+    @property
+    def duration(self) -> float:
+        """Planned duration [s]."""
+        return sum(motion.duration for motion in self.motions)
+
+
+@dataclass(frozen=True, slots=True)
+class StepMember(Generic[S]):
+    """A member of the seam: the verb in YAML.
+
+    Attributes:
+        name: the verb.
+        spec: what the user writes under it.
+        plan: (spec, planner, situation) -> StepPlan. Begins at the situation; raises NotPlannable.
+        check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know.
+    """
+
+    name: str
+    spec: type[S]
+    plan: Callable[[S, Planner, Situation], StepPlan]
+    check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]

@@ -1,0 +1,48 @@
+"""`grasp`: close the hand until each finger meets the stated force.
+
+    - grasp: {object: cup, posture: wrap, force: 8 N}
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.names import unknown_body, unknown_pose
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Force
+
+DEFAULT_FORCE = 8.0
+
+
+class GraspSpec(Model):
+    """How the hand closes. A grasp holds by friction alone."""
+
+    object: str | None = Field(None, description="What is grasped; it is carried from then on.")
+    posture: str = Field("closed", description="The named pose that the hand closes towards.")
+    force: Annotated[Force, Field(gt=0, description="Contact force at which a finger stops [N].")] = DEFAULT_FORCE
+    until: Literal["contact", "posture"] = Field(
+        "contact", description="`contact`: fails if no finger touches; `posture`: reaching the posture is fine, too."
+    )
+
+
+def plan(spec: GraspSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """One motion of the hand."""
+    draft = Draft(planner, situation)
+    draft.close(spec.posture, force=spec.force, must_hold=spec.until == "contact", body=spec.object)
+    return draft.plan()
+
+
+def check(spec: GraspSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown object or posture."""
+    found = unknown_pose(robot, spec.posture, ("posture",))
+    return found if spec.object is None else found + unknown_body(scene, spec.object, ("object",), movable=True)
+
+
+MEMBER = StepMember(name="grasp", spec=GraspSpec, plan=plan, check=check)

@@ -1,0 +1,51 @@
+"""`lift`: raise a held object straight up.
+
+    - lift: {object: cup, by: [8 cm, 20 cm]}
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from manipcli.core.geometry import Transform
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.names import unknown_body
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.steps.move import Speed
+from manipcli.spec.base import Model
+
+
+class LiftSpec(Model):
+    """The object goes straight up by a height in the range `by`; the middle of the range is tried first."""
+
+    object: str = Field(description="What is held and lifted.")
+    by: Annotated[Range, Field(description="Height [m]: one number, or [least, most].")] = (0.08, 0.2)
+    speed: Speed = 0.5
+
+
+def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """A straight line of the tool, its orientation kept."""
+    held = planner.held(situation, spec.object)
+    under = planner.touching(situation, spec.object)
+
+    def attempt(height: float) -> StepPlan:
+        draft = Draft(planner, situation)
+        up = Transform.of(xyz=(0.0, 0.0, height))
+        draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=held | under)
+        return draft.plan()
+
+    return first_feasible(attempt, spread(spec.by), what=f"no height to lift '{spec.object}' by")
+
+
+def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown object."""
+    return unknown_body(scene, spec.object, ("object",), movable=True)
+
+
+MEMBER = StepMember(name="lift", spec=LiftSpec, plan=plan, check=check)

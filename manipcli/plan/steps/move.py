@@ -1,0 +1,74 @@
+"""`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
+
+    - move: {to: home}
+    - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
+    - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
+from manipcli.plan.planner import Draft, Planner
+from manipcli.model.build_scene import pose_transform
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import JointValue
+from manipcli.spec.robot import PoseSpec
+
+Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity and acceleration limits (0, 1].")]
+
+
+class MoveSpec(Model):
+    """Either `to` (joint space) or `pose` (of the tool, in `frame`)."""
+
+    to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
+    pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
+    frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
+    path: Literal["free", "joint", "linear"] = Field(
+        "free", description="`linear`: the tool on a straight line; `joint`: straight in joint space; `free`: any way."
+    )
+    speed: Speed = 1.0
+
+    @model_validator(mode="after")
+    def _one_target(self) -> MoveSpec:
+        if (self.to is None) == (self.pose is None):
+            raise ValueError("say either `to` (a named pose or joints) or `pose` (of the tool)")
+        if self.to is not None and self.path == "linear":
+            raise ValueError("`path: linear` needs a tool `pose`, not `to`")
+        return self
+
+
+def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """One motion; a named pose that includes the hand moves the hand at the same time."""
+    draft = Draft(planner, situation)
+    if isinstance(spec.to, str):
+        pose = planner.robot.pose(spec.to)
+        draft.joints("move", pose.joints, pose.positions, speed=spec.speed)
+    elif spec.to is not None:
+        draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
+    elif spec.pose is not None:
+        X_WT = planner.frame(spec.frame, situation) @ pose_transform(spec.pose)
+        if spec.path == "linear":
+            draft.straight("move", X_WT, speed=spec.speed)
+        else:
+            draft.reach("move", X_WT, speed=spec.speed)
+    return draft.plan()
+
+
+def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown poses, joints and frames."""
+    if isinstance(spec.to, str):
+        return unknown_pose(robot, spec.to, ("to",))
+    if spec.to is not None:
+        return tuple(problem for name in spec.to for problem in unknown_joint(robot, name, ("to", name)))
+    return unknown_frame(scene, spec.frame, ("frame",))
+
+
+MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check)

@@ -1,0 +1,122 @@
+"""`pick`: reach an object, approach it straight, and close the hand on it.
+
+    - pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
+
+The tool's +z is the direction of approach, its y the direction in which the fingers close.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.names import unknown_body, unknown_pose
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.steps.grasp import GraspSpec
+from manipcli.plan.steps.move import Speed
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Angle, Length
+
+YAWS_DEG = (0.0, 10.0, -10.0, 20.0, -20.0, 35.0, -35.0, 50.0, -50.0)
+"""Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
+
+
+class ApproachSpec(Model):
+    """From where the hand comes."""
+
+    from_: Literal["side", "top"] = Field("side", alias="from", description="Horizontally, or from straight above.")
+    yaw: Angle | None = Field(
+        None, description="Direction of the approach about the vertical [rad]; default: away from the robot's base."
+    )
+    distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
+
+
+class PickGraspSpec(GraspSpec):
+    """The grasp of a pick: its object is the pick's own."""
+
+    object: None = None
+    height: Length | None = Field(None, description="Of the tool above the object's bottom [m]; default: its middle.")
+
+
+class PickSpec(Model):
+    """Open the hand, reach, approach, close."""
+
+    object: str = Field(description="What to take.")
+    approach: ApproachSpec = ApproachSpec()
+    grasp: PickGraspSpec = PickGraspSpec()
+    open: str = Field("open", description="The pose of the hand while approaching.")
+    speed: Speed = Field(1.0, description="Of reaching; the straight approach takes half of it.")
+
+
+def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """The first of the candidate directions, rolls and distances that is reachable and free."""
+    X_WO = planner.body_pose(situation, spec.object)
+    body = planner.scene.body(spec.object)
+    bottom = body.centre[2] - body.size[2] / 2
+    height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
+    p_WG = X_WO.apply([body.centre[0], body.centre[1], height])
+
+    def attempt(candidate: tuple[float, Array]) -> StepPlan:
+        distance, R_WT = candidate
+        X_WG = Transform.of(xyz=p_WG, R=R_WT)
+        draft = Draft(planner, situation)
+        draft.reach("reach", X_WG @ Transform.of(xyz=(0.0, 0.0, -distance)), speed=spec.speed, hand=spec.open)
+        draft.straight("approach", X_WG, speed=spec.speed / 2)
+        draft.close(
+            spec.grasp.posture,
+            force=spec.grasp.force,
+            must_hold=spec.grasp.until == "contact",
+            body=spec.object,
+        )
+        return draft.plan()
+
+    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
+    candidates = itertools.product(spread(spec.approach.distance), turns)
+    return first_feasible(attempt, candidates, what=f"no way to pick '{spec.object}'")
+
+
+def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[Array]:
+    """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z)."""
+    found = []
+    if spec.from_ == "side":
+        away = X_WO.p - X_WB.p
+        nominal = math.atan2(away[1], away[0]) if spec.yaw is None else spec.yaw
+        turns = YAWS_DEG if spec.yaw is None else (0.0,)
+        for turn in turns:
+            yaw = nominal + math.radians(turn)
+            z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+            x = np.array([0.0, 0.0, -1.0])
+            found += [_frame(x, z), _frame(-x, z)]
+    else:
+        nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
+        for turn in (0.0, 90.0, 180.0, -90.0) if spec.yaw is None else (0.0, 180.0):
+            yaw = nominal + math.radians(turn)
+            found.append(_frame(np.array([math.cos(yaw), math.sin(yaw), 0.0]), np.array([0.0, 0.0, -1.0])))
+    return found
+
+
+def _frame(x: Array, z: Array) -> Array:
+    """The rotation with these two unit axes."""
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown object or postures."""
+    return (
+        unknown_body(scene, spec.object, ("object",), movable=True)
+        + unknown_pose(robot, spec.grasp.posture, ("grasp", "posture"))
+        + unknown_pose(robot, spec.open, ("open",))
+    )
+
+
+MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check)

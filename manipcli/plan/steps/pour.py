@@ -1,0 +1,113 @@
+"""`pour`: hold a cup over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back.
+
+    - pour: {object: cup, into: tray, tilt: 120 deg, dwell: 1 s}
+      until: {inside: {object: ball, of: tray}}
+      timeout: 15 s
+
+Said by the objects' geometry: the lip (lowest point of the rim, when tilted) stands over the middle of the container.
+With h the height of the rim above O, r its radius, a the axis and w = a x z the horizontal direction in which the
+cup tips, a turn by theta about a puts the lip at p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Body, Scene
+from manipcli.plan.names import unknown_body
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.search import Range, first_feasible, spread
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.steps.move import Speed
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Angle, Time
+
+TURNS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
+"""Turns of the hand about the vertical that are tried, away from how the cup is held."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class PourSpec(Model):
+    """Carry, tilt, dwell, tilt back."""
+
+    object: str = Field(description="The container that is held and tilted.")
+    into: str = Field(description="The container that receives.")
+    tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
+    dwell: Annotated[Time, Field(ge=0, description="How long to stay tilted [s]; `until` prolongs it.")] = 1.0
+    clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
+    speed: Speed = Field(0.5, description="Of carrying and tilting.")
+
+
+def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """The first of the candidate directions, senses and clearances that is reachable and free."""
+    held = planner.held(situation, spec.object)
+    body = planner.scene.body(spec.object)
+    X_TO = planner.held_in_tool(situation)
+    R_WT = planner.tool_pose(situation).R
+    receiver = planner.scene.body(spec.into)
+    X_WR = planner.body_pose(situation, spec.into)
+    mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
+
+    def attempt(candidate: tuple[float, float, float]) -> StepPlan:
+        clearance, turn, sense = candidate
+        R_WT0 = matrix_from_axis_angle(UP, turn) @ R_WT
+        a = _horizontal_axis(R_WT0)
+        theta = sense * spec.tilt
+        lip = mouth + clearance * UP
+        R_tilt = matrix_from_axis_angle(a, theta)
+        p_WT = lip - _lip_offset(body, a, theta) - R_tilt @ R_WT0 @ X_TO.p
+        draft = Draft(planner, situation)
+        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.speed, allowed=held)
+        draft.turn("tilt", a, theta, speed=spec.speed, allowed=held)
+        draft.dwell("dwell", spec.dwell, awaits=True)
+        draft.turn("tilt back", a, -theta, speed=spec.speed, allowed=held)
+        return draft.plan()
+
+    candidates = itertools.product(
+        spread(spec.clearance), (math.radians(turn) for turn in TURNS_DEG), _senses(planner, situation, mouth, R_WT)
+    )
+    return first_feasible(attempt, candidates, what=f"no way to pour from '{spec.object}' into '{spec.into}'")
+
+
+def _horizontal_axis(R_WT: Array) -> Array:
+    """The axis of the tool that is horizontal and nearest to its z: the axis of the last joint on most arms."""
+    for axis in (R_WT[:, 2], R_WT[:, 0], R_WT[:, 1]):
+        if abs(axis[2]) < math.sin(math.radians(10.0)):
+            flat = np.array([axis[0], axis[1], 0.0])
+            return np.asarray(flat / np.linalg.norm(flat))
+    raise NotPlannable("no axis of the tool is horizontal, so the cup cannot be tilted about one")
+
+
+def _senses(planner: Planner, situation: Situation, mouth: Array, R_WT: Array) -> tuple[float, float]:
+    """Tipping towards the receiver first."""
+    w = np.cross(_horizontal_axis(R_WT), UP)
+    towards = mouth - planner.tool_pose(situation).p
+    sense = 1.0 if float(towards @ w) >= 0.0 else -1.0
+    return (sense, -sense)
+
+
+def _lip_offset(body: Body, axis: Array, theta: float) -> Array:
+    """From O to the lip, in the world, once the cup has turned by `theta` about the horizontal `axis`."""
+    sense = math.copysign(1.0, theta)
+    h = float(body.centre[2] + body.size[2] / 2)
+    r = float(max(body.size[0], body.size[1]) / 2)
+    w = sense * np.cross(axis, UP)
+    s, c = math.sin(abs(theta)), math.cos(abs(theta))
+    return np.asarray((h * s + r * c) * w + (h * c - r * s) * UP)
+
+
+def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown bodies."""
+    return unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
+
+
+MEMBER = StepMember(name="pour", spec=PourSpec, plan=plan, check=check)

@@ -1,0 +1,37 @@
+"""`release`: open the hand.
+
+    - release: {posture: open}
+"""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.names import unknown_pose
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.spec.base import Model
+
+
+class ReleaseSpec(Model):
+    """The hand opens to a named pose and lets go."""
+
+    posture: str = Field("open", description="The named pose that the hand opens to.")
+
+
+def plan(spec: ReleaseSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """One motion of the hand."""
+    draft = Draft(planner, situation)
+    draft.open(spec.posture)
+    return draft.plan()
+
+
+def check(spec: ReleaseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Unknown posture."""
+    return unknown_pose(robot, spec.posture, ("posture",))
+
+
+MEMBER = StepMember(name="release", spec=ReleaseSpec, plan=plan, check=check)

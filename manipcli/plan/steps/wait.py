@@ -1,0 +1,46 @@
+"""`wait`: hold still.
+
+    - wait: 1 s
+    - wait: {duration: 1 s}
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.condition import Problem
+from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Time
+
+
+class WaitSpec(Model):
+    """Hold still for `duration`; with `until` on the step, at most until the condition holds."""
+
+    duration: Annotated[Time, Field(ge=0, description="How long [s].")] = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _scalar(cls, value: Any) -> Any:
+        """`wait: 1 s` is short for `wait: {duration: 1 s}`."""
+        return {"duration": value} if isinstance(value, str | int | float) else value
+
+
+def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """One motion that commands nothing."""
+    draft = Draft(planner, situation)
+    draft.dwell("wait", spec.duration, awaits=True)
+    return draft.plan()
+
+
+def check(spec: WaitSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """Nothing in it can be unknown."""
+    return ()
+
+
+MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=check)
