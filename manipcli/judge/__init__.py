@@ -1,0 +1,1 @@
+"""Judges a run from its recording alone."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.core.names import did_you_mean
+from manipcli.core.text import did_you_mean
 from manipcli.model import body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
@@ -24,7 +24,7 @@ Locate = Callable[[Loc], Place | None]
 Resolve = Callable[[str], Path]
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
-RESERVED = ("world", "robot", "start", "floor")
+RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from manipcli.core.geometry import Array
-from manipcli.core.names import did_you_mean
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.core.geometry import Array
-from manipcli.core.names import did_you_mean
+from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Condition, Problem, World
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene

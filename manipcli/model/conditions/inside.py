@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.core.geometry import Array, rotate, rotate_inverse
-from manipcli.core.names import did_you_mean
+from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Condition, Problem, World, unknown_body
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Interior, Scene

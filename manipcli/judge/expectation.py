@@ -1,0 +1,148 @@
+"""The contract of expectations: what a task may expect of its recording, each answered with a signed margin.
+
+Every condition is an expectation too: it must hold at the end (`at_end`). The others look at the whole recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
+from manipcli.model.condition import Condition, Problem, World, needs_physics
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import WorldState
+from manipcli.record.recording import Recording
+from manipcli.spec.base import Model
+
+END_WINDOW = 0.5
+"""How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
+
+S = TypeVar("S", bound=Model)
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What expectations are judged by.
+
+    Attributes:
+        recording: the log; `states` follow `world.robot` and `world.scene`.
+        world: robot, scene, and the first recorded state as the start.
+        physics: False when the engine moved no bodies and knew no contacts.
+        steps: how the steps went.
+    """
+
+    recording: Recording
+    world: World
+    physics: bool
+    steps: tuple[StepOutcome, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What an expectation found: the worst `margin` (>= 0 passes) in `unit`, when [s], and about what."""
+
+    margin: float
+    unit: str
+    at: float | None
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class NotEvaluated:
+    """Why an expectation could not be judged; that is never a pass."""
+
+    reason: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation(Generic[S]):
+    """A member of the seam.
+
+    Attributes:
+        name: the word in YAML.
+        spec: what the user writes under that word.
+        evaluate: (spec, evidence) -> the worst margin, or why there is none.
+        check: (spec, robot, scene, ids of the task's steps) -> what in the spec these do not know.
+    """
+
+    name: str
+    spec: type[S]
+    evaluate: Callable[[S, Evidence], Measured | NotEvaluated]
+    check: Callable[[S, RobotModel, Scene, tuple[str, ...]], tuple[Problem, ...]]
+
+
+def at_end(condition: Condition[Any]) -> Expectation[Any]:
+    """The expectation that a condition holds at the end.
+
+    Its margin is the smallest over the last `END_WINDOW` seconds of the recording (over all of it when it is
+    shorter), so that it also bounds the last state's.
+    """
+
+    def evaluate(spec: Model, evidence: Evidence) -> Measured | NotEvaluated:
+        scene, states = evidence.world.scene, evidence.recording.states
+        if not evidence.physics and needs_physics(condition, spec, scene):
+            movable = {body.name for body in scene.movable}
+            names = ", ".join(f"'{name}'" for name in condition.bodies(spec, scene) if name in movable)
+            return NotEvaluated(f"the engine has no physics, so {names} never moved", condition.unit)
+        if states.time.size == 0:
+            return NotEvaluated("the recording holds no state", condition.unit)
+        # Half a nanosecond of slack: recorded times are whole nanoseconds.
+        first = int(np.searchsorted(states.time, states.time[-1] - END_WINDOW - 0.5e-9))
+        margins = condition.margin(spec, evidence.world, since(states, first))
+        return worst(margins, states.time[first:], condition.unit, describe(spec))
+
+    def check(spec: Model, robot: RobotModel, scene: Scene, steps: tuple[str, ...]) -> tuple[Problem, ...]:
+        return condition.check(spec, robot, scene)
+
+    return Expectation(name=condition.name, spec=condition.spec, evaluate=evaluate, check=check)
+
+
+def worst(margins: Array, times: Array, unit: str, text: str) -> Measured | NotEvaluated:
+    """The smallest of `margins` (T,) and the first moment it was met."""
+    if not np.all(np.isfinite(margins)):
+        at = float(times[int(np.argmin(np.isfinite(margins)))])
+        return NotEvaluated(f"the recorded state is not finite at t = {at:.3f} s", unit)
+    k = int(np.argmin(margins))
+    return Measured(margin=float(margins[k]), unit=unit, at=float(times[k]), text=text)
+
+
+def since(states: WorldState, first: int) -> WorldState:
+    """The states from index `first` on."""
+    return WorldState(
+        time=states.time[first:],
+        position=states.position[first:],
+        velocity=states.velocity[first:],
+        effort=states.effort[first:],
+        body_position=states.body_position[first:],
+        body_quat_xyzw=states.body_quat_xyzw[first:],
+        body_linear=states.body_linear[first:],
+        body_angular=states.body_angular[first:],
+    )
+
+
+def describe(spec: Model) -> str:
+    """What was written, in one line: `object: ball, of: tray`."""
+    return ", ".join(f"{key}: {value}" for key, value in spec.model_dump(exclude_defaults=True).items())
+
+
+def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:
+    """The outcome of an expectation called `name`: met from a margin of zero on."""
+    if isinstance(found, NotEvaluated):
+        return ExpectationOutcome(
+            name=name, outcome="not_evaluated", margin=None, unit=found.unit, at=None, text=found.reason
+        )
+    return ExpectationOutcome(
+        name=name,
+        outcome="passed" if found.margin >= 0.0 else "failed",
+        margin=found.margin,
+        unit=found.unit,
+        at=found.at,
+        text=found.text,
+    )

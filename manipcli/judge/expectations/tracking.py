@@ -1,0 +1,54 @@
+"""`tracking`: the joints of a group followed their references."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.core.text import did_you_mean
+from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvaluated, worst
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import JointValue
+
+
+class TrackingSpec(Model):
+    """No joint of the group was ever further than `within` from its controller's reference."""
+
+    group: str = Field(description="A group of the robot; each of its joints must have a controller.")
+    within: Annotated[JointValue, Field(gt=0)] = Field(description="Largest difference of a joint [rad or m].")
+
+
+def evaluate(spec: TrackingSpec, evidence: Evidence) -> Measured | NotEvaluated:
+    """`within` minus the largest |reference - measured| over joints and run [rad, or m where the worst joint slides]."""
+    robot = evidence.world.robot
+    found: Measured | None = None
+    for name in robot.group(spec.group).joints:
+        unit = "m" if robot.joint(name).type == "prismatic" else "rad"
+        trace = next((trace for trace in evidence.recording.controllers if name in trace.joints), None)
+        if trace is None or trace.times.size == 0:
+            return NotEvaluated(f"the recording holds no reference of joint '{name}'", unit)
+        k = trace.joints.index(name)
+        margins = spec.within - np.abs(trace.reference_position[:, k] - trace.position[:, k])
+        joint = worst(margins, trace.times, unit, f"joint '{name}'")
+        if isinstance(joint, NotEvaluated):
+            return joint
+        if found is None or joint.margin < found.margin:
+            found = joint
+    return found or NotEvaluated(f"group '{spec.group}' has no joints")
+
+
+def check(spec: TrackingSpec, robot: RobotModel, scene: Scene, steps: tuple[str, ...]) -> tuple[Problem, ...]:
+    """The robot has the group."""
+    groups = [group.name for group in robot.groups]
+    if spec.group in groups:
+        return ()
+    message = f"'{spec.group}' is not a group of robot '{robot.name}'"
+    return (Problem(("group",), message, did_you_mean(spec.group, groups)),)
+
+
+TRACKING = Expectation(name="tracking", spec=TrackingSpec, evaluate=evaluate, check=check)
