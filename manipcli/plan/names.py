@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from manipcli.core.names import did_you_mean
+from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
