@@ -79,14 +79,14 @@ class CollisionChecker:
         self.scene = scene
         self.margin = margin
         self._kinematics = kinematics
-        self._bodies = {body.name: [(g.X_LS, _geometry(g.shape)) for g in body.geometries] for body in scene.bodies}
+        self._bodies = {body.name: [(g.X_LS, coal_shape(g.shape)) for g in body.geometries] for body in scene.bodies}
         self._links: list[_Part] = []
         model = kinematics.model
         for link in kinematics.robot.links:
             frame = model.frames[model.getFrameId(link.name)]
             for g in link.collisions:
                 placement = frame.placement * _se3(g.X_LS)
-                self._links.append(_Part(f"robot/{link.name}", True, frame.parentJoint, placement, _geometry(g.shape)))
+                self._links.append(_Part(f"robot/{link.name}", True, frame.parentJoint, placement, coal_shape(g.shape)))
         self._near = _neighbours(model)
         self._ignored = {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in ignore}
         self._ignored |= self._touching_at_zero()
@@ -242,7 +242,7 @@ def _se3(X: Transform) -> pin.SE3:
     return pin.SE3(X.R, X.p)
 
 
-def _geometry(shape: Shape) -> coal.CollisionGeometry:
+def coal_shape(shape: Shape) -> coal.CollisionGeometry:
     """Coal's own shape; a mesh becomes the convex hull of its vertices."""
     import coal
 
