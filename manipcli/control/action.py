@@ -1,12 +1,21 @@
-"""Goals, feedback and results of controllers, as FollowJointTrajectory and GripperCommand know them."""
+"""Goals, feedback and results of controllers, as FollowJointTrajectory and GripperCommand know them.
+
+`controller.send_goal(...)` returns a `GoalHandle`; the controller ends it in one of its next updates. The session that
+owns the stepping, and the Python API, hold the same handles.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
 
+from manipcli.core.geometry import Array
+
 GoalStatus = Literal["active", "succeeded", "aborted", "canceled"]
+FingerStop = Literal["contact", "stalled", "reached"]
+"""Why a finger stopped: the force was met, it was blocked, or it came to its target without either."""
 
 
 class ErrorCode(IntEnum):
@@ -22,9 +31,66 @@ class ErrorCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class GoalResult:
-    """How a goal ended: code, and a text that names joint, value, limit and time."""
+    """How a goal ended: code, a text that names joint, value, limit and time, and the `time` [s].
+
+    `fingers` says of a gripper goal why each finger stopped, in the order of the goal's fingers.
+    """
 
     status: GoalStatus
     code: ErrorCode
     text: str
     time: float
+    fingers: tuple[FingerStop, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Feedback:
+    """A goal on its way: `elapsed` [s] since it began, and (n) copies of what is wanted and what is; rad or m."""
+
+    elapsed: float
+    desired: Array
+    actual: Array
+
+    @property
+    def error(self) -> Array:
+        """(n) desired minus actual."""
+        return self.desired - self.actual
+
+
+class GoalHandle:
+    """A goal that a controller has accepted.
+
+    Attributes:
+        result: None while the goal is active, then how it ended.
+    """
+
+    __slots__ = ("_cancel", "_feedback", "result")
+
+    def __init__(self, *, cancel: Callable[[GoalHandle], None], feedback: Callable[[], Feedback]) -> None:
+        self.result: GoalResult | None = None
+        self._cancel = cancel
+        self._feedback = feedback
+
+    @property
+    def status(self) -> GoalStatus:
+        return "active" if self.result is None else self.result.status
+
+    @property
+    def active(self) -> bool:
+        return self.result is None
+
+    def feedback(self) -> Feedback:
+        """Where the controller is now; after the goal ended: where the controller holds."""
+        return self._feedback()
+
+    def cancel(self) -> None:
+        """Ends the goal as canceled, and lets the controller stop and hold; nothing happens to a goal that ended."""
+        if self.result is None:
+            self._cancel(self)
+
+    def end(
+        self, status: GoalStatus, code: ErrorCode, text: str, time: float, fingers: tuple[FingerStop, ...] = ()
+    ) -> None:
+        """For the controller: the goal ends; the first end counts."""
+        if self.result is None:
+            self.result = GoalResult(status=status, code=code, text=text, time=time, fingers=fingers)

@@ -75,6 +75,13 @@ class InvalidInput(ManipcliError):
         return self._findings
 
 
+class InvalidArgument(InvalidInput, ValueError):
+    """An argument of the Python API cannot be used; also a `ValueError`, as callers in Python expect."""
+
+    def __init__(self, code: str, message: str, *, hint: str | None = None) -> None:
+        super().__init__((Finding(code=code, message=message, hint=hint),))
+
+
 class NotPlannable(ManipcliError):
     """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits."""
 

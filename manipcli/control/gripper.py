@@ -1,0 +1,271 @@
+"""Closes and opens a hand: each finger's reference moves at a speed and stops on contact, on stall, or at its target.
+
+    controllers:
+      hand_controller:
+        type: gripper
+        joints: [finger_1_proximal, finger_1_distal]
+        gains: {finger_1_proximal: {p: 3, d: 0.03}, finger_1_distal: {p: 2, d: 0.015}}
+        speed: 1 rad/s
+        max_effort: 2
+
+u = PID(e, de/dt) + feed-forward, clamped to the maximum effort. Where a finger stops, its reference stays: the spring
+of the gains keeps pressing with what it had built up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle
+from manipcli.control.controller import ControllerOutput, FeedForward, Interface, JointState
+from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.pid import Compat
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.spec.controllers import GainsSpec
+
+REACHED = 1e-9
+"""rad or m: a reference this close to its target has arrived."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GripperGoal:
+    """Where the hand shall go, and what may stop it.
+
+    Attributes:
+        target: (n) rad or m, in the order of the controller's joints.
+        force: [N] at which a finger stops; None: contact does not stop it (to open).
+        max_effort: (n) N m or N, for this goal and after it; None: the controller's.
+        fingers: joint indices of each finger, every joint in exactly one; empty: each joint is a finger.
+    """
+
+    target: Array
+    force: float | None = None
+    max_effort: Array | None = None
+    fingers: tuple[tuple[int, ...], ...] = ()
+
+
+class GripperController:
+    """One goal at a time; holds in between. The goal succeeds when every finger has stopped; see `GoalResult.fingers`.
+
+    A finger has *contact* when the sum of its joints' contact forces meets the goal's force; it is *stalled* when none
+    of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity` for
+    `stall_time`; it has *reached* when all its joints are within `goal_tolerance` and their references have arrived.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        gains: by joint name.
+        fingers: joint indices of each finger, where a goal does not say; empty: each joint is a finger.
+        speed: [rad/s or m/s] of the references.
+        max_effort: (n) or a number, N m or N; None: unlimited here.
+        stall_velocity, stall_time, goal_tolerance: see above.
+        feed_forward: what the caller of `update` shall pass for this controller.
+        compat: order of the PID integration.
+
+    Raises:
+        InvalidArgument: joints repeated, gains of an unknown joint or all zero, fingers that do not part the joints.
+    """
+
+    interface: Interface = "effort"
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        gains: Mapping[str, GainsSpec],
+        fingers: tuple[tuple[int, ...], ...] = (),
+        speed: float = 1.0,
+        max_effort: npt.ArrayLike | None = None,
+        stall_velocity: float = 0.02,
+        stall_time: float = 0.2,
+        goal_tolerance: float = 0.05,
+        feed_forward: FeedForward = "none",
+        compat: Compat = "ros2",
+    ) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        self.feed_forward: FeedForward = feed_forward
+        n = len(self.joints)
+        if n == 0 or len(set(self.joints)) != n:
+            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
+        self._pid = build_pid(name, self.joints, joint_gains(name, self.joints, gains), compat)
+        self._default_fingers = self._parted(fingers)
+        self._speed = speed
+        unlimited = np.full(n, math.inf)
+        self._default_effort = unlimited if max_effort is None else np.broadcast_to(max_effort, (n,)).astype(np.float64)
+        self._stall_velocity, self._stall_time, self._goal_tolerance = stall_velocity, stall_time, goal_tolerance
+
+        self._reference, self._velocity, self._acceleration, self._command = np.zeros((4, n))
+        self._error, self._error_rate, self._step, self._measured = np.zeros((4, n))
+        self._output = ControllerOutput(
+            position=self._reference, velocity=self._velocity, acceleration=self._acceleration, command=self._command
+        )
+        self._activated = False
+        self._time = self._began = 0.0
+        self._goal: GoalHandle | None = None
+        self._starts = False
+        self._set_effort(self._default_effort)
+        self._target = np.zeros(n)
+        self._fingers = self._default_fingers
+        self._force: float | None = None
+        self._stops: list[FingerStop | None] = []
+        self._moved: list[float] = []
+        self._texts: list[str] = []
+        self._moving = np.zeros(n)
+
+    def _parted(self, fingers: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
+        n = len(self.joints)
+        if not fingers:
+            return tuple((j,) for j in range(n))
+        if sorted(j for finger in fingers for j in finger) != list(range(n)) or not all(fingers):
+            raise InvalidArgument(
+                "CTRL130", f"controller '{self.name}': fingers {fingers} do not part the joints 0 to {n - 1}"
+            )
+        return fingers
+
+    def _set_effort(self, effort: Array) -> None:
+        self._effort, self._minus_effort = effort, -effort
+
+    def send_goal(self, goal: GripperGoal) -> GoalHandle:
+        """Accepts a goal, which begins at the next update; a goal before it ends as aborted.
+
+        Raises:
+            InvalidArgument: a target of another length or not finite, fingers that do not part the joints, a force or
+                an effort that is not positive.
+        """
+        n = len(self.joints)
+        target = np.array(goal.target, dtype=np.float64)
+        if target.shape != (n,) or not np.isfinite(target).all():
+            raise InvalidArgument("CTRL131", f"target {target.tolist()}: expected {n} finite numbers, one a joint")
+        if goal.force is not None and not goal.force > 0.0:
+            raise InvalidArgument("CTRL132", f"force is {goal.force} N; expected more than 0, or None")
+        fingers = self._parted(goal.fingers) if goal.fingers else self._default_fingers
+        effort = self._default_effort
+        if goal.max_effort is not None:
+            effort = np.broadcast_to(np.asarray(goal.max_effort, dtype=np.float64), (n,)).copy()
+            if not (effort > 0.0).all():
+                raise InvalidArgument("CTRL133", f"max_effort {effort.tolist()}: expected more than 0")
+        if self._goal is not None:
+            self._goal.end("aborted", ErrorCode.INVALID_GOAL, "preempted by a new goal", self._time)
+        self._set_effort(effort)
+        self._target, self._force, self._fingers = target, goal.force, fingers
+        self._stops = [None] * len(fingers)
+        self._texts = [""] * len(fingers)
+        self._moving = np.ones(n)
+        self._starts = True
+        self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
+        return self._goal
+
+    def deactivate(self, time: float) -> None:
+        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        if self._goal is not None:
+            self._goal.end("aborted", ErrorCode.INVALID_GOAL, "the controller was deactivated", time)
+        self._goal = None
+        self._activated = False
+
+    def update(
+        self,
+        time: float,
+        period: float,
+        measured: JointState,
+        feed_forward: Array | None = None,
+        *,
+        contact_force: Array | None = None,
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s].
+
+        Args:
+            measured: (n) of the controller's joints.
+            feed_forward: (n) added to the effort, before it is clamped.
+            contact_force: (n) [N] on what each joint moves, up to the next joint; None: contact is not sensed.
+        """
+        self._time = time
+        self._measured[:] = measured.position
+        if not self._activated:
+            self._activated = True
+            self._pid.reset()
+            self._reference[:] = measured.position
+            self._velocity[:] = 0.0
+            self._set_effort(self._effort if self._goal is not None else self._default_effort)
+        if self._goal is not None:
+            if self._starts:
+                self._starts = False
+                self._began = time
+                self._moved = [time] * len(self._fingers)
+            self._judge(time, measured, contact_force)
+            self._ramp(period)
+        np.subtract(self._reference, measured.position, out=self._error)
+        np.subtract(self._velocity, measured.velocity, out=self._error_rate)
+        command = self._pid.update(self._error, period, self._error_rate)
+        if feed_forward is not None:
+            command += feed_forward
+        np.maximum(command, self._minus_effort, out=command)
+        np.minimum(command, self._effort, out=self._command)
+        return self._output
+
+    def _ramp(self, period: float) -> None:
+        """Moves the references of the fingers that have not stopped towards their targets."""
+        step, limit = self._step, self._speed * period
+        np.subtract(self._target, self._reference, out=step)
+        step *= self._moving
+        np.minimum(step, limit, out=step)
+        np.maximum(step, -limit, out=step)
+        self._reference += step
+        np.divide(step, period, out=self._velocity)
+
+    def _judge(self, time: float, measured: JointState, contact_force: Array | None) -> None:
+        """Stops the fingers that met something or arrived; ends the goal when all have."""
+        away = np.abs(self._target - measured.position).tolist()
+        left = np.abs(self._target - self._reference).tolist()
+        speed = np.abs(measured.velocity).tolist()
+        force = contact_force.tolist() if contact_force is not None and self._force is not None else None
+        tolerance, slow = self._goal_tolerance, self._stall_velocity
+        for f, finger in enumerate(self._fingers):
+            if self._stops[f] is not None:
+                continue
+            if force is not None and self._force is not None:
+                pressed = sum(force[j] for j in finger)
+                if pressed >= self._force:
+                    self._stop(f, "contact", f"contact at {pressed:.3g} N (asked {self._force:.3g} N)")
+                    continue
+            far = [j for j in finger if away[j] > tolerance]
+            if not far:
+                if all(left[j] <= REACHED for j in finger):
+                    self._stop(f, "reached", "reached its target")
+                continue
+            if any(speed[j] > slow for j in far):
+                self._moved[f] = time
+            elif time - self._moved[f] >= self._stall_time:
+                j = max(far, key=away.__getitem__)
+                self._stop(f, "stalled", f"stalled {away[j]:.3g} before the target of '{self.joints[j]}'")
+        if self._goal is not None and None not in self._stops:
+            stops = tuple(stop for stop in self._stops if stop is not None)
+            names = (self.joints[finger[0]] for finger in self._fingers)
+            text = "; ".join(f"finger of '{name}': {why}" for name, why in zip(names, self._texts, strict=True))
+            self._goal.end("succeeded", ErrorCode.SUCCESSFUL, f"{text}; at t = {time:.3f} s", time, stops)
+            self._end_motion()
+
+    def _stop(self, f: int, why: FingerStop, text: str) -> None:
+        self._stops[f], self._texts[f] = why, text
+        for j in self._fingers[f]:
+            self._moving[j] = 0.0
+
+    def _end_motion(self) -> None:
+        self._goal = None
+        self._moving[:] = 0.0
+        self._velocity[:] = 0.0
+
+    def _cancel(self, handle: GoalHandle) -> None:
+        handle.end("canceled", ErrorCode.SUCCESSFUL, f"canceled at t = {self._time:.3f} s", self._time)
+        if self._goal is handle:
+            self._end_motion()
+
+    def _feedback(self) -> Feedback:
+        return Feedback(elapsed=self._time - self._began, desired=self._reference.copy(), actual=self._measured.copy())
