@@ -30,9 +30,7 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
     )
 
 
-def _outcome(
-    step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool
-) -> StepOutcome:
+def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:
     mine = [event for event in events if event.step == step_id]
     started = next((event.time for event in mine if event.kind == "step_started"), None)
     end = next((event for event in reversed(mine) if event.kind == "step_ended"), None)

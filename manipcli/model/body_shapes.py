@@ -128,9 +128,7 @@ def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:
             _placed(along_y, ((x - w) / 2.0, 0.0, middle), rgba),
             _placed(along_y, ((w - x) / 2.0, 0.0, middle), rgba),
         ),
-        interior=Interior(
-            X_OS=Transform.of(xyz=(0.0, 0.0, middle)), shape=Box((x - 2.0 * w, y - 2.0 * w, depth))
-        ),
+        interior=Interior(X_OS=Transform.of(xyz=(0.0, 0.0, middle)), shape=Box((x - 2.0 * w, y - 2.0 * w, depth))),
         size=frozen(spec.size),
         centre=frozen([0.0, 0.0, z / 2.0]),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.model import body_shapes
+from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
@@ -108,7 +108,7 @@ class _Builder:
             self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
             return
         self._add_shape(name, kind, shape)
-        if spec.mass is None and not spec.fixed and shape.inertial is None:
+        if spec.mass is None and not spec.fixed and kind != "urdf":
             self._error(
                 "TASK223", f"body '{name}' can move and has no mass", loc, "say `mass: 150 g`, or `fixed: true`"
             )
@@ -130,6 +130,8 @@ class _Builder:
             if spec.tray.wall >= min(x / 2.0, y / 2.0, z):
                 raise ValueError(f"a wall of {spec.tray.wall:g} m leaves no hollow in the tray")
             return body_shapes.tray(spec.tray, rgba)
+        if spec.mesh is not None:
+            return body_files.mesh(spec.mesh, self.resolve(spec.mesh.file), rgba)
         raise ValueError(f"'{kind}' cannot be used here")
 
     def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:

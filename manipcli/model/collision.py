@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.coal_shape import coal_shape
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Box, Cylinder, Mesh, Shape, Sphere
 from manipcli.model.scene import Scene
 
 if TYPE_CHECKING:
@@ -240,20 +240,3 @@ def _se3(X: Transform) -> pin.SE3:
     import pinocchio as pin
 
     return pin.SE3(X.R, X.p)
-
-
-def coal_shape(shape: Shape) -> coal.CollisionGeometry:
-    """Coal's own shape; a mesh becomes the convex hull of its vertices."""
-    import coal
-
-    match shape:
-        case Box(size=size):
-            return coal.Box(*size)
-        case Sphere(radius=radius):
-            return coal.Sphere(radius)
-        case Cylinder(radius=radius, length=length):
-            return coal.Cylinder(radius, length)
-        case Mesh(path=path, scale=scale):
-            mesh = coal.MeshLoader().load(str(path), np.array(scale))
-            mesh.buildConvexHull(True, "Qt")
-            return mesh.convex

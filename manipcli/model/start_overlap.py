@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.robot import Box, Cylinder, Geometry, Sphere
+from manipcli.model.coal_shape import coal_shape
+from manipcli.model.robot import Geometry
 from manipcli.model.scene import Body
-
-if TYPE_CHECKING:
-    import coal
 
 TOLERANCE = 1e-3
 """Depth [m] up to which two bodies count as touching: rounding, and what the settling pushes apart without harm."""
@@ -48,30 +45,14 @@ def _depth(a: Body, shape_a: Geometry, b: Body, shape_b: Geometry) -> float:
     """How deep two shapes are in each other [m]; 0 when apart."""
     import coal
 
-    made_a, made_b = _coal(shape_a), _coal(shape_b)
-    if made_a is None or made_b is None:
-        return 0.0
     X_a, X_b = a.X_WO @ shape_a.X_LS, b.X_WO @ shape_b.X_LS
     result = coal.DistanceResult()
     coal.distance(
-        made_a,
+        coal_shape(shape_a.shape),
         coal.Transform3s(np.array(X_a.R), np.array(X_a.p)),
-        made_b,
+        coal_shape(shape_b.shape),
         coal.Transform3s(np.array(X_b.R), np.array(X_b.p)),
         coal.DistanceRequest(),
         result,
     )
     return max(0.0, -float(result.min_distance))
-
-
-def _coal(geometry: Geometry) -> coal.ShapeBase | None:
-    import coal
-
-    shape = geometry.shape
-    if isinstance(shape, Box):
-        return coal.Box(*shape.size)
-    if isinstance(shape, Sphere):
-        return coal.Sphere(shape.radius)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.length)
-    return None  # a mesh: the engine's own check at the start sees it

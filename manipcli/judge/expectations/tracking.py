@@ -24,7 +24,7 @@ class TrackingSpec(Model):
 
 
 def evaluate(spec: TrackingSpec, evidence: Evidence) -> Measured | NotEvaluated:
-    """`within` minus the largest |reference - measured| over joints and run [rad, or m where the worst joint slides]."""
+    """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of joints and run."""
     robot = evidence.world.robot
     found: Measured | None = None
     for name in robot.group(spec.group).joints:
