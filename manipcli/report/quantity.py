@@ -13,20 +13,14 @@ _CUSTOMARY = {
 
 
 def quantity(value: float, unit: str) -> str:
-    """`value` in the SI `unit` as text in its customary unit, to three significant digits at least.
+    """`value` in the SI `unit` as text in its customary unit, to at least two significant digits.
 
     Lengths are given in mm below 1 m, angles in degrees; any other unit is kept. `0.0041, "m"` gives `4.1 mm`.
     """
-    name, scale = _CUSTOMARY.get(unit, (unit, 1.0))
-    if unit == "m" and abs(value) >= 1.0:
-        name, scale = unit, 1.0
-    return f"{_short(value * scale)} {name}".rstrip()
-
-
-def _short(number: float) -> str:
-    if not math.isfinite(number):
-        return "unlimited" if number > 0 else str(number)
+    if not math.isfinite(value):
+        return "unlimited" if value > 0 else str(value)
+    name, scale = (unit, 1.0) if unit == "m" and abs(value) >= 1.0 else _CUSTOMARY.get(unit, (unit, 1.0))
+    number = value * scale
     size = abs(number)
-    if size >= 100 or number == int(number):
-        return f"{number:.0f}"
-    return f"{number:.1f}" if size >= 1 else f"{number:.2g}"
+    digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:.2g}"
+    return f"{digits} {name}".rstrip()

@@ -1,0 +1,273 @@
+"""The command line's promises: exit codes, one JSON object whatever happens, and never a traceback."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NoReturn
+
+import numpy as np
+import pytest
+
+import manipcli
+from manipcli.cli.app import main
+from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
+from manipcli.core.geometry import Transform
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.robot import Joint, JointLimits, RobotModel
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.report.run_report import RunReport, Timing
+
+PASSED = Verdict(
+    task="pour",
+    verdict="passed",
+    seed=7,
+    engine="pybullet",
+    simulated_time=20.5,
+    steps=(StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9),),
+    expectations=(ExpectationOutcome("upright", "passed", 0.05, "rad", 20.1),),
+)
+
+
+def _report(verdict: Verdict) -> RunReport:
+    return RunReport(
+        verdict, wall_time=3.0, real_time_factor=8.0, log="runs/pour.mcap", timing=Timing(0.1, 0.2, 2.5, 0.2)
+    )
+
+
+@pytest.fixture
+def pipeline(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """A stand-in whose functions each test sets: here only what the commands do with it is tested."""
+    stand_in = SimpleNamespace()
+    monkeypatch.setitem(sys.modules, "manipcli.pipeline", stand_in)
+    monkeypatch.setattr(manipcli, "pipeline", stand_in, raising=False)
+    return stand_in
+
+
+def _raising(error: BaseException) -> Callable[..., NoReturn]:
+    def fail(*_: object, **__: object) -> NoReturn:
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize(
+    ("verdict", "code"),
+    [
+        (PASSED, 0),
+        (replace(PASSED, verdict="failed"), 1),
+        (replace(PASSED, verdict="error", steps=(replace(PASSED.steps[0], outcome="interrupted"),)), 2),
+        (replace(PASSED, verdict="error", errors=(Finding("SIM100", "gone"),)), 3),
+    ],
+)
+def test_the_verdict_decides_the_exit_code(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], verdict: Verdict, code: int
+) -> None:
+    pipeline.run_task = lambda *_, **__: _report(verdict)
+    pipeline.judge_log = lambda _: verdict
+    assert main(["run", "t.yaml"]) == code
+    assert main(["judge", "x.mcap"]) == code
+
+
+ERRORS = [
+    (InvalidInput([Finding("TASK203", "no such joint", Place("t.yaml", 14, 9), hint="did you mean 'a'?")]), 4, "error"),
+    (NotPlannable("out of reach", step="pick_1"), 1, "failed"),
+    (SimulationFailed("cup exploded", time=1.0), 1, "failed"),
+    (ManipcliError("odd"), 3, "error"),
+    (KeyboardInterrupt(), 2, "error"),
+    (PermissionError(13, "Permission denied", "/nowhere/x.mcap"), 4, "error"),
+    (OSError(28, "No space left on device"), 3, "error"),
+    (ZeroDivisionError("division\nby zero"), 3, "error"),
+]
+
+
+@pytest.mark.parametrize(("error", "code", "verdict"), ERRORS, ids=lambda value: type(value).__name__)
+def test_an_error_becomes_a_message_and_an_exit_code(
+    pipeline: SimpleNamespace,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    code: int,
+    verdict: str,
+) -> None:
+    monkeypatch.delenv("MANIPCLI_DEBUG", raising=False)
+    pipeline.run_task = _raising(error)
+
+    assert main(["run", "t.yaml"]) == code
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.count("error[") == 1
+    assert "Traceback" not in told.err
+
+    assert main(["run", "t.yaml", "--format", "json"]) == code
+    told = capsys.readouterr()
+    assert told.err == ""
+    answer = json.loads(told.out)
+    assert answer["verdict"] == verdict
+    assert [set(one) >= {"code", "file", "line", "column", "message"} for one in answer["errors"]] == [True]
+
+
+def test_an_error_in_a_file_says_where_and_hints(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
+    pipeline.run_task = _raising(ERRORS[0][0])
+    main(["run", "t.yaml"])
+    assert capsys.readouterr().err == "t.yaml:14:9: error[TASK203]: no such joint\n  hint: did you mean 'a'?\n"
+
+
+def test_the_traceback_is_there_for_who_asks(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MANIPCLI_DEBUG", "1")
+    pipeline.run_task = _raising(ZeroDivisionError("x"))
+    assert main(["run", "t.yaml"]) == 3
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["rnu"],
+        ["run"],
+        ["run", "t.yaml", "--seeed", "1"],
+        ["run", "t.yaml", "--seed", "-1"],
+        ["run", "t.yaml", "--format", "xml"],
+        ["list", "robotss"],
+        ["schema", "engine"],
+        ["--nope"],
+    ],
+)
+def test_wrong_usage_is_4_and_one_message(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert main(words) == 4
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("error[USE001]: ")
+    assert "--help" in told.err
+
+
+def test_wrong_usage_answers_in_json_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "--format=json"]) == 4
+    assert json.loads(capsys.readouterr().out)["errors"][0]["code"] == "USE001"
+
+
+@pytest.mark.parametrize("words", [[], ["--help"], ["--version"], ["run", "--help"]])
+def test_help_and_version_are_results(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert main(words) == 0
+    told = capsys.readouterr()
+    assert told.out
+    assert told.err == ""
+
+
+def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
+    given: dict[str, object] = {}
+
+    def run_task(path: Path, **options: object) -> RunReport:
+        given.update(options, path=path)
+        return _report(PASSED)
+
+    pipeline.run_task = run_task
+    words = "run t.yaml --log a.mcap --force --seed 3 --set a.b=1 --set c=x=y --package-path p --allow-outside -q"
+    assert main(words.split()) == 0
+    del given["progress"]
+    assert given == {
+        "path": Path("t.yaml"),
+        "log": Path("a.mcap"),
+        "force": True,
+        "seed": 3,
+        "overrides": ("a.b=1", "c=x=y"),
+        "package_path": (Path("p"),),
+        "allow_outside": True,
+    }
+    assert capsys.readouterr().err == ""
+
+
+def test_a_run_tells_one_line_a_step_where_there_is_no_terminal(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run_task(path: Path, *, progress: object, **_: object) -> RunReport:
+        for k, step in enumerate(PASSED.steps):
+            progress.step_started(step, k, len(PASSED.steps))  # type: ignore[attr-defined]
+            progress.tick(1.0, 0.5)  # type: ignore[attr-defined]
+            progress.step_ended(step)  # type: ignore[attr-defined]
+        return _report(PASSED)
+
+    pipeline.run_task = run_task
+    assert main(["run", "t.yaml"]) == 0
+    assert capsys.readouterr().err == "[1/1] pick_1: done (0.00 s to 6.10 s)\n"
+
+
+@pytest.mark.parametrize(("severity", "code"), [("error", 1), ("warning", 0)])
+def test_check_fails_on_errors_only(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], severity: str, code: int
+) -> None:
+    pipeline.check_files = lambda _: (Finding("TASK1", "x", severity=severity),)
+    assert main(["check", "a.yaml", "b.yaml"]) == code
+    assert "2 files checked" in capsys.readouterr().out
+    assert main(["check", "a.yaml", "--format", "json"]) == code
+    assert json.loads(capsys.readouterr().out)["findings"][0]["severity"] == severity
+
+
+def _robot() -> RobotModel:
+    limits = JointLimits(velocity=2.0, acceleration=10.0)
+    joint = Joint("j1", "revolute", "a", "b", Transform.identity(), np.array([0.0, 0.0, 1.0]), limits)
+    return RobotModel("r", "a", (), (joint,), (), (), (), Transform.identity(), "")
+
+
+def _motion() -> SimpleNamespace:
+    times = np.array([0.0, 1.0, 2.0])
+    velocities = np.array([[0.0], [1.5], [0.0]])
+    trajectory = JointTrajectory(("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1)))
+    return SimpleNamespace(step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0)
+
+
+def test_plan_names_the_joint_that_limits_and_writes_every_point(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pipeline.load_task = lambda *_, **__: SimpleNamespace(name="home", robot=_robot())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=(_motion(),))
+    csv = tmp_path / "plan.csv"
+    assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
+    assert "velocity of j1" in (out := capsys.readouterr().out)
+    assert "75.0 %" in out
+    rows = csv.read_text().splitlines()
+    assert rows[0] == "step,motion,time,j1_position,j1_velocity,j1_acceleration"
+    assert rows[2] == "move_1,move,1.000000,0.5,1.5,0"
+    assert len(rows) == 4
+
+    assert main(["plan", "t.yaml", "--format", "json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["motions"][0]["limited_by"] == {"joint": "j1", "quantity": "velocity", "used": 0.75}
+
+
+def test_plan_that_cannot_write_its_csv_says_so(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    pipeline.load_task = lambda *_, **__: SimpleNamespace(name="home", robot=_robot())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
+    assert "No such file or directory" in capsys.readouterr().err
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    script = f"{sys.executable} -m manipcli --version >&- 2>&-; echo $?"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"
+
+    script = f"set -o pipefail; {sys.executable} -m manipcli --version | true"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_full_disk_is_told_and_not_passed_over() -> None:
+    done = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m manipcli --version > /dev/full"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 3
+    assert "No space left" in done.stderr
+    assert "Traceback" not in done.stderr

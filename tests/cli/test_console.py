@@ -1,0 +1,63 @@
+"""What reaches a terminal: nothing that it would obey, colour only where it is wanted."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manipcli.cli import console
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@given(st.text())
+def test_escaped_text_holds_no_control_character(text: str) -> None:
+    for character in console.escape(text):
+        assert character in "\n\t" or (ord(character) >= 0x20 and not 0x7F <= ord(character) <= 0x9F)
+
+
+@given(st.text(st.characters(exclude_categories=["Cc", "Cf"])))
+def test_ordinary_text_is_left_alone(text: str) -> None:
+    assert console.escape(text) == text
+
+
+def test_a_title_in_a_file_cannot_recolour_the_terminal() -> None:
+    assert console.escape("\x1b[31mred\u202e") == "\\x1b[31mred\\u202e"
+
+
+@pytest.mark.parametrize(
+    ("environment", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)]
+)
+def test_colour_is_for_terminals_that_want_it(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], coloured: bool
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stdout", terminal)
+    console.result("✓ passed")
+    assert ("\x1b[" in terminal.getvalue()) is coloured
+    assert "passed" in terminal.getvalue()
+
+
+def test_a_file_gets_no_colour(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = io.StringIO()
+    monkeypatch.setattr("sys.stdout", plain)
+    console.result("✓ passed")
+    assert plain.getvalue() == "✓ passed\n"
+
+
+def test_what_the_encoding_lacks_is_written_as_its_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(raw, encoding="ascii"))
+    console.prepare()
+    console.result("✓ \udc80")
+    assert raw.getvalue() == b"\\u2713 \\udc80\n"

@@ -1,0 +1,51 @@
+"""The progress of a run: drawn at most ten times a second, and nothing is left on the line."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from manipcli.cli.progress import StepProgress
+from manipcli.judge.verdict import StepOutcome
+
+STEP = StepOutcome("lift_1", "lift", "done", 1.0, 2.0, 0.9)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_second_of_ticks_is_drawn_at_most_eleven_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("sys.stderr", terminal)
+    with StepProgress() as progress:
+        progress.step_started(STEP, 0, 4)
+        for k in range(1000):
+            progress.tick(8e-3 * k, 1e-3 * k)
+        drawings = terminal.getvalue().count("[1/4] lift_1")
+        progress.step_ended(STEP)
+    assert 9 <= drawings <= 11
+    assert "8.0 x real time" in terminal.getvalue()
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_an_interrupted_run_leaves_no_half_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("sys.stderr", terminal)
+    with pytest.raises(KeyboardInterrupt), StepProgress() as progress:
+        progress.step_started(STEP, 0, 4)
+        progress.tick(0.1, 0.1)
+        raise KeyboardInterrupt
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+def test_quiet_is_silent(capsys: pytest.CaptureFixture[str]) -> None:
+    with StepProgress(quiet=True, verbose=True) as progress:
+        progress.step_started(STEP, 0, 1)
+        progress.tick(0.1, 0.1)
+        progress.step_ended(STEP)
+    assert capsys.readouterr().err == ""

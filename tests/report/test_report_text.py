@@ -1,0 +1,95 @@
+"""The text of a verdict: the cause first, margins in units that people use, words beside every mark."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from manipcli.core.errors import Finding
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.report.quantity import quantity
+from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.table import table
+from manipcli.report.text import render_findings, render_run, render_verdict
+
+PASSED = Verdict(
+    task="pour",
+    verdict="passed",
+    seed=7,
+    engine="pybullet",
+    simulated_time=20.5,
+    steps=(StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9),),
+    expectations=(ExpectationOutcome("near", "passed", 0.0041, "m", 17.32),),
+)
+FAILED = replace(
+    PASSED,
+    verdict="failed",
+    steps=(*PASSED.steps, StepOutcome("lift_1", "lift", "failed", 6.1, 7.0, 2.0, "the hand lost the cup")),
+    expectations=(ExpectationOutcome("upright", "failed", -math.radians(12), "rad", 19.0),),
+)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0041, "m", "4.1 mm"),
+        (1.5, "m", "1.5 m"),
+        (math.radians(5), "rad", "5.0 deg"),
+        (0.00002, "m", "0.02 mm"),
+        (0.2345, "m", "234 mm"),
+        (12.0, "N", "12.0 N"),
+        (0.25, "s", "0.25 s"),
+        (3.0, "", "3.0"),
+        (math.inf, "m", "unlimited"),
+    ],
+)
+def test_quantities_are_in_customary_units(value: float, unit: str, text: str) -> None:
+    assert quantity(value, unit) == text
+
+
+def test_a_pass_says_how_much_there_was_to_spare() -> None:
+    text = render_verdict(PASSED, "runs/pour.mcap")
+    assert "passes with 4.1 mm to spare (closest at 17.32 s)" in text
+    assert "✓ pour passed: 1 of 1 step done, 1 of 1 expectation met" in text
+    assert text.endswith("log: runs/pour.mcap")
+
+
+def test_a_failure_begins_with_its_first_cause() -> None:
+    lines = render_verdict(FAILED, "x.mcap").splitlines()
+    assert lines[0] == "✗ step 'lift_1' failed: the hand lost the cup"
+    assert lines[1] == "✗ expectation 'upright' fails by 12.0 deg (worst at 19.00 s)"
+
+
+def test_an_expectation_that_was_never_evaluated_says_why() -> None:
+    outcome = ExpectationOutcome("inside", "not_evaluated", None, "m", None, "the kinematic engine moves no ball")
+    text = render_verdict(replace(PASSED, verdict="failed", expectations=(outcome,)), "x")
+    assert "was never evaluated: the kinematic engine moves no ball" in text.splitlines()[0]
+
+
+def test_a_task_without_expectations_says_so() -> None:
+    assert "nothing expected beyond that" in render_verdict(replace(PASSED, expectations=()), "x")
+
+
+def test_a_run_says_how_fast_it_was() -> None:
+    report = RunReport(PASSED, 3.0, 8.25, "x.mcap", Timing(0.1, 0.2, 2.5, 0.2))
+    assert "20.50 s simulated, 3.00 s real (8.2 x real time" in render_run(report)
+    assert "plan 0.20 s" in render_run(report, verbose=True)
+
+
+def test_findings_are_counted() -> None:
+    findings = [Finding("A1", "x"), Finding("A2", "y", severity="warning", hint="z")]
+    assert render_findings(findings, ["a", "b"]).splitlines() == [
+        "error[A1]: x",
+        "warning[A2]: y",
+        "  hint: z",
+        "✗ failed: 2 files checked, 1 error, 1 warning",
+    ]
+    assert render_findings([], ["a"]) == "✓ passed: 1 file checked, 0 errors"
+
+
+def test_columns_line_up_also_for_wide_characters_and_nothing_is_cut() -> None:
+    long = "x" * 300
+    lines = table(("a", "b"), [("茶碗", long), ("cup", "[bold]y[/bold]")], right=()).splitlines()
+    assert lines == ["a     b", f"茶碗  {long}", "cup   [bold]y[/bold]"]
