@@ -315,10 +315,12 @@ class Draft:
 
     def _grip(self, targets: dict[str, float], *, force: float | None = None, must_hold: bool = False) -> Grip | None:
         """A goal for the joints that a gripper controller moves, or None where there is none."""
-        joints = tuple(name for name in self._planner.gripper_joints if name in targets)
-        if not joints:
+        joints = self._planner.gripper_joints
+        if not any(name in targets for name in joints):
             return None
-        return Grip(joints=joints, target=frozen([targets[j] for j in joints]), force=force, must_hold=must_hold)
+        here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
+        target = frozen([targets.get(name, here[name]) for name in joints])
+        return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
 
     def _grip_time(self, grip: Grip) -> float:
         """How long the references take to the target [s]."""

@@ -1,7 +1,7 @@
 """The contract of engines: a world that can be read, commanded and stepped.
 
-A constructed engine is usable: the robot stands at its start position, the bodies at theirs, time is 0. One engine
-object owns one world; two in one process do not meet.
+A constructed engine is usable: the robot stands at its start position, the bodies at theirs. One engine object owns one
+world; two in one process do not meet. Engines know no time: the session counts ticks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Engine(Protocol):
     """Joint vectors follow `RobotModel.moving_joints`, body arrays `Scene.movable`."""
 
     def read(self) -> WorldState:
-        """The true state now. Its arrays are the engine's own, overwritten by the next read: copy to keep."""
+        """The true state now; `time` is the session's to fill. The arrays are overwritten by the next read."""
         ...
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:

@@ -11,12 +11,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from manipcli.model.build_scene import pose_transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import Draft, Planner
-from manipcli.model.build_scene import pose_transform
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue

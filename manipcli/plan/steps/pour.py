@@ -5,8 +5,10 @@
       timeout: 15 s
 
 Said by the objects' geometry: the lip (lowest point of the rim, when tilted) stands over the middle of the container.
-With h the height of the rim above O, r its radius, a the axis and w = a x z the horizontal direction in which the
-cup tips, a turn by theta about a puts the lip at p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z.
+With h the height of the rim above O, r its radius, a the axis and w = a x z the horizontal direction in which the cup
+tips, a turn by theta about a puts the lip at
+
+    p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z.
 """
 
 from __future__ import annotations

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.model.condition import Problem
 from manipcli.plan.planner import Draft, Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model

@@ -21,8 +21,6 @@ class KinematicEngine:
             for k, joint in enumerate(robot.moving_joints)
             if joint.mimic is not None
         ]
-        self._period = settings.step * settings.substeps
-        self._tick = 0
         self._state = WorldState(
             time=np.zeros(()),
             position=np.array(settings.start),
@@ -45,8 +43,7 @@ class KinematicEngine:
             self._state.velocity[follower] = multiplier * velocity[driver]
 
     def advance(self) -> None:
-        self._tick += 1
-        self._state.time[...] = self._tick * self._period
+        """Nothing moves by itself."""
 
     def robot_contacts(self) -> tuple[Contact, ...]:
         return ()

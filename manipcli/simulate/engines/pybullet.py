@@ -72,9 +72,7 @@ class PybulletEngine:
             body_linear=np.zeros((m, 3)),
             body_angular=np.zeros((m, 3)),
         )
-        self._tick = 0
         self._substeps = settings.substeps
-        self._period = settings.step * settings.substeps
 
     def _add_body(self, body: Body) -> int:
         p, client = self._p, self._client
@@ -261,8 +259,6 @@ class PybulletEngine:
     def advance(self) -> None:
         for _ in range(self._substeps):
             self._p.stepSimulation(self._client)
-        self._tick += 1
-        self._state.time[...] = self._tick * self._period
 
     def robot_contacts(self) -> tuple[Contact, ...]:
         return self._merged(self._p.getContactPoints(bodyA=self._robot, physicsClientId=self._client))

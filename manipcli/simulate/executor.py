@@ -1,0 +1,136 @@
+"""Turns motions into controller goals and steps the session until they are done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from manipcli.control.action import GoalHandle
+from manipcli.control.gripper import GripperController, GripperGoal
+from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.core.errors import InvalidArgument
+from manipcli.model.robot import RobotModel
+from manipcli.model.state import WorldState
+from manipcli.plan.step import Grip, Motion
+from manipcli.simulate.session import Session
+
+Until = Callable[[WorldState], bool]
+"""Whether the condition that a step waits for holds in a state."""
+
+UNTIL_TICKS: Final = 10
+"""Control ticks between two looks at an `until`."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionEnd:
+    """How a motion or a wait ended."""
+
+    outcome: Literal["done", "failed", "timeout"]
+    text: str = ""
+
+
+DONE: Final = MotionEnd("done")
+
+
+class Executor:
+    """Carries motions out, one after the other."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
+        """Send the motion's goals and tick until all are reached and its duration is over.
+
+        Args:
+            motion: what to do.
+            until: waited for in addition, where the motion awaits it.
+            deadline: simulated time [s] at which the step's time is over.
+        """
+        session = self._session
+        handles = self._send(motion)
+        last_tick = session.ticks + round(motion.duration / session.period)
+        awaited = until if motion.awaits else None
+        while True:
+            state = session.tick()
+            for handle in handles:
+                if handle.result is not None and handle.result.status != "succeeded":
+                    return MotionEnd("failed", handle.result.text)
+            busy = session.ticks < last_tick or any(handle.active for handle in handles)
+            if not busy and awaited is not None and session.ticks % UNTIL_TICKS == 0 and awaited(state):
+                awaited = None
+            if not busy and awaited is None:
+                return _held(motion, handles)
+            if deadline is not None and session.time >= deadline:
+                self._cancel(handles)
+                return MotionEnd("timeout", _late(motion, handles))
+
+    def wait(self, until: Until, *, deadline: float) -> MotionEnd:
+        """Hold still until the condition holds."""
+        while self._session.time < deadline:
+            state = self._session.tick()
+            if self._session.ticks % UNTIL_TICKS == 0 and until(state):
+                return DONE
+        return MotionEnd("timeout", "the condition under `until` did not come to hold")
+
+    def hold(self, duration: float) -> None:
+        """Command nothing new for `duration` [s]."""
+        for _ in range(round(duration / self._session.period)):
+            self._session.tick()
+
+    def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
+        handles = []
+        manager = self._session.manager
+        if motion.trajectory is not None:
+            follower = manager.serving(motion.trajectory.names)
+            if not isinstance(follower, JointTrajectoryController):
+                raise InvalidArgument("CTRL150", f"controller '{follower.name}' does not follow trajectories")
+            handles.append(follower.send_goal(motion.trajectory))
+        if motion.grip is not None:
+            gripper = manager.serving(motion.grip.joints)
+            if not isinstance(gripper, GripperController):
+                raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
+            handles.append(gripper.send_goal(_gripper_goal(self._session.robot, gripper, motion.grip)))
+        return tuple(handles)
+
+    def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
+        for handle in handles:
+            handle.cancel()
+
+
+def _held(motion: Motion, handles: tuple[GoalHandle, ...]) -> MotionEnd:
+    """Done; unless the hand was to hold something and no finger met anything."""
+    text = "; ".join(handle.result.text for handle in handles if handle.result is not None and handle.result.fingers)
+    if motion.grip is not None and motion.grip.must_hold:
+        stops = [stop for handle in handles if handle.result is not None for stop in handle.result.fingers]
+        if "contact" not in stops and "stalled" not in stops:
+            return MotionEnd("failed", f"the hand closed on nothing: {text}")
+    return MotionEnd("done", text)
+
+
+def _late(motion: Motion, handles: tuple[GoalHandle, ...]) -> str:
+    if any(handle.active for handle in handles):
+        return f"the step's timeout came during '{motion.label}'"
+    return f"the step's timeout came at '{motion.label}': the condition under `until` did not come to hold"
+
+
+def _gripper_goal(robot: RobotModel, gripper: GripperController, grip: Grip) -> GripperGoal:
+    return GripperGoal(
+        target=grip.target[[grip.joints.index(name) for name in gripper.joints]],
+        force=grip.force,
+        fingers=fingers(robot, gripper.joints),
+    )
+
+
+def fingers(robot: RobotModel, joints: tuple[str, ...]) -> tuple[tuple[int, ...], ...]:
+    """The joints of a hand by finger: a joint below another one of the hand is of the same finger."""
+    found: list[list[int]] = []
+    for k, name in enumerate(joints):
+        child = robot.joint(name).child
+        for finger in found:
+            if any(child in robot.descendants(robot.joint(joints[j]).child) for j in finger):
+                finger.append(k)
+                break
+        else:
+            found.append([k])
+    return tuple(tuple(finger) for finger in found)

@@ -1,0 +1,192 @@
+"""The stepping: one control tick at a time, in one order and no other.
+
+read engine -> controllers -> joint limits -> write -> observe -> physics. Whoever wants to see a tick (the recorder,
+the progress line) is an observer; nothing else happens in the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from manipcli.control.controller import ControllerOutput
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import SimulationFailed
+from manipcli.core.geometry import Array
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact, WorldState
+from manipcli.simulate.engine import Engine
+
+SLOW: Final = 10
+"""Control ticks between two looks at all contacts and at the plausibility of the state."""
+RUNAWAY_FACTOR: Final = 3.0
+"""A joint this many times faster than its velocity limit has left its controller."""
+RUNAWAY_SPEED: Final = 90.0
+"""The same for a joint without a limit [rad/s or m/s]; Bullet clamps joints at 100."""
+BODY_SPEED: Final = 50.0
+"""No body of a manipulation task is as fast as this [m/s]."""
+FALLEN: Final = -10.0
+"""A body below this height [m] falls for ever."""
+
+
+class Observer(Protocol):
+    """Sees every tick before the physics moves on. The arrays are only valid during the call."""
+
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+        """The state at the start of control tick `tick`, and what the controllers answered."""
+        ...
+
+    def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
+        """Everything that touches."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Silent:
+    """Observes nothing: for the time before the start."""
+
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None: ...
+
+    def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None: ...
+
+
+class Session:
+    """Owns the clock of a run: control tick k begins at k * period."""
+
+    def __init__(
+        self,
+        *,
+        robot: RobotModel,
+        scene: Scene,
+        engine: Engine,
+        manager: ControllerManager,
+        kinematics: Kinematics,
+        period: float,
+    ) -> None:
+        self.robot = robot
+        self.scene = scene
+        self.engine = engine
+        self.manager = manager
+        self.period = period
+        self.observer: Observer = Silent()
+        self.ticks = 0
+        self.state = engine.read()
+        self._limiter = manager.limiter([joint.limits for joint in robot.moving_joints])
+        self._kinematics = kinematics
+        self._feed_forward = "gravity" if "gravity" in manager.feed_forward else None
+        if "inverse_dynamics" in manager.feed_forward:
+            self._feed_forward = "inverse_dynamics"
+        n = len(robot.joint_names)
+        self._position, self._velocity, self._acceleration = np.zeros((3, n))
+        self._addition = np.zeros(n)
+        self._gravity_only = np.array([want == "gravity" for want in manager.feed_forward])
+        self._contact_force = np.zeros(n)
+        self._joint_of_part = _joint_of_part(robot)
+        limits = [joint.limits.velocity for joint in robot.moving_joints]
+        self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
+        self._robot_touched: tuple[Contact, ...] = ()
+        self._others: tuple[Contact, ...] = ()
+        self._indices = [manager.index(controller.name) for controller in manager.controllers]
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.ticks * self.period
+
+    @property
+    def saturations(self) -> Array:
+        """(n) in how many ticks each joint's command was cut."""
+        return self._limiter.saturations.astype(np.float64)
+
+    def restart_clock(self, observer: Observer) -> None:
+        """The next tick is number 0, and the first that `observer` sees; the world stays as it is."""
+        self.ticks = 0
+        self.observer = observer
+        self._limiter.reset()
+
+    def tick(self) -> WorldState:
+        """One control period.
+
+        Raises:
+            SimulationFailed: the state is not finite, a joint runs away, a body flies or falls for ever.
+        """
+        state = self.state = self.engine.read()
+        time = self.ticks * self.period
+        state.time[...] = time
+        self._touch(state)
+        command = self.manager.update(time, state, self._wanted(state), self._contact_force)
+        outputs = self.manager.outputs
+        for index, output in zip(self._indices, outputs, strict=True):
+            self._position[index] = output.position
+            self._velocity[index] = output.velocity
+            self._acceleration[index] = output.acceleration
+        command = self._limiter.apply(command, state.position, state.velocity, self.period)
+        self.engine.write(command, self._position, self._velocity)
+        self.observer.tick(self.ticks, state, outputs)
+        self.engine.advance()
+        self.ticks += 1
+        return state
+
+    def _wanted(self, state: WorldState) -> Array | None:
+        """Feed-forward efforts (n): gravity at the measured position, or inverse dynamics along the reference."""
+        if self._feed_forward is None:
+            return None
+        gravity = self._kinematics.gravity(state.position)
+        if self._feed_forward == "gravity":
+            return gravity
+        dynamics = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+        return np.where(self._gravity_only, gravity, dynamics)
+
+    def _touch(self, state: WorldState) -> None:
+        """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""
+        touched = self.engine.robot_contacts()
+        slow = self.ticks % SLOW == 0
+        if touched or self._robot_touched:
+            self._contact_force[:] = 0.0
+            for contact in touched:
+                a, b = self._joint_of_part.get(contact.a), self._joint_of_part.get(contact.b)
+                if (a is None) != (b is None):
+                    self._contact_force[a if a is not None else b] += contact.force
+        if slow:
+            self._refuse_runaway(state)
+            everything = self.engine.contacts()
+            self._others = tuple(c for c in everything if not _of_robot(c))
+        if slow or touched or self._robot_touched:
+            self.observer.contacts(self.ticks, touched + self._others)
+        self._robot_touched = touched
+
+    def _refuse_runaway(self, state: WorldState) -> None:
+        speeds = np.abs(state.velocity)
+        if not (speeds < self._runaway).all():
+            k = int(np.argmax(np.where(np.isfinite(speeds), speeds / self._runaway, np.inf)))
+            raise SimulationFailed(
+                f"joint '{self.robot.joint_names[k]}' runs away at {state.velocity[k]:.3g} per second; "
+                "its controller may be unstable (gains too high for the control period)",
+                time=self.time,
+            )
+        for k, body in enumerate(self.scene.movable):
+            speed = float(np.linalg.norm(state.body_linear[k]))
+            if not speed < BODY_SPEED:
+                raise SimulationFailed(f"'{body.name}' flies off at {speed:.3g} m/s", time=self.time)
+            if not state.body_position[k, 2] > FALLEN:
+                raise SimulationFailed(f"'{body.name}' has fallen out of the scene", time=self.time)
+
+
+def _of_robot(contact: Contact) -> bool:
+    return contact.a.startswith("robot/") or contact.b.startswith("robot/")
+
+
+def _joint_of_part(robot: RobotModel) -> dict[str, int]:
+    """For every part `robot/<link>`: the joint vector index of the joint that moves it last; base parts are absent."""
+    index: dict[str, int] = {}
+    for joint in robot.joints:
+        if joint.moves:
+            index[joint.child] = robot.joint_names.index(joint.name)
+        elif joint.parent in index:
+            index[joint.child] = index[joint.parent]
+    return {f"robot/{link}": k for link, k in index.items()}
