@@ -23,14 +23,17 @@ class ExitCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in a file the user wrote something. Lines and columns count from 1."""
+    """Where in a file the user wrote something. Lines and columns count from 1.
+
+    Line 0: not in a file but in an argument, which `file` quotes (`--set scene.cup.mass=80`).
+    """
 
     file: str
     line: int
     column: int
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}"
+        return f"{self.file}:{self.line}:{self.column}" if self.line > 0 else self.file
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,58 @@
-"""The base of everything that users write: frozen, unknown keys forbidden, no NaN or infinity."""
+"""The base of everything that users write: frozen, unknown keys forbidden, nothing converted that was not meant."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError
+
+Mistake = Literal["name", "range", "type", "count", "unit", "conflict", "verb", "duplicate"]
+"""Kinds of mistakes that validators tell with `problem`; the codes stand in `spec/explain.py`."""
+
+_STRICT = frozenset({"float", "int", "bool", "str"})
+_NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function", "expected"})
 
 
 class Model(BaseModel):
-    """A block of a user's file."""
+    """A block of a user's file.
+
+    Its numbers, truth values and texts are strict: pydantic alone would read `true` as 1.0 and `"1.0"` as a number.
+    A whole number is still a float where one is wanted, and a list is a tuple.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: type[BaseModel], handler: GetCoreSchemaHandler, /) -> CoreSchema:
+        schema = handler(source)
+        _make_strict(schema)
+        return schema
+
+
+def _make_strict(schema: object) -> None:
+    if isinstance(schema, dict):
+        if schema.get("type") in _STRICT:
+            schema["strict"] = True
+        for key, value in schema.items():
+            if key not in _NO_SCHEMA:
+                _make_strict(value)
+    elif isinstance(schema, list | tuple):
+        for value in schema:
+            _make_strict(value)
+
+
+def problem(
+    mistake: Mistake, message: str, *, at: tuple[str | int, ...] = (), hint: str | None = None, key: bool = False
+) -> PydanticCustomError:
+    """What a validator raises when a block cannot be meant.
+
+    Args:
+        mistake: the kind, which decides the code.
+        message: one sentence: what is wrong, what was expected.
+        at: where inside the validated block.
+        hint: what to do; the nearest name.
+        key: point at the key that `at` names, not at its value.
+    """
+    context = {"message": message, "at": at, "hint": hint or "", "key": key}
+    return PydanticCustomError(mistake, "{message}", context)

@@ -1,16 +1,77 @@
-"""Numbers with units, converted to SI once: a bare number is SI, a text is a number and a unit (`"45 deg"`)."""
-# CONTRACT STUB (spec owner implements): Annotated[float, BeforeValidator(...), json schema] types.
+"""Numbers with units, converted to SI once: a bare number is SI, a text is a number and a unit (`"45 deg"`).
+
+A truth value, NaN and infinity are refused; so is a text without a unit, which could be meant either way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
 from typing import Annotated
 
-Length = Annotated[float, "m"]
-Angle = Annotated[float, "rad"]
-Mass = Annotated[float, "kg"]
-Time = Annotated[float, "s"]
-Force = Annotated[float, "N"]
-Speed = Annotated[float, "m/s"]
-JointValue = Annotated[float, "rad or m"]  # revolute and prismatic alike: accepts angle or length text
-JointVelocity = Annotated[float, "rad/s or m/s"]
-JointAcceleration = Annotated[float, "rad/s2 or m/s2"]
-JointJerk = Annotated[float, "rad/s3 or m/s3"]
-JointEffort = Annotated[float, "N m or N"]
-Frequency = Annotated[float, "Hz"]
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from manipcli.core import units
+from manipcli.core.units import NUMBER_PATTERN, Dimension, UnitError, fitting_units, names_of, to_si
+from manipcli.spec.base import problem
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Metadata of an annotated float: the dimensions that a text may have."""
+
+    dimensions: tuple[Dimension, ...]
+
+    @property
+    def name(self) -> str:
+        """`an angle or a length`."""
+        return names_of(self.dimensions)
+
+    @property
+    def expected(self) -> str:
+        """What to write, for messages."""
+        symbols = " or ".join(dimension.symbol or "1" for dimension in self.dimensions)
+        last = fitting_units(self.dimensions[0])[1 if len(fitting_units(self.dimensions[0])) > 1 else 0]
+        example = f"5 {last}" if self.dimensions[0].symbol else last
+        return f"{self.name}: a number in {symbols}, or a text such as '{example}'"
+
+    def read(self, value: object) -> object:
+        """The SI value of a text; anything but a text, a number or truth value passes on to pydantic."""
+        if isinstance(value, str):
+            try:
+                return to_si(value, *self.dimensions)
+            except UnitError as error:
+                raise problem("unit", error.cause, hint=error.hint) from None
+        if value is None or isinstance(value, bool | list | tuple | dict):
+            raise PydanticCustomError("quantity_type", "{expected}", {"expected": self.expected})
+        return value
+
+    def __get_pydantic_core_schema__(self, source: type[float], handler: GetCoreSchemaHandler, /) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        json_schema = handler(schema)
+        json_schema["type"] = ["number", "string"]
+        json_schema["pattern"] = rf"^\s*[-+]?\s*{NUMBER_PATTERN}\s*[A-Za-z°µ%]|\$"
+        json_schema["description"] = self.expected
+        return json_schema
+
+
+Length = Annotated[float, Unit((units.LENGTH,))]
+Angle = Annotated[float, Unit((units.ANGLE,))]
+Mass = Annotated[float, Unit((units.MASS,))]
+Time = Annotated[float, Unit((units.TIME,))]
+Force = Annotated[float, Unit((units.FORCE,))]
+Torque = Annotated[float, Unit((units.TORQUE,))]
+Speed = Annotated[float, Unit((units.SPEED,))]
+Acceleration = Annotated[float, Unit((units.ACCELERATION,))]
+AngularVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY,))]
+Frequency = Annotated[float, Unit((units.FREQUENCY,))]
+Ratio = Annotated[float, Unit((units.NUMBER,))]
+JointValue = Annotated[float, Unit((units.ANGLE, units.LENGTH))]
+"""Position of a joint, revolute or prismatic."""
+JointVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY, units.SPEED))]
+JointAcceleration = Annotated[float, Unit((units.ANGULAR_ACCELERATION, units.ACCELERATION))]
+JointJerk = Annotated[float, Unit((units.ANGULAR_JERK, units.JERK))]
+JointEffort = Annotated[float, Unit((units.TORQUE, units.FORCE))]

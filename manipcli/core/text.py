@@ -1,0 +1,78 @@
+"""Text for people: the nearest known name, lists of names, and text that cannot harm a terminal."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
+_SHORT = {"\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+def nearest(name: str, known: Iterable[str], *, most: int = 1) -> tuple[str, ...]:
+    """Up to `most` of the `known` names that look like `name`, the nearest first; empty when none does.
+
+    Upper and lower case count as equal at first, so that `Home` finds `home`; names of one or two letters match
+    only by case or as a prefix.
+    """
+    names = list(dict.fromkeys(known))
+    folded: dict[str, list[str]] = {}
+    for candidate in names:
+        folded.setdefault(candidate.casefold(), []).append(candidate)
+    found: list[str] = []
+    wanted = name.casefold()
+    for close in difflib.get_close_matches(wanted, list(folded), n=most, cutoff=0.6):
+        found.extend(folded[close])
+    if len(found) < most and len(wanted) >= 2:
+        found.extend(c for c in names if c not in found and _begins(c.casefold(), wanted))
+    return tuple(found[:most])
+
+
+def _begins(one: str, other: str) -> bool:
+    return bool(one) and (one.startswith(other) or (len(one) >= 2 and other.startswith(one)))
+
+
+def did_you_mean(name: str, known: Iterable[str], *, kind: str = "known", most: int = 1) -> str | None:
+    """The hint for an unknown name: the nearest of `known`, else the known names themselves; None when there are none.
+
+    Args:
+        name: what was given.
+        known: what would have been right.
+        kind: what the names are, in the plural ("verbs", "joints"); begins the list of them.
+        most: how many near names to offer.
+    """
+    names = list(dict.fromkeys(known))
+    close = nearest(name, names, most=most)
+    if close:
+        return f"did you mean {any_of(close)}?"
+    return f"{kind}: {listed(names)}" if names else None
+
+
+def any_of(names: Iterable[str]) -> str:
+    """`'a', 'b' or 'c'`."""
+    quoted = [f"'{escape(name)}'" for name in names]
+    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} or {quoted[-1]}"
+
+
+def listed(names: Iterable[str], *, most: int = 12) -> str:
+    """`a, b, c` and, beyond `most`, how many more there are."""
+    every = [escape(name) for name in names]
+    rest = len(every) - most
+    return ", ".join(every[:most]) + (f", and {rest} more" if rest > 0 else "")
+
+
+def escape(text: str) -> str:
+    r"""`text` on one line, with control characters, direction marks and lone surrogates written as `\x1b`, `\u202e`."""
+    return _CONTROL.sub(lambda match: _escaped(match.group()), text)
+
+
+def _escaped(character: str) -> str:
+    code = ord(character)
+    return _SHORT.get(character) or (f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}")
+
+
+def shorten(text: str, *, width: int = 60) -> str:
+    """`text`, escaped, and cut in the middle of nowhere with `...` when longer than `width`."""
+    line = escape(text)
+    return line if len(line) <= width else line[: width - 3] + "..."

@@ -1,0 +1,287 @@
+"""Pydantic's complaints, told to the writer of the file: place, what was given, what was expected, the nearest name.
+
+Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not change:
+
+| number | mistake |
+|---|---|
+| 200 | the file is empty, or no mapping at its top |
+| 201 | an unknown key |
+| 202 | a key is missing |
+| 203 | an unknown name, verb, condition or parameter |
+| 204 | out of range |
+| 205 | a value of the wrong type |
+| 206 | too many or too few items |
+| 207 | a quantity without a unit, or with the wrong one |
+| 208 | keys or values that contradict each other |
+| 209 | a step without a verb or with several; a condition likewise |
+| 210 | the same name, id or joint twice |
+| 211 | an expression (`2 * $tilt + 5 deg`) that cannot be computed |
+| 212 | an override (`--set a.b=value`) that fits nowhere |
+| 213 | the file needs a newer manipcli |
+| 214 | a parameter that ROS knows and manipcli does not serve (warning) |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import any_of, did_you_mean, listed, nearest
+from manipcli.spec import shape
+from manipcli.spec.tree import MappingNode, Node, Path, ScalarNode, SequenceNode, child, dotted, key_place_at, node_at, shown
+
+_MISTAKES = {
+    "name": 203, "range": 204, "type": 205, "count": 206, "unit": 207, "conflict": 208, "verb": 209, "duplicate": 210,
+    "missing": 202, "extra_forbidden": 201, "literal_error": 203, "value_error": 208, "assertion_error": 208,
+    "quantity_type": 205, "too_short": 206, "too_long": 206, "string_too_short": 206, "string_too_long": 206,
+    "greater_than": 204, "greater_than_equal": 204, "less_than": 204, "less_than_equal": 204, "multiple_of": 204,
+    "finite_number": 204, "string_pattern_mismatch": 208, "union_tag_invalid": 203, "union_tag_not_found": 202,
+}  # fmt: skip
+_EXPECTED = {
+    "float_type": "a number", "int_type": "a whole number", "bool_type": "true or false", "string_type": "a text",
+    "tuple_type": "a list", "list_type": "a list", "dict_type": "a mapping", "model_type": "a mapping",
+    "model_attributes_type": "a mapping", "mapping_type": "a mapping", "set_type": "a list", "frozen_set_type": "a list",
+    "none_required": "nothing", "int_from_float": "a whole number",
+}  # fmt: skip
+_WORDS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Complaint:
+    """One of pydantic's errors on the tree: `path` leads to it, `tags` say at which depth a union took which branch."""
+
+    error: ErrorDetails
+    path: Path
+    tags: tuple[tuple[int, str], ...]
+    used: int = 0
+
+    @property
+    def open_tag(self) -> tuple[int, str] | None:
+        """The outermost branch that is not decided yet."""
+        return self.tags[self.used] if self.used < len(self.tags) else None
+
+    def mismatch(self, depth: int) -> bool:
+        """Whether the branch at `depth` was wrong as a whole, so that it was not meant."""
+        return len(self.path) == depth and (self.error["type"] in _EXPECTED or self.error["type"] in _WHOLE)
+
+
+_WHOLE = frozenset({"literal_error", "quantity_type", "unit", "string_pattern_mismatch"})
+
+
+def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Finding, ...]:
+    """Every complaint as a finding, in the order of the file."""
+    complaints = [_locate(details, root) for details in error.errors(include_url=False)]
+    findings: list[Finding] = []
+    for complaint in _decide(_counted(complaints), root):
+        findings.append(_finding(complaint[0], complaint, root, model, area))
+    unique = dict.fromkeys(findings)
+    return tuple(sorted(unique, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0)))
+
+
+def _locate(error: ErrorDetails, root: Node) -> _Complaint:
+    """Walk the location down the tree; what is not on it is pydantic's name of a union's branch."""
+    path: Path = ()
+    tags: list[tuple[int, str]] = []
+    loc = error["loc"]
+    node: Node | None = root
+    for index, part in enumerate(loc):
+        below = child(node, part) if node is not None else None
+        last = index == len(loc) - 1
+        if below is not None:
+            path, node = (*path, part), below
+        elif last and error["type"] in ("missing", "extra_forbidden"):
+            path = (*path, part)
+        elif part != "[key]":
+            tags.append((len(path), str(part)))
+    context = error.get("ctx", {})
+    return _Complaint(error, (*path, *context.get("at", ())), tuple(tags))
+
+
+def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
+    """Missing items of a list of fixed length are one complaint: its length."""
+    result: list[_Complaint] = []
+    longest: dict[tuple[Path, tuple[tuple[int, str], ...]], int] = {}
+    for complaint in complaints:
+        last = complaint.path[-1] if complaint.path else None
+        if complaint.error["type"] == "missing" and isinstance(last, int):
+            key = (complaint.path[:-1], complaint.tags)
+            if key not in longest:
+                result.append(replace(complaint, path=complaint.path[:-1]))
+            longest[key] = last + 1
+        else:
+            result.append(complaint)
+    for index, complaint in enumerate(result):
+        wanted = longest.get((complaint.path, complaint.tags))
+        if wanted is not None and complaint.error["type"] == "missing":
+            details = complaint.error.copy()
+            details["type"], details["ctx"] = "too_short", {"min_length": wanted, "exact": True}
+            result[index] = replace(complaint, error=details)
+    return result
+
+
+def _decide(complaints: Sequence[_Complaint], root: Node) -> list[list[_Complaint]]:
+    """For each union, keep the branch that was meant; branches that are all of the wrong type become one complaint."""
+    decided: list[list[_Complaint]] = []
+    unions: dict[tuple[int, Path], list[_Complaint]] = {}
+    for complaint in complaints:
+        tag = complaint.open_tag
+        if tag is None:
+            decided.append([complaint])
+        else:
+            unions.setdefault((tag[0], complaint.path[: tag[0]]), []).append(complaint)
+    for (depth, _), group in unions.items():
+        branches: dict[str, list[_Complaint]] = {}
+        for complaint in group:
+            tag = complaint.open_tag
+            if tag is not None:
+                branches.setdefault(tag[1], []).append(replace(complaint, used=complaint.used + 1))
+        meant = [branch for branch in branches.values() if not all(c.mismatch(depth) for c in branch)]
+        if meant:
+            decided.extend(_decide(min(meant, key=_badness), root))
+        elif len(branches) == 1:
+            decided.extend(_decide(next(iter(branches.values())), root))
+        else:
+            decided.append([complaint for branch in branches.values() for complaint in branch])
+    return decided
+
+
+def _badness(branch: Sequence[_Complaint]) -> tuple[int, int]:
+    strange = sum(1 for c in branch if c.error["type"] in ("extra_forbidden", "missing"))
+    return strange, len(branch)
+
+
+def _finding(
+    first: _Complaint, branches: Sequence[_Complaint], root: Node, model: type[BaseModel], area: str
+) -> Finding:
+    kind, path = first.error["type"], first.path
+    node = node_at(root, path)
+    what, hint = _told(first, branches, root, model)
+    at_key = kind == "extra_forbidden" or bool(first.error.get("ctx", {}).get("key", False))
+    place = key_place_at(root, path) if at_key else node.place
+    where = dotted(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path)
+    code = f"{area}{_MISTAKES.get(kind, 205)}"
+    return Finding(code, f"{where}: {what}" if where else what, place, hint=hint)
+
+
+def _told(
+    first: _Complaint, branches: Sequence[_Complaint], root: Node, model: type[BaseModel]
+) -> tuple[str, str | None]:
+    """What to say, and the hint."""
+    kind, path, context = first.error["type"], first.path, first.error.get("ctx", {})
+    node = node_at(root, path)
+    if len(branches) > 1:
+        return _none_fits(branches, node)
+    if kind == "extra_forbidden":
+        return _unknown_key(path, dict(first.tags), model)
+    if kind == "missing":
+        field = shape.keys_of(shape.at(model, path[:-1], dict(first.tags))).get(str(path[-1]))
+        described = field.description if field is not None else None
+        return f"the key '{path[-1]}' is missing", described and f"{path[-1]}: {described}"
+    if "message" in context:
+        return str(context["message"]), str(context.get("hint", "")) or None
+    if kind == "literal_error":
+        return _unknown_word(str(context.get("expected", "")), node)
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        return _unknown_type(context, node)
+    if kind in ("too_short", "too_long"):
+        return _wrong_count(context, node), None
+    if kind in _RANGES:
+        return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", None
+    if kind == "string_pattern_mismatch":
+        return f"{shown(node)} does not look like {context.get('pattern')}", None
+    if kind in ("value_error", "assertion_error"):
+        return str(context.get("error", first.error["msg"])), None
+    expected = _expected(first)
+    return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], _type_hint(kind, node)
+
+
+_RANGES = {
+    "greater_than": "more than", "greater_than_equal": "at least", "less_than": "less than",
+    "less_than_equal": "at most", "multiple_of": "a multiple of",
+}  # fmt: skip
+
+
+def _limit(context: dict[str, object]) -> str:
+    value = next((context[key] for key in ("gt", "ge", "lt", "le", "multiple_of") if key in context), "")
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
+
+
+def _expected(complaint: _Complaint) -> str:
+    error = complaint.error
+    context = error.get("ctx", {})
+    if error["type"] == "literal_error":
+        return f"one of {context.get('expected', '')}"
+    if error["type"] == "unit":
+        return str(context.get("message", "")).partition("expected ")[2] or "a quantity"
+    return str(context.get("expected") or _EXPECTED.get(error["type"], ""))
+
+
+def _none_fits(branches: Sequence[_Complaint], node: Node) -> tuple[str, str | None]:
+    wanted = list(dict.fromkeys(expected for expected in map(_expected, branches) if expected))
+    one = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
+    hints = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
+    return f"expected {one}, not {shown(node)}", next((hint for hint in hints if hint), None)
+
+
+def _unknown_key(path: Path, tags: dict[int, str], model: type[BaseModel]) -> tuple[str, str | None]:
+    known = shape.keys_of(shape.at(model, path[:-1], tags))
+    close = nearest(str(path[-1]), known)
+    hint = did_you_mean(str(path[-1]), known, kind="known keys")
+    if close and known[close[0]].description:
+        hint = f"{hint} {known[close[0]].description}"
+    return f"unknown key '{dotted((path[-1],))}'", hint
+
+
+def _unknown_word(expected: str, node: Node) -> tuple[str, str | None]:
+    words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
+    value = node.value if isinstance(node, ScalarNode) else None
+    close = nearest(value, words) if isinstance(value, str) else ()
+    one = f"one of {expected}" if len(words) > 1 else expected
+    return f"expected {one}, not {shown(node)}", f"did you mean {any_of(close)}?" if close else None
+
+
+def _unknown_type(context: dict[str, object], node: Node) -> tuple[str, str | None]:
+    key = str(context.get("discriminator", "")).strip("'")
+    if "expected_tags" not in context:
+        return f"the key '{key}' is missing: it says which kind this is", None
+    tags = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
+    given = str(context.get("tag", ""))
+    hint = did_you_mean(given, tags, kind="known")
+    return f"unknown {key} '{dotted((given,))}', expected one of {listed(tags)}", hint
+
+
+def _wrong_count(context: dict[str, object], node: Node) -> str:
+    given = len(node.items) if isinstance(node, SequenceNode) else len(node.entries) if isinstance(node, MappingNode) else 0
+    if "min_length" in context:
+        exactly = "" if context.get("exact") else "at least "
+        return f"expected {exactly}{_items(context['min_length'])}, got {given}"
+    return f"expected at most {_items(context.get('max_length'))}, got {given}"
+
+
+def _items(number: object) -> str:
+    return "1 item" if number == 1 else f"{number} items"
+
+
+def _type_hint(kind: str, node: Node) -> str | None:
+    value = node.value if isinstance(node, ScalarNode) else None
+    if isinstance(node, ScalarNode) and value is None:
+        return "the key has no value"
+    if kind == "bool_type" and isinstance(value, str) and value.casefold() in _WORDS:
+        return f"YAML 1.2 knows true and false alone: write {_WORDS[value.casefold()]}"
+    if kind in ("float_type", "int_type") and isinstance(value, str):
+        return _quoted_hint(value)
+    if kind == "string_type" and isinstance(value, int | float):
+        return "quotes make a text of it"
+    return None
+
+
+def _quoted_hint(text: str) -> str | None:
+    try:
+        float(text)
+    except ValueError:
+        return "this number has no unit" if text[:1].isdigit() else None
+    return f"remove the quotes: {text}"

@@ -1,0 +1,115 @@
+"""A validated file with the places of everything in it, so that later stages can point at what they refuse."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+from pydantic import ValidationError
+
+from manipcli import __version__
+from manipcli.core.errors import Finding, InvalidInput, Place, Severity
+from manipcli.core.text import listed, shorten
+from manipcli.spec.base import Model
+from manipcli.spec.explain import explain
+from manipcli.spec.tree import MappingNode, Node, Path, ScalarNode, dotted, key_place_at, node_at, plain, shown
+
+M = TypeVar("M", bound=Model)
+
+Area = Literal["TASK", "ROBOT", "CTRL"]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A file's tree, after parameters and overrides, and what it is called."""
+
+    name: str
+    root: Node
+    area: Area
+
+    def place(self, *path: str | int) -> Place:
+        """Where the value at `path` stands; of what is not written, the nearest block around it."""
+        return node_at(self.root, path).place
+
+    def key_place(self, *path: str | int) -> Place:
+        """Where the key at `path` stands."""
+        return key_place_at(self.root, path)
+
+    def finding(
+        self,
+        number: int,
+        path: Path,
+        message: str,
+        *,
+        hint: str | None = None,
+        severity: Severity = "error",
+        key: bool = False,
+    ) -> Finding:
+        """Something to tell about the value (or, with `key`, the key) at `path`, under the code of this kind of file."""
+        place = self.key_place(*path) if key else self.place(*path)
+        where = f"{dotted(path)}: " if path else ""
+        return Finding(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
+
+
+@dataclass(frozen=True, slots=True)
+class Located(Generic[M]):
+    """A validated spec and its source. `findings` are warnings and notes: errors do not get here."""
+
+    spec: M
+    source: Source
+    findings: tuple[Finding, ...] = ()
+
+    def place(self, *path: str | int) -> Place:
+        """`place("scene", "cup", "mass")`, `place("steps", 3, "move", "to")`."""
+        return self.source.place(*path)
+
+
+def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()) -> Located[M]:
+    """The spec that the source says.
+
+    Args:
+        source: the tree.
+        model: what it should be.
+        findings: what is known against the file already; errors among them are raised together with the model's.
+
+    Raises:
+        InvalidInput: with every finding.
+    """
+    _check_top(source, model)
+    _check_version(source)
+    told = tuple(findings)
+    try:
+        spec = model.model_validate(plain(source.root))
+    except ValidationError as error:
+        raise InvalidInput([*told, *explain(error, source.root, model, source.area)]) from None
+    except RecursionError:
+        raise InvalidInput([*told, source.finding(205, (), "nested too deep")]) from None
+    if any(finding.severity == "error" for finding in told):
+        raise InvalidInput(told)
+    return Located(spec, source, told)
+
+
+def _check_top(source: Source, model: type[Model]) -> None:
+    if isinstance(source.root, MappingNode) and source.root.entries:
+        return
+    required = [name for name, field in model.model_fields.items() if field.is_required()]
+    given = "an empty file" if isinstance(source.root, MappingNode) else shown(source.root)
+    message = f"expected a mapping with the keys {listed(required)}, not {given}"
+    raise InvalidInput([source.finding(200, (), message)])
+
+
+def _check_version(source: Source) -> None:
+    """A newer file may have keys that this version does not know: that alone is told then."""
+    node = source.root.get("version") if isinstance(source.root, MappingNode) else None
+    if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
+        return
+    if re.fullmatch(r"\d{1,6}\.\d{1,6}\.\d{1,6}", node.value) and _numbers(node.value) > _numbers(__version__):
+        message = f"this file needs manipcli >= {shorten(node.value)}; this is {__version__}"
+        hint = "update with: pip install --upgrade manipcli"
+        raise InvalidInput([source.finding(213, ("version",), message, hint=hint)])
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(number) for number in re.findall(r"\d+", version)[:3])

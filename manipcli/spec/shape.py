@@ -1,0 +1,86 @@
+"""Which types may stand at a path of a model: asked for the keys a block knows and what a value should have been."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, Tag
+from pydantic.fields import FieldInfo
+
+from manipcli.spec.tree import Path
+
+
+def alternatives(annotation: object) -> list[tuple[object, str | None]]:
+    """The members of a union, flattened, each with its tag; a type that is no union stands alone."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        inner, *metadata = get_args(annotation)
+        tag = next((item.tag for item in metadata if isinstance(item, Tag)), None)
+        return [(member, tag or below) for member, below in alternatives(inner)]
+    if origin in (Union, types.UnionType):
+        return [pair for member in get_args(annotation) for pair in alternatives(member)]
+    return [(annotation, None)]
+
+
+def at(model: type[BaseModel], path: Path, tags: Mapping[int, str]) -> list[object]:
+    """The types that may stand at `path`.
+
+    Args:
+        model: of the whole file.
+        path: keys and indices.
+        tags: for a depth of the path, which member of a union there is meant (pydantic's name of it).
+    """
+    found: list[tuple[object, str | None]] = [(model, None)]
+    for depth, part in enumerate(path):
+        found = [pair for kind, _ in _chosen(found, tags.get(depth)) for pair in _below(kind, part)]
+    return [kind for kind, _ in _chosen(found, tags.get(len(path)))]
+
+
+def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
+    """The keys that these types know, with their fields."""
+    return {
+        field.alias or name: field
+        for kind in kinds
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+        for name, field in kind.model_fields.items()
+    }
+
+
+def takes_any_key(kinds: Sequence[object]) -> bool:
+    """Whether one of the types is a mapping of names that the user chooses."""
+    return any(get_origin(kind) is dict for kind in kinds)
+
+
+def _chosen(found: list[tuple[object, str | None]], tag: str | None) -> list[tuple[object, str | None]]:
+    if tag is None:
+        return found
+    return [(kind, own) for kind, own in found if own == tag or _called(kind, tag)] or found
+
+
+def _called(kind: object, tag: str) -> bool:
+    origin = get_origin(kind)
+    if origin is not None:
+        return isinstance(origin, type) and tag.startswith(f"{origin.__name__}[")
+    if not isinstance(kind, type):
+        return False
+    if not issubclass(kind, BaseModel):
+        return kind.__name__ == tag
+    word = kind.model_fields.get("type")
+    literal = word is not None and get_origin(word.annotation) is Literal and tag in get_args(word.annotation)
+    return literal or kind.__name__ == tag
+
+
+def _below(kind: object, part: str | int) -> list[tuple[object, str | None]]:
+    origin, arguments = get_origin(kind), get_args(kind)
+    if isinstance(kind, type) and origin is None and issubclass(kind, BaseModel):
+        field = keys_of([kind]).get(str(part))
+        return [] if field is None else alternatives(field.annotation)
+    if origin is dict and isinstance(part, str):
+        return alternatives(arguments[1])
+    if origin in (tuple, list) and isinstance(part, int):
+        if len(arguments) == 2 and arguments[1] is Ellipsis:
+            return alternatives(arguments[0])
+        return alternatives(arguments[min(part, len(arguments) - 1)])
+    return []

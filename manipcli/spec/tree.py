@@ -1,0 +1,119 @@
+"""What a file says, as a tree whose every key and value knows its place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from manipcli.core.errors import Place
+from manipcli.core.text import escape, listed, shorten
+
+Scalar = str | int | float | bool | None
+Plain = Scalar | list["Plain"] | dict[str, "Plain"]
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ScalarNode:
+    """A text, number, truth value or nothing. `written`: the expression that it was computed from."""
+
+    value: Scalar
+    place: Place
+    written: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What stands under a key, and where the key stands."""
+
+    key_place: Place
+    node: Node
+
+
+@dataclass(frozen=True, slots=True)
+class MappingNode:
+    """Keys in the order of the file."""
+
+    entries: dict[str, Entry]
+    place: Place
+
+    def get(self, key: str) -> Node | None:
+        entry = self.entries.get(key)
+        return None if entry is None else entry.node
+
+    def with_entry(self, key: str, entry: Entry) -> MappingNode:
+        """A copy in which `entry` stands under `key`."""
+        return MappingNode({**self.entries, key: entry}, self.place)
+
+    def without(self, *keys: str) -> MappingNode:
+        """A copy without these keys."""
+        return MappingNode({key: entry for key, entry in self.entries.items() if key not in keys}, self.place)
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceNode:
+    """A list."""
+
+    items: tuple[Node, ...]
+    place: Place
+
+
+Node = ScalarNode | MappingNode | SequenceNode
+
+
+def plain(node: Node) -> Plain:
+    """The data alone."""
+    if isinstance(node, MappingNode):
+        return {key: plain(entry.node) for key, entry in node.entries.items()}
+    if isinstance(node, SequenceNode):
+        return [plain(item) for item in node.items]
+    return node.value
+
+
+def child(node: Node, part: str | int) -> Node | None:
+    """What stands one step below, or None."""
+    if isinstance(node, MappingNode):
+        return node.get(part) if isinstance(part, str) else None
+    if isinstance(node, SequenceNode) and isinstance(part, int) and 0 <= part < len(node.items):
+        return node.items[part]
+    return None
+
+
+def node_at(root: Node, path: Path) -> Node:
+    """The node at `path`, or the deepest one on the way to it."""
+    node = root
+    for part in path:
+        below = child(node, part)
+        if below is None:
+            return node
+        node = below
+    return node
+
+
+def key_place_at(root: Node, path: Path) -> Place:
+    """Where the last key of `path` stands; the place of the deepest node on the way where there is no such key."""
+    parent = node_at(root, path[:-1])
+    if path and isinstance(parent, MappingNode) and isinstance(path[-1], str) and path[-1] in parent.entries:
+        return parent.entries[path[-1]].key_place
+    return node_at(root, path).place
+
+
+def dotted(path: Path) -> str:
+    """`scene.cup.mass`, `steps[3].move.to`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{escape(part)}" if text else escape(part)
+    return text
+
+
+def shown(node: Node) -> str:
+    """What was given, short enough for a message."""
+    if isinstance(node, MappingNode):
+        return f"a mapping with the keys {listed(node.entries, most=5)}" if node.entries else "an empty mapping"
+    if isinstance(node, SequenceNode):
+        return f"a list of {len(node.items)}" if node.items else "an empty list"
+    if node.value is None:
+        return "nothing"
+    if isinstance(node.value, bool):
+        return "true" if node.value else "false"
+    text = f"'{shorten(node.value)}'" if isinstance(node.value, str) else shorten(repr(node.value), width=24)
+    return f"{text} (from '{shorten(node.written)}')" if node.written is not None else text
