@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from collada import write_collada, write_stl
+from mesh_files import write_collada, write_stl
 from surfaces import (
     Array,
     Surface,
