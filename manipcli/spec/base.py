@@ -14,6 +14,18 @@ _STRICT = frozenset({"float", "int", "bool", "str"})
 _NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function", "expected"})
 
 
+def _make_strict(schema: object) -> None:
+    if isinstance(schema, dict):
+        if schema.get("type") in _STRICT:
+            schema["strict"] = True
+        for key, value in schema.items():
+            if key not in _NO_SCHEMA:
+                _make_strict(value)
+    elif isinstance(schema, list | tuple):
+        for value in schema:
+            _make_strict(value)
+
+
 class Model(BaseModel):
     """A block of a user's file.
 
@@ -28,18 +40,6 @@ class Model(BaseModel):
         schema = handler(source)
         _make_strict(schema)
         return schema
-
-
-def _make_strict(schema: object) -> None:
-    if isinstance(schema, dict):
-        if schema.get("type") in _STRICT:
-            schema["strict"] = True
-        for key, value in schema.items():
-            if key not in _NO_SCHEMA:
-                _make_strict(value)
-    elif isinstance(schema, list | tuple):
-        for value in schema:
-            _make_strict(value)
 
 
 def problem(
