@@ -39,7 +39,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh file: `uri` as the user wrote it, `path` where it was found, `scale` per axis."""
+    """A mesh file: `uri` as `package://NAME/...`, `path` where it was found, `scale` per axis."""
 
     uri: str
     path: Path

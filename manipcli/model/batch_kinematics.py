@@ -1,0 +1,129 @@
+"""Poses of links over many instants at once, in numpy: what a recording writes and a picture draws.
+
+Each moving joint is two constant quaternions: with X_PJ = (p, v) and u = v (axis, 0), the quaternion of its child link
+at angle q is  u sin(q/2) + v cos(q/2).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, frozen, rotate
+from manipcli.model.robot import Joint, RobotModel
+
+
+def relative_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
+    """Pose of each moving joint's child link in its parent link.
+
+    Args:
+        robot: the robot.
+        q: (T, n) joint positions.
+
+    Returns:
+        Positions (T, n, 3) [m] and unit quaternions (T, n, 4) xyzw.
+    """
+    return _terms(robot).relative(q)
+
+
+def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
+    """Pose of each moving joint's child link in the world.
+
+    Args:
+        robot: the robot.
+        q: (T, n) joint positions.
+
+    Returns:
+        Positions (T, n, 3) [m] and unit quaternions (T, n, 4) xyzw.
+    """
+    terms = _terms(robot)
+    p, quat = terms.relative_to_last(q)
+    for k, before in enumerate(terms.before):
+        if before >= 0:
+            p[:, k] = p[:, before] + rotate(quat[:, before], p[:, k])
+            quat[:, k] = _product(quat[:, before], quat[:, k])
+    return p, quat
+
+
+class _Terms:
+    """The constants of a robot's moving joints."""
+
+    def __init__(self, robot: RobotModel) -> None:
+        joints = robot.moving_joints
+        self._turning = np.array([joint.type != "prismatic" for joint in joints], dtype=bool)
+        self._sliding = np.flatnonzero(~self._turning)
+        self._parent = _halves(joints, [joint.X_PJ for joint in joints])
+        # Where each link stands in the child link of the last moving joint above it, or in the world.
+        where: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
+        placements: list[Transform] = []
+        before: list[int] = []
+        for joint in robot.joints:
+            last, X = where[joint.parent]
+            X = X @ joint.X_PJ
+            if joint.moves:
+                placements.append(X)
+                before.append(last)
+                last, X = len(before) - 1, Transform.identity()
+            where[joint.child] = (last, X)
+        self.before = tuple(before)
+        self._last = _halves(joints, placements)
+
+    def relative(self, q: Array) -> tuple[Array, Array]:
+        return self._poses(q, *self._parent)
+
+    def relative_to_last(self, q: Array) -> tuple[Array, Array]:
+        return self._poses(q, *self._last)
+
+    def _poses(self, q: Array, p0: Array, u: Array, v: Array, slide: Array) -> tuple[Array, Array]:
+        half = np.where(self._turning, q, 0.0) * 0.5
+        quat = np.sin(half)[..., None] * u + np.cos(half)[..., None] * v
+        p = np.repeat(p0[None], len(q), axis=0)
+        if len(self._sliding):
+            p[:, self._sliding] += q[:, self._sliding, None] * slide[self._sliding]
+        return p, quat
+
+
+def _halves(joints: tuple[Joint, ...], placements: list[Transform]) -> tuple[Array, Array, Array, Array]:
+    """(p, u, v, slide), each (n, 3 or 4): position, the two quaternions, and the direction of sliding in the parent."""
+    n = len(joints)
+    p, u, v, slide = np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 3))
+    for k, (joint, X) in enumerate(zip(joints, placements, strict=True)):
+        p[k], v[k] = X.p, X.quat_xyzw
+        u[k] = _product(v[k], np.array([*joint.axis, 0.0]))
+        slide[k] = X.R @ joint.axis
+    return frozen(p), frozen(u), frozen(v), frozen(slide)
+
+
+def _product(a: Array, b: Array) -> Array:
+    """Hamilton's product of quaternions (..., 4) xyzw."""
+    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = aw * bx + ax * bw + ay * bz - az * by
+    out[..., 1] = aw * by - ax * bz + ay * bw + az * bx
+    out[..., 2] = aw * bz + ax * by - ay * bx + az * bw
+    out[..., 3] = aw * bw - ax * bx - ay * by - az * bz
+    return out
+
+
+class _ByIdentity:
+    """Makes a robot, which cannot be hashed, a cache key that keeps it alive."""
+
+    def __init__(self, robot: RobotModel) -> None:
+        self.robot = robot
+
+    def __hash__(self) -> int:
+        return id(self.robot)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _ByIdentity) and other.robot is self.robot
+
+
+@lru_cache(maxsize=8)
+def _cached(key: _ByIdentity) -> _Terms:
+    return _Terms(key.robot)
+
+
+def _terms(robot: RobotModel) -> _Terms:
+    return _cached(_ByIdentity(robot))

@@ -1,0 +1,281 @@
+"""A robot file to the robot: descriptions welded together, groups, named poses, limits, tool frame."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.description import read_description
+from manipcli.model.named_poses import build_groups, build_poses
+from manipcli.model.normalise import portable_urdf
+from manipcli.model.packages import NotFound, Packages
+from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
+from manipcli.model.urdf import Parts, read_parts
+from manipcli.model.urdf_numbers import nearest
+from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
+
+Loc = tuple[str | int, ...]
+PlaceOf = Callable[[Loc], Place | None]
+
+
+class Reporter:
+    """Gathers findings about the robot file, each with the place of the value it is about."""
+
+    def __init__(self, place: PlaceOf | None) -> None:
+        self._place = place
+        self.findings: list[Finding] = []
+
+    def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
+        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+
+    def note(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
+        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
+
+    def place(self, loc: Loc) -> Place | None:
+        return self._place(loc) if self._place is not None else None
+
+    def stop(self) -> None:
+        """Raises InvalidInput when an error was found."""
+        if any(finding.severity == "error" for finding in self.findings):
+            raise InvalidInput(self.findings)
+
+
+def build_robot(
+    spec: RobotSpec,
+    *,
+    file: Path,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+    place: PlaceOf | None = None,
+) -> tuple[RobotModel, tuple[Finding, ...]]:
+    """The robot that a robot file describes.
+
+    Args:
+        spec: the robot file.
+        file: where it is; its relative paths start there.
+        package_path: more folders to look for packages in.
+        allow_outside: lets meshes and includes lie outside of packages and the description's folder.
+        place: line and column of a value in the robot file, by its path of keys.
+
+    Returns:
+        The robot, and what a user should know about it: warnings and notes.
+
+    Raises:
+        InvalidInput: every error of the descriptions at once; or, where those are sound, of the robot file.
+    """
+    reporter = Reporter(place)
+    sources = Packages(file, package_path=package_path, allow_outside=True)
+    read = _Descriptions(reporter, sources, file, tuple(package_path), allow_outside)
+    main = read.parts(spec.description, spec.args, ("description",))
+    attached = [
+        read.parts(each.description, each.args, ("attach", k, "description")) for k, each in enumerate(spec.attach)
+    ]
+    reporter.stop()
+    assert main is not None
+    body = _Body(main.root, list(main.links), list(main.joints), list(main.transmissions))
+    for k, (each, parts) in enumerate(zip(spec.attach, attached, strict=True)):
+        assert parts is not None
+        body.weld(reporter, each, parts, k)
+    reporter.stop()
+    joints = _with_limits(reporter, spec, body.ordered())
+    links = tuple(body.links)
+    moving = {joint.name: joint for joint in joints if joint.moves}
+    groups = build_groups(reporter, spec, links, joints)
+    poses = build_poses(reporter, spec, groups, moving)
+    tool = _tool(reporter, spec, links)
+    for k, pair in enumerate(spec.collision_ignore):
+        for name in pair:
+            _known_link(reporter, name, links, ("collision_ignore", k))
+    reporter.stop()
+    robot = RobotModel(
+        name=spec.robot,
+        root=main.root,
+        links=links,
+        joints=joints,
+        groups=groups,
+        poses=poses,
+        transmissions=tuple(body.transmissions),
+        X_WB=transform(spec.mount),
+        urdf=portable_urdf(spec.robot, links, joints, body.transmissions),
+        tool=tool,
+        collision_ignore=spec.collision_ignore,
+    )
+    return robot, tuple(reporter.findings)
+
+
+def transform(pose: PoseSpec) -> Transform:
+    """The transform that a pose in a file says."""
+    return Transform.of(xyz=pose.xyz, rpy=pose.rpy, quat_xyzw=pose.quat_xyzw)
+
+
+class _Descriptions:
+    """Reads the description files that a robot file names."""
+
+    def __init__(
+        self, reporter: Reporter, sources: Packages, file: Path, package_path: tuple[Path, ...], allow_outside: bool
+    ) -> None:
+        self._reporter = reporter
+        self._sources = sources
+        self._folder = file.resolve().parent
+        self._package_path = package_path
+        self._allow_outside = allow_outside
+
+    def parts(self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc) -> Parts | None:
+        """The parts of one description, or None; findings are reported."""
+        try:
+            path = self._sources.resolve(uri, relative_to=self._folder)
+        except NotFound as error:
+            self._reporter.error("ROBOT201", f"description: {error.message}", loc, hint=error.hint)
+            return None
+        packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
+        try:
+            parts = read_parts(read_description(path, packages=packages, arguments=arguments))
+        except InvalidInput as error:
+            self._reporter.findings += error.findings
+            return None
+        self._reporter.findings += parts.findings
+        return parts
+
+
+class _Body:
+    """Links and joints while descriptions are welded together."""
+
+    def __init__(self, root: str, links: list[Link], joints: list[Joint], transmissions: list[TransmissionTag]) -> None:
+        self.root = root
+        self.links = links
+        self.joints = joints
+        self.transmissions = transmissions
+
+    def weld(self, reporter: Reporter, spec: AttachSpec, parts: Parts, k: int) -> None:
+        """Adds the parts below `spec.parent`, their names prefixed, by a fixed joint `<prefix><root>_attach`."""
+        prefix = spec.prefix
+        names = [link.name for link in self.links]
+        if spec.parent not in names:
+            message = f"link '{spec.parent}' is not in the description"
+            reporter.error("ROBOT202", message, ("attach", k, "parent"), hint=nearest(spec.parent, names))
+            return
+        taken = {f"link '{name}'" for name in names} | {f"joint '{joint.name}'" for joint in self.joints}
+        added = [f"link '{prefix}{link.name}'" for link in parts.links]
+        added += [f"joint '{prefix}{joint.name}'" for joint in parts.joints]
+        joint_name = f"{prefix}{parts.root}_attach"
+        for what in (*added, f"joint '{joint_name}'"):
+            if what in taken:
+                message = f"{what} is already there"
+                reporter.error("ROBOT203", message, ("attach", k), hint="give this attachment a prefix")
+        self.links += [dataclasses.replace(link, name=prefix + link.name) for link in parts.links]
+        self.joints.append(
+            Joint(
+                name=joint_name,
+                type="fixed",
+                parent=spec.parent,
+                child=prefix + parts.root,
+                X_PJ=transform(spec.pose),
+                axis=frozen([1.0, 0.0, 0.0]),
+                limits=JointLimits(),
+            )
+        )
+        self.joints += [_prefixed(joint, prefix) for joint in parts.joints]
+        self.transmissions += [
+            dataclasses.replace(
+                tag,
+                name=prefix + tag.name,
+                joints=tuple(prefix + name for name in tag.joints),
+                actuators=tuple(prefix + name for name in tag.actuators),
+            )
+            for tag in parts.transmissions
+        ]
+
+    def ordered(self) -> tuple[Joint, ...]:
+        """Joints depth first; links are put into the order of their joints."""
+        from manipcli.model.topology import depth_first
+
+        joints = depth_first(self.root, {joint.name: joint for joint in self.joints})
+        by_name = {link.name: link for link in self.links}
+        self.links = [by_name[self.root], *(by_name[joint.child] for joint in joints)]
+        return joints
+
+
+def _prefixed(joint: Joint, prefix: str) -> Joint:
+    mimic = joint.mimic
+    return dataclasses.replace(
+        joint,
+        name=prefix + joint.name,
+        parent=prefix + joint.parent,
+        child=prefix + joint.child,
+        mimic=Mimic(prefix + mimic.joint, mimic.multiplier, mimic.offset) if mimic is not None else None,
+    )
+
+
+def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
+    """The joints with the robot file's limits: positions only narrowed, acceleration stated or the default."""
+    moving = [joint.name for joint in joints if joint.moves]
+    for name in spec.limits:
+        if name not in moving:
+            message = f"limits: joint '{name}' is not a moving joint of the robot"
+            reporter.error("ROBOT204", message, ("limits", name), hint=nearest(name, moving))
+    without: list[str] = []
+    result = []
+    for joint in joints:
+        if not joint.moves:
+            result.append(joint)
+            continue
+        limits = _overridden(reporter, joint, spec.limits.get(joint.name))
+        if limits.acceleration is None and joint.mimic is None:
+            without.append(joint.name)
+            limits = dataclasses.replace(limits, acceleration=spec.default_acceleration)
+        result.append(dataclasses.replace(joint, limits=limits))
+    if without:
+        many = ", ".join(without[:6]) + (", ..." if len(without) > 6 else "")
+        message = (
+            f"no acceleration limit is stated for {many}: default_acceleration, "
+            f"{spec.default_acceleration:g} rad/s2 or m/s2, is used"
+        )
+        hint = f"state it in the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
+        reporter.note("ROBOT230", message, ("limits",), hint=hint)
+    return tuple(result)
+
+
+def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> JointLimits:
+    base = joint.limits
+    if own is None:
+        return base
+    lower, upper = base.lower, base.upper
+    for key, bound in (("lower", own.lower), ("upper", own.upper)):
+        if bound is None:
+            continue
+        wider = (base.lower is not None and bound < base.lower) or (base.upper is not None and bound > base.upper)
+        if wider:
+            message = f"joint '{joint.name}': {key} {bound:g} widens the description's {base.lower:g} to {base.upper:g}"
+            hint = "the robot file may only narrow it"
+            reporter.error("ROBOT205", message, ("limits", joint.name, key), hint=hint)
+        elif key == "lower":
+            lower = bound
+        else:
+            upper = bound
+    if lower is not None and upper is not None and lower > upper:
+        message = f"joint '{joint.name}': lower {lower:g} is above upper {upper:g}"
+        reporter.error("ROBOT205", message, ("limits", joint.name))
+    return JointLimits(
+        lower=lower,
+        upper=upper,
+        velocity=own.velocity if own.velocity is not None else base.velocity,
+        effort=own.effort if own.effort is not None else base.effort,
+        acceleration=own.acceleration,
+        jerk=own.jerk,
+    )
+
+
+def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) -> bool:
+    names = [link.name for link in links]
+    if name not in names:
+        reporter.error("ROBOT206", f"link '{name}' is not in the robot", loc, hint=nearest(name, names))
+    return name in names
+
+
+def _tool(reporter: Reporter, spec: RobotSpec, links: Sequence[Link]) -> Tool | None:
+    if spec.tool is None or not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
+        return None
+    return Tool(link=spec.tool.link, X_LT=transform(spec.tool.pose))

@@ -1,0 +1,59 @@
+"""A description file, URDF or xacro, as one expanded tree of located elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli.core.errors import Finding
+from manipcli.model.located_xml import Element, element_of, invalid, read_document
+from manipcli.model.packages import Packages
+
+XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """`root` is the <robot> element, expanded; `packages` finds what it names; `findings` are warnings."""
+
+    path: Path
+    root: Element
+    packages: Packages
+    findings: tuple[Finding, ...]
+
+
+def read_description(
+    path: Path, *, packages: Packages, arguments: Mapping[str, str | int | float | bool] = {}
+) -> Description:
+    """Reads and expands a description.
+
+    Args:
+        path: URDF or xacro; xacro is told by its name or by the namespace on its root element.
+        packages: finds the packages and files it names.
+        arguments: for `<xacro:arg>`.
+
+    Raises:
+        InvalidInput: with file, line and column.
+    """
+    document = read_document(path)
+    top = document.documentElement
+    declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+    findings: tuple[Finding, ...] = ()
+    if path.suffix == ".xacro" or declared:
+        from manipcli.model.xacro import expand
+
+        document, findings = expand(path, {name: argument_text(value) for name, value in arguments.items()}, packages)
+    elif arguments:
+        names = ", ".join(arguments)
+        raise invalid("XACRO003", f"'{path.name}' is plain URDF and has no arguments; given: {names}")
+    assert document.documentElement is not None  # a document without a root element is not well-formed
+    root = element_of(document.documentElement)
+    if root.tag != "robot":
+        raise invalid("URDF002", f"the root element is <{root.tag}>; a description begins with <robot>", root.place)
+    return Description(path=path, root=root, packages=packages, findings=findings)
+
+
+def argument_text(value: str | int | float | bool) -> str:
+    """An argument as xacro gets it: `true`, `0.1`, text as it is."""
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,122 @@
+"""Kinematics and dynamics of a robot through Pinocchio.
+
+Joint vectors (n,) follow `RobotModel.moving_joints`; a mimic joint is an ordinary joint here. Frames: W world, L link,
+T a frame fixed in a link. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse dynamics) and 6.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.robot import RobotModel
+
+if TYPE_CHECKING:
+    import pinocchio
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
+"""[m/s2] in the world."""
+
+
+class Kinematics:
+    """Forward kinematics, Jacobians and joint-space dynamics; holds scratch memory, so one object serves one thread.
+
+    Args:
+        robot: the robot; its mount `X_WB` is included, so that poses are in the world.
+        gravity: (3,) [m/s2] in the world.
+    """
+
+    def __init__(self, robot: RobotModel, *, gravity: tuple[float, float, float] | Array = STANDARD_GRAVITY) -> None:
+        import pinocchio as pin
+
+        self._pin = pin
+        self.robot = robot
+        self._model = model = pin.Model()
+        model.gravity = pin.Motion(np.asarray(gravity, dtype=np.float64), np.zeros(3))
+        # Joints are added in the order of the robot, which is depth first as Pinocchio wants it: q needs no reordering.
+        at: dict[str, tuple[int, pinocchio.SE3]] = {robot.root: (0, self._se3(robot.X_WB))}
+        for joint in robot.joints:
+            parent, X = at[joint.parent]
+            X = X * self._se3(joint.X_PJ)
+            if joint.moves:
+                axis = np.array(joint.axis)
+                linear = joint.type == "prismatic"
+                kind = pin.JointModelPrismaticUnaligned(axis) if linear else pin.JointModelRevoluteUnaligned(axis)
+                parent, X = model.addJoint(parent, kind, X, joint.name), pin.SE3.Identity()
+            at[joint.child] = (parent, X)
+        self._frames: dict[str, int] = {}
+        self._holders: dict[str, int] = {}
+        for link in robot.links:
+            parent, X = at[link.name]
+            if link.inertial is not None:
+                X_I = self._se3(link.inertial.X_LI)
+                inertia = pin.Inertia(link.inertial.mass, np.zeros(3), np.array(link.inertial.inertia))
+                model.appendBodyToJoint(parent, inertia, X * X_I)
+            frame = pin.Frame(link.name, parent, 0, X, pin.FrameType.BODY)
+            self._frames[link.name] = model.addFrame(frame, False)
+            self._holders[link.name] = parent
+        self._data = model.createData()
+        self._zero = np.zeros(model.nv)
+
+    @property
+    def model(self) -> pinocchio.Model:
+        """Pinocchio's own: joints in the order of joint vectors, a frame for each link. To be read only."""
+        return self._model
+
+    def _se3(self, X: Transform) -> pinocchio.SE3:
+        return self._pin.SE3(np.array(X.R), np.array(X.p))
+
+    def forward(self, q: Array, link: str) -> Transform:
+        """X_WL: pose of `link` in the world at `q`."""
+        self._pin.forwardKinematics(self._model, self._data, q)
+        X = self._pin.updateFramePlacement(self._model, self._data, self._frames[link])
+        return Transform(R=frozen(X.rotation), p=frozen(X.translation))
+
+    def jacobian(self, q: Array, link: str, offset: Transform | None = None) -> Array:
+        """J_WT (6, n): velocity of frame T (linear rows first, then angular), in world axes, per joint velocity.
+
+        Args:
+            q: (n,) joint positions.
+            link: L.
+            offset: X_LT; T is L itself by default.
+        """
+        return self.pose_and_jacobian(q, link, offset)[2]
+
+    def pose_and_jacobian(self, q: Array, link: str, offset: Transform | None = None) -> tuple[Array, Array, Array]:
+        """(R_WT (3, 3), p_WT (3,), J_WT (6, n)) in one pass; the arrays are the caller's."""
+        pin, model, data = self._pin, self._model, self._data
+        frame = self._frames[link]
+        # computeFrameJacobian would leave the placements of the joints as they were before.
+        pin.computeJointJacobians(model, data, q)
+        X = pin.updateFramePlacement(model, data, frame)
+        J: Array = np.array(pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))
+        R, p = np.array(X.rotation), np.array(X.translation)
+        if offset is not None:
+            arm = R @ offset.p
+            # v_T = v_L + w x arm
+            J[0] += J[4] * arm[2] - J[5] * arm[1]
+            J[1] += J[5] * arm[0] - J[3] * arm[2]
+            J[2] += J[3] * arm[1] - J[4] * arm[0]
+            R, p = R @ offset.R, p + arm
+        return R, p, J
+
+    def gravity(self, q: Array) -> Array:
+        """g(q) (n,) [N m or N]: what the joints must hold at rest. A view, overwritten by the next call."""
+        g: Array = self._pin.computeGeneralizedGravity(self._model, self._data, q)
+        return g
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> Array:
+        """tau = M(q) a + C(q, v) v + g(q) (n,) [N m or N]. A view, overwritten by the next call."""
+        tau: Array = self._pin.rnea(self._model, self._data, q, v, a)
+        return tau
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M(q) (n, n), symmetric."""
+        upper = np.triu(self._pin.crba(self._model, self._data, q))
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    def potential_energy(self, q: Array) -> float:
+        """V(q) = -sum m_i gravity . c_i [J], relative to the world's origin; links fixed to the world excluded."""
+        return float(self._pin.computePotentialEnergy(self._model, self._data, q))

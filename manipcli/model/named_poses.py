@@ -1,0 +1,166 @@
+"""Groups and named poses of a robot file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from manipcli.model.robot import Group, Joint, Link, NamedPose
+from manipcli.model.urdf_numbers import nearest
+from manipcli.spec.robot import GroupSpec, RobotSpec
+
+if TYPE_CHECKING:
+    from manipcli.model.build_robot import Reporter
+
+LIMIT_TOLERANCE = 1e-6
+"""How far a named pose may lie beyond a limit [rad or m]: angles in degrees are written with few digits."""
+
+
+def build_groups(
+    reporter: Reporter, spec: RobotSpec, links: Sequence[Link], joints: Sequence[Joint]
+) -> tuple[Group, ...]:
+    """The groups of a robot file; unknown names are reported."""
+    found = []
+    for name, group in spec.groups.items():
+        built = _group(reporter, name, group, links, joints)
+        if built is not None:
+            found.append(built)
+    return tuple(found)
+
+
+def _group(
+    reporter: Reporter, name: str, spec: GroupSpec, links: Sequence[Link], joints: Sequence[Joint]
+) -> Group | None:
+    link_names = [link.name for link in links]
+    if (spec.chain is None) == (spec.joints is None):
+        message = f"group '{name}' needs either a chain or a list of joints"
+        reporter.error("ROBOT210", message, ("groups", name))
+        return None
+    if spec.tip is not None and spec.tip not in link_names:
+        message = f"group '{name}': tip link '{spec.tip}' is not in the robot"
+        reporter.error("ROBOT206", message, ("groups", name, "tip"), hint=nearest(spec.tip, link_names))
+        return None
+    if spec.joints is not None:
+        return _listed(reporter, name, spec.joints, spec.tip, joints)
+    assert spec.chain is not None
+    for key, link in (("base", spec.chain.base), ("tip", spec.chain.tip)):
+        if link not in link_names:
+            message = f"group '{name}': {key} link '{link}' is not in the robot"
+            reporter.error("ROBOT206", message, ("groups", name, "chain", key), hint=nearest(link, link_names))
+            return None
+    by_child = {joint.child: joint for joint in joints}
+    way: list[Joint] = []
+    at = spec.chain.tip
+    while at != spec.chain.base and at in by_child:
+        way.append(by_child[at])
+        at = by_child[at].parent
+    if at != spec.chain.base:
+        message = f"group '{name}': link '{spec.chain.tip}' does not stand below '{spec.chain.base}'"
+        reporter.error("ROBOT211", message, ("groups", name, "chain"))
+        return None
+    names = tuple(joint.name for joint in reversed(way) if joint.independent)
+    if not names:
+        message = f"group '{name}': no joint moves between '{spec.chain.base}' and '{spec.chain.tip}'"
+        reporter.error("ROBOT211", message, ("groups", name, "chain"))
+        return None
+    return Group(name=name, joints=names, base=spec.chain.base, tip=spec.tip or spec.chain.tip)
+
+
+def _listed(
+    reporter: Reporter, name: str, listed: Sequence[str], tip: str | None, joints: Sequence[Joint]
+) -> Group | None:
+    by_name = {joint.name: joint for joint in joints}
+    usable = [joint.name for joint in joints if joint.independent]
+    good = bool(listed)
+    if not listed:
+        reporter.error("ROBOT210", f"group '{name}' has no joint", ("groups", name, "joints"))
+    for k, joint in enumerate(listed):
+        if joint in usable and joint not in listed[:k]:
+            continue
+        good = False
+        known = by_name.get(joint)
+        if known is None:
+            message = f"group '{name}': joint '{joint}' is not in the robot"
+        elif known.mimic is not None:
+            message = f"group '{name}': joint '{joint}' follows '{known.mimic.joint}' and cannot be commanded"
+        elif not known.moves:
+            message = f"group '{name}': joint '{joint}' is fixed"
+        else:
+            message = f"group '{name}': joint '{joint}' is listed twice"
+        hint = nearest(joint, usable) if known is None else None
+        reporter.error("ROBOT212", message, ("groups", name, "joints", k), hint=hint)
+    return Group(name=name, joints=tuple(listed), base=None, tip=tip) if good else None
+
+
+def build_poses(
+    reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], moving: Mapping[str, Joint]
+) -> tuple[NamedPose, ...]:
+    """The named poses of a robot file, each over all groups it speaks of, within the limits of the joints."""
+    return tuple(_Poses(reporter, spec, groups, moving).build(name) for name in spec.poses)
+
+
+class _Poses:
+    """Named poses refer to each other group by group, so they are looked up by (pose, group)."""
+
+    def __init__(
+        self, reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], moving: Mapping[str, Joint]
+    ) -> None:
+        self._reporter = reporter
+        self._spec = spec
+        self._groups = {group.name: group for group in groups}
+        self._moving = moving
+
+    def build(self, name: str) -> NamedPose:
+        values: dict[str, float] = {}
+        for group in self._spec.poses[name]:
+            if group not in self._spec.groups:
+                message = f"pose '{name}': there is no group '{group}'"
+                hint = nearest(group, self._spec.groups)
+                self._reporter.error("ROBOT220", message, ("poses", name, group), hint=hint)
+            elif group in self._groups:  # one that could not be built has been reported
+                values |= self._part(name, group, ())
+        return NamedPose(name=name, joints=tuple(values), positions=tuple(values.values()))
+
+    def _part(self, name: str, group: str, seen: tuple[str, ...]) -> dict[str, float]:
+        """Joint values of one group in one pose; names of other poses are followed."""
+        part = self._spec.poses[name][group]
+        loc = ("poses", name, group)
+        joints = self._groups[group].joints
+        if isinstance(part, str):
+            having = [other for other, parts in self._spec.poses.items() if group in parts and other != name]
+            if part in seen or part == name:
+                circle = " -> ".join([*seen, name, part])
+                self._reporter.error("ROBOT221", f"pose '{name}' refers to itself: {circle}", loc)
+                return {}
+            if part not in having:
+                message = f"pose '{name}': there is no pose '{part}' of group '{group}'"
+                self._reporter.error("ROBOT221", message, loc, hint=nearest(part, having))
+                return {}
+            return self._part(part, group, (*seen, name))
+        if seen:  # the values themselves are checked where they are written
+            return dict(part) if isinstance(part, dict) else dict(zip(joints, part, strict=False))
+        if isinstance(part, dict):
+            for joint in part:
+                if joint not in joints:
+                    message = f"pose '{name}': joint '{joint}' is not in group '{group}'"
+                    hint = nearest(joint, joints)
+                    self._reporter.error("ROBOT222", message, ("poses", name, group, joint), hint=hint)
+            named = {joint: value for joint, value in part.items() if joint in joints}
+            return self._checked(name, named, {joint: (*loc, joint) for joint in named})
+        if len(part) != len(joints):
+            message = f"pose '{name}': {len(part)} values for the {len(joints)} joints of group '{group}'"
+            self._reporter.error("ROBOT222", message, loc, hint=f"in this order: {', '.join(joints)}")
+            return {}
+        return self._checked(name, dict(zip(joints, part, strict=True)), {j: (*loc, k) for k, j in enumerate(joints)})
+
+    def _checked(
+        self, name: str, values: dict[str, float], locs: Mapping[str, tuple[str | int, ...]]
+    ) -> dict[str, float]:
+        for joint, value in values.items():
+            limits = self._moving[joint].limits
+            low = limits.lower is not None and value < limits.lower - LIMIT_TOLERANCE
+            high = limits.upper is not None and value > limits.upper + LIMIT_TOLERANCE
+            if low or high:
+                message = f"pose '{name}': joint '{joint}' at {value:g} is outside {limits.lower:g} to {limits.upper:g}"
+                self._reporter.error("ROBOT223", message, locs[joint])
+        return values

@@ -1,0 +1,174 @@
+"""Where the files that a description names are found: `package://`, `model://`, `file://` and relative paths.
+
+A description is untrusted data: what it names must be a regular file inside the folder tree of the description or
+inside the root of a package that was asked for by name. Links are followed before that is judged.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import unquote
+
+LEVELS_ABOVE = 5
+"""How many folders above a description are looked at for a folder of a package's name."""
+SUBFOLDERS = frozenset({"urdf", "xacro", "robots", "robot", "description", "cfg"})
+"""A description in such a folder belongs to the folder above it."""
+
+
+class NotFound(Exception):
+    """A file or package that cannot be used; the caller, who knows the place, makes a finding of it."""
+
+    def __init__(self, message: str, *, hint: str | None = None) -> None:
+        self.message = message
+        self.hint = hint
+        super().__init__(message)
+
+
+def own_root(description: Path) -> Path:
+    """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder."""
+    folder = description.resolve().parent
+    for ancestor in (folder, *list(folder.parents)[:LEVELS_ABOVE]):
+        if (ancestor / "package.xml").is_file():
+            return ancestor
+    return folder.parent if folder.name in SUBFOLDERS and folder.parent != folder.parent.parent else folder
+
+
+class Packages:
+    """Finds packages and files for one description.
+
+    Args:
+        description: the file that names things; None looks only at `package_path` and what is installed.
+        package_path: folders that hold packages (or are one), looked at first.
+        allow_outside: lets a file lie anywhere.
+    """
+
+    def __init__(
+        self, description: Path | None, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+    ) -> None:
+        self._package_path = tuple(Path(folder).resolve() for folder in package_path)
+        self._allow_outside = allow_outside
+        self._folder = description.resolve().parent if description is not None else None
+        self._own = own_root(description) if description is not None else None
+        self._found: dict[str, Path] = {}
+
+    def root(self, name: str) -> Path:
+        """The folder of package `name`.
+
+        Raises:
+            NotFound: with the places that were searched.
+        """
+        if name in self._found:
+            return self._found[name]
+        searched: list[Path] = []
+        if name and name not in {".", ".."} and "/" not in name and "\\" not in name and "\0" not in name:
+            for candidate in self._candidates(name):
+                if candidate.is_dir():
+                    self._found[name] = candidate.resolve()
+                    return self._found[name]
+                searched.append(candidate)
+            installed = _installed_package(name)
+            if installed is not None:
+                self._found[name] = installed
+                return installed
+        places = ", ".join(_shown(place) for place in searched)
+        raise NotFound(
+            f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
+            hint=f"add the folder that holds '{name}' with --package-path DIR",
+        )
+
+    def _candidates(self, name: str) -> list[Path]:
+        places: list[Path] = []
+        for folder in self._package_path:
+            places += [folder] if folder.name == name else []
+            places.append(folder / name)
+        if self._folder is not None:
+            home = Path.home()
+            for ancestor in (self._folder, *list(self._folder.parents)[:LEVELS_ABOVE]):
+                if ancestor in (ancestor.parent, home):
+                    break
+                places += [ancestor] if ancestor.name == name else []
+                places.append(ancestor / name)
+        for variable, below in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+            places += [Path(part) / below / name for part in os.environ.get(variable, "").split(os.pathsep) if part]
+        return list(dict.fromkeys(places))
+
+    def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
+        """The regular file that `uri` names, links followed; relative paths start at the folder `relative_to`.
+
+        Raises:
+            NotFound: unknown scheme or package, no such file, not a regular file, or outside of the allowed folders.
+        """
+        scheme, separator, rest = uri.partition("://")
+        roots = [root for root in (self._own, *self._package_path, *self._found.values()) if root is not None]
+        if separator and scheme in {"package", "model"}:
+            name, _, inside = unquote(rest).partition("/")
+            root = self.root(name)
+            path, roots = root / inside, [root]
+        elif separator and scheme == "file":
+            path = Path(unquote(rest.removeprefix("localhost")))
+        elif separator:
+            raise NotFound(f"'{uri}': scheme '{scheme}' is not read", hint="use package://NAME/path or a relative path")
+        else:
+            path = Path(uri)
+        if "\0" in uri:
+            raise NotFound("a file name holds a NUL character")
+        if not path.is_absolute():
+            path = (relative_to or self._folder or Path.cwd()) / path
+        return self._checked(path, uri, roots)
+
+    def _checked(self, path: Path, uri: str, roots: Sequence[Path]) -> Path:
+        try:
+            real = path.resolve(strict=True)
+        except (OSError, RuntimeError) as error:
+            raise NotFound(f"'{uri}' is not found; searched {_shown(path)}") from error
+        if not self._allow_outside and not any(real.is_relative_to(root) for root in roots):
+            raise NotFound(
+                f"'{uri}' lies outside of the description's folder and packages",
+                hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside",
+            )
+        if not real.is_file():
+            raise NotFound(f"'{uri}' is not a regular file")
+        return real
+
+    def portable(self, path: Path) -> str:
+        """A `package://NAME/...` URI of a resolved file that says nothing about this machine.
+
+        NAME is the outermost Python package or nearest ROS package that holds the file, else a package found by name,
+        else the description's own folder, else the file's folder.
+        """
+        for ancestor in path.parents:
+            if (ancestor / "package.xml").is_file():
+                return _uri(ancestor, path)
+            if (ancestor / "__init__.py").is_file() and not (ancestor.parent / "__init__.py").is_file():
+                return _uri(ancestor, path)
+        for root in (self._own, *self._found.values(), *self._package_path):
+            if root is not None and path.is_relative_to(root):
+                return _uri(root, path)
+        return _uri(path.parent, path)
+
+
+def _uri(root: Path, path: Path) -> str:
+    return f"package://{root.name}/{path.relative_to(root).as_posix()}"
+
+
+def _installed_package(name: str) -> Path | None:
+    """The folder of an installed Python package, without importing it."""
+    if not name.isidentifier():
+        return None
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        return None
+    places = list(spec.submodule_search_locations or ()) if spec is not None else []
+    return Path(places[0]).resolve() if places and Path(places[0]).is_dir() else None
+
+
+def _shown(path: Path) -> str:
+    """A path as a message shows it: relative to the working folder where it lies below that."""
+    try:
+        return str(path.relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

@@ -1,0 +1,88 @@
+"""A description's tree to links, joints and transmissions; every error of it at once.
+
+Nothing that an engine would crash on or silently misread gets through: names, references, one tree, finite numbers,
+axes, limits, masses and inertias, shapes, meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from manipcli.core.errors import Finding, Place
+from manipcli.model.description import Description
+from manipcli.model.located_xml import Element
+from manipcli.model.robot import Joint, Link, TransmissionTag
+from manipcli.model.topology import check_tree, depth_first
+from manipcli.model.urdf_joint import read_joint, read_transmissions
+from manipcli.model.urdf_link import read_link, read_materials
+from manipcli.model.urdf_mimic import resolve_mimics
+from manipcli.model.urdf_numbers import Reader
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a description consists of. `root` is '' and the rest is what could be read, where there are errors.
+
+    `findings`: errors and warnings, in the order of the file. `places`: where each ("link" | "joint", name) is written.
+    """
+
+    name: str
+    root: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    transmissions: tuple[TransmissionTag, ...]
+    places: Mapping[tuple[str, str], Place]
+    findings: tuple[Finding, ...]
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        return tuple(finding for finding in self.findings if finding.severity == "error")
+
+
+def read_parts(description: Description) -> Parts:
+    """Links, joints (parents before children, depth first) and transmissions of a description, with all findings."""
+    reader = Reader()
+    root = description.root
+    places: dict[tuple[str, str], Place] = {}
+    name = root.attributes.get("name", "").strip()
+    if not name:
+        reader.report("URDF003", "<robot> has no attribute 'name'", root.place, severity="warning")
+    links_by_name = _named(reader, root, "link", places)
+    joints_by_name = _named(reader, root, "joint", places)
+    if not links_by_name:
+        reader.report("URDF007", "the description has no link", root.place)
+    materials = read_materials(reader, root)
+    links = {key: read_link(reader, each, key, description.packages, materials) for key, each in links_by_name.items()}
+    joints = {key: read_joint(reader, element, key) for key, element in joints_by_name.items()}
+    known = {key: joint for key, joint in joints.items() if joint is not None}
+    top = check_tree(reader, tuple(links), joints, places) if links else ""
+    known = resolve_mimics(reader, known, tuple(joints), places)
+    transmissions = read_transmissions(reader, root, tuple(joints))
+    ordered = depth_first(top, known) if top else tuple(known.values())
+    order = [top, *(joint.child for joint in ordered)] if top else list(links)
+    return Parts(
+        name=name or description.path.stem.partition(".")[0],
+        root=top,
+        links=tuple(links[link] for link in order if link in links),
+        joints=ordered,
+        transmissions=transmissions,
+        places=places,
+        findings=(*description.findings, *reader.findings),
+    )
+
+
+def _named(reader: Reader, root: Element, tag: str, places: dict[tuple[str, str], Place]) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for element in root.all(tag):
+        name = reader.name(element)
+        if name is None:
+            continue
+        if name in found:
+            message = f"{tag} '{name}' is written twice; the first is at {found[name].place}"
+            reader.report("URDF005", message, element.place)
+            continue
+        found[name] = element
+        if element.place is not None:
+            places[(tag, name)] = element.place
+    return found

@@ -1,0 +1,204 @@
+"""<joint> and <transmission>."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Literal
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.model.located_xml import Element
+from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, TransmissionTag
+from manipcli.model.urdf_numbers import Reader, nearest
+
+_TYPES: dict[str, JointType] = {
+    "revolute": "revolute",
+    "continuous": "continuous",
+    "prismatic": "prismatic",
+    "fixed": "fixed",
+}
+UNIT_TOLERANCE = 1e-3
+"""How far the length of an axis may be from 1 without a word."""
+
+
+def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
+    """The joint that `element` describes, or None with findings. Its links and its mimic are not looked up here."""
+    text = element.attributes.get("type")
+    kind = _TYPES.get(text or "")
+    if kind is None:
+        what = f"unknown type '{text}'" if text else "no attribute 'type'"
+        hint = nearest(text or "", _TYPES)
+        if text in {"floating", "planar"}:
+            what, hint = f"type '{text}', which is not supported", "use several joints of one degree of freedom"
+        reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=hint)
+    ends = [_end(reader, element, name, tag) for tag in ("parent", "child")]
+    X_PJ = reader.origin(element)
+    dynamics = element.first("dynamics")
+    damping = friction = 0.0
+    if dynamics is not None:
+        damping = _not_negative(reader, dynamics, "damping", name) or 0.0
+        friction = _not_negative(reader, dynamics, "friction", name) or 0.0
+    if kind is None or ends[0] is None or ends[1] is None:
+        return None
+    moves = kind != "fixed"
+    axis = _axis(reader, element, name) if moves else frozen([1.0, 0.0, 0.0])
+    limits = _limits(reader, element, name, kind) if moves else JointLimits()
+    if axis is None or limits is None:
+        return None
+    return Joint(
+        name=name,
+        type=kind,
+        parent=ends[0],
+        child=ends[1],
+        X_PJ=X_PJ,
+        axis=axis,
+        limits=limits,
+        mimic=_mimic(reader, element) if moves else None,
+        damping=damping if moves else 0.0,
+        friction=friction if moves else 0.0,
+    )
+
+
+def _end(reader: Reader, element: Element, name: str, tag: Literal["parent", "child"]) -> str | None:
+    end = element.first(tag)
+    if end is None:
+        reader.report("URDF006", f"joint '{name}' has no <{tag} link=\"...\"/>", element.place)
+        return None
+    return reader.name(end, "link")
+
+
+def _axis(reader: Reader, element: Element, name: str) -> Array | None:
+    """Unit axis; x where none is written."""
+    axis = element.first("axis")
+    if axis is None or "xyz" not in axis.attributes:
+        return frozen([1.0, 0.0, 0.0])
+    values = reader.numbers(axis, "xyz", 3)
+    if values is None:
+        return None
+    length = math.hypot(*values)
+    if length < 1e-9:
+        reader.report("URDF009", f"joint '{name}' has the axis 0 0 0; expected a direction", axis.place)
+        return None
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        message = f"joint '{name}': the axis has length {length:g}; its direction is used"
+        reader.report("URDF034", message, axis.place, severity="warning")
+    unit = np.array(values)
+    # An axis as near to unit length as numbers can say stays as written: reading what we wrote changes nothing.
+    return frozen(unit if abs(length - 1.0) < 1e-15 else unit / length)
+
+
+def _not_negative(reader: Reader, element: Element, attribute: str, joint: str) -> float | None:
+    value = reader.number(element, attribute)
+    if value is not None and value < 0.0:
+        message = f"joint '{joint}': {attribute} is {value:g}; expected 0 or more"
+        reader.report("URDF010", message, element.place)
+        return None
+    return value
+
+
+def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits | None:
+    limit = element.first("limit")
+    if limit is None:
+        if kind == "continuous":
+            return JointLimits()
+        hint = '<limit lower="..." upper="..." velocity="..." effort="..."/>'
+        reader.report("URDF010", f"joint '{name}' is {kind} and has no <limit>", element.place, hint=hint)
+        return None
+    lower = reader.number(limit, "lower", 0.0)
+    upper = reader.number(limit, "upper", 0.0)
+    velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
+    if kind == "continuous":
+        return JointLimits(velocity=velocity, effort=effort)
+    if lower is not None and upper is not None and lower > upper:
+        message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"
+        reader.report("URDF010", message, limit.place)
+        return None
+    if lower == upper:
+        message = f"joint '{name}' cannot move: lower and upper are both {lower:g}"
+        reader.report("URDF035", message, limit.place, severity="warning")
+    return JointLimits(lower=lower, upper=upper, velocity=velocity, effort=effort)
+
+
+def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float | None:
+    """A limit of velocity or effort; 0 and nothing both count as not stated."""
+    value = _not_negative(reader, limit, attribute, joint)
+    if value:
+        return value
+    if value == 0.0 or attribute not in limit.attributes:
+        how = "is 0" if value == 0.0 else "is missing"
+        message = f"joint '{joint}': the {attribute} limit {how}; it counts as not stated"
+        hint = f"state it in the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
+        reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
+    return None
+
+
+def _mimic(reader: Reader, element: Element) -> Mimic | None:
+    mimic = element.first("mimic")
+    if mimic is None:
+        return None
+    joint = reader.name(mimic, "joint")
+    multiplier = reader.number(mimic, "multiplier", 1.0)
+    offset = reader.number(mimic, "offset", 0.0)
+    if joint is None or multiplier is None or offset is None:
+        return None
+    return Mimic(joint=joint, multiplier=multiplier, offset=offset)
+
+
+def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -> tuple[TransmissionTag, ...]:
+    """Every <transmission>, of ROS 1 (below <robot>) and of ros2_control (below <ros2_control>)."""
+    elements = [*root.all("transmission")]
+    for control in root.all("ros2_control"):
+        elements += control.all("transmission")
+    found = (_transmission(reader, element, joints) for element in elements)
+    return tuple(tag for tag in found if tag is not None)
+
+
+def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
+    name = element.attributes.get("name", "").strip() or "(without a name)"
+    kind = element.first("type") or element.first("plugin")
+    if kind is None or not kind.text:
+        message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
+        reader.report("URDF015", message, element.place)
+        return None
+    joint_elements = _by_role(element.all("joint"))
+    actuator_elements = _by_role(element.all("actuator"))
+    joint_names = [reader.name(joint) for joint in joint_elements]
+    actuator_names = [reader.name(actuator) for actuator in actuator_elements]
+    for joint, joint_name in zip(joint_elements, joint_names, strict=True):
+        if joint_name is not None and joint_name not in joints:
+            message = f"transmission '{name}' names joint '{joint_name}', which is not in the description"
+            reader.report("URDF015", message, joint.place, hint=nearest(joint_name, joints))
+    if not joint_elements:
+        reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
+    reductions = [_reduction(reader, each, name) for each in (*joint_elements, *actuator_elements)]
+    return TransmissionTag(
+        name=name,
+        type=kind.text.rpartition("/")[2],
+        joints=tuple(joint or "" for joint in joint_names),
+        joint_reductions=tuple(reductions[: len(joint_elements)]),
+        joint_offsets=tuple(reader.text_number(joint.first("offset"), 0.0) for joint in joint_elements),
+        actuators=tuple(actuator or "" for actuator in actuator_names),
+        actuator_reductions=tuple(reductions[len(joint_elements) :]),
+    )
+
+
+def _by_role(elements: tuple[Element, ...]) -> list[Element]:
+    """In the order of their roles (joint1, joint2, ...) where they have roles, else as written."""
+
+    def role(element: Element) -> str:
+        child = element.first("role")
+        return child.text if child is not None else element.attributes.get("role", "")
+
+    return sorted(elements, key=role)
+
+
+def _reduction(reader: Reader, element: Element, transmission: str) -> float:
+    child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
+    value = reader.text_number(child, 1.0)
+    if value == 0.0:
+        message = f"transmission '{transmission}': a reduction of 0 is not possible"
+        reader.report("URDF015", message, (child or element).place)
+        return 1.0
+    return value

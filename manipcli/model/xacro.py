@@ -1,0 +1,294 @@
+"""Expands xacro with the library, but as data: no expression runs code, no environment is read, no file is far away.
+
+The library's module is loaded a second time for each expansion and its doors are replaced in that private copy: reading
+files, evaluating expressions and `$(...)`, loading YAML, warnings. The module that others import stays as it is.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import threading
+import xml.dom.minidom
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.dom.minidom import Document
+from xml.dom.minidom import Element as DomElement
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.model.expression import Evaluator, Refused, bounded, math_symbols, python_symbols
+from manipcli.model.located_xml import invalid, place_of, read_document
+from manipcli.model.packages import NotFound, Packages
+from manipcli.model.xacro_yaml import load_yaml
+
+MAX_EXPANSIONS = 100_000
+MAX_MACRO_DEPTH = 64
+MAX_INCLUDE_DEPTH = 32
+_loading = threading.Lock()
+
+
+def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> tuple[Document, tuple[Finding, ...]]:
+    """The document of a xacro file with everything expanded; its elements know where they were written.
+
+    Args:
+        path: the file.
+        arguments: values of `<xacro:arg>`.
+        packages: finds what it includes.
+
+    Returns:
+        The document and the warnings that the description itself or the expansion gave.
+
+    Raises:
+        InvalidInput: with the place of the innermost element that was being expanded, and the macros around it.
+    """
+    return _Expansion(packages).run(path, arguments)
+
+
+def _private_module() -> ModuleType:
+    """A copy of the xacro module of our own."""
+    with _loading:
+        # xacro replaces this method of the standard library when it is loaded; others keep the original.
+        original = xml.dom.minidom.Element.writexml
+        try:
+            spec = importlib.util.find_spec("xacro")
+            if spec is None or spec.loader is None:
+                raise invalid("XACRO001", "the Python package 'xacro' is not installed")
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+        finally:
+            xml.dom.minidom.Element.writexml = original  # type: ignore[method-assign]
+    return module
+
+
+class _Expansion:
+    """The doors of one private module, and what they count."""
+
+    def __init__(self, packages: Packages) -> None:
+        self._packages = packages
+        self._module = _private_module()
+        self._evaluate = Evaluator()
+        self._findings: list[Finding] = []
+        self._current: DomElement | None = None
+        self._calls: list[DomElement] = []
+        self._expansions = 0
+        self._known_arguments: set[str] = set()
+        module = self._module
+        self._eval_all = module.eval_all
+        self._eval_text = module.eval_text
+        self._macro_call = module.handle_macro_call
+        self._check = module.check_attrs
+        self._required = module.reqd_attrs
+        doors: dict[str, Callable[..., object]] = {
+            "parse": self._door_parse,
+            "safe_eval": self._door_eval,
+            "eval_extension": self._door_extension,
+            "load_yaml": self._load_yaml,
+            "get_include_files": self._door_include_files,
+            "eval_all": self._door_eval_all,
+            "eval_text": self._door_eval_text,
+            "handle_macro_call": self._door_macro_call,
+            "check_attrs": self._door_check_attrs,
+            "reqd_attrs": self._door_reqd_attrs,
+            "warning": self._warn,
+            "error": self._warn,
+            "message": lambda *words, **options: "",
+            "print_location": lambda: None,
+        }
+        for name, door in doors.items():
+            setattr(module, name, door)
+        module._global_symbols = self._symbols()  # type: ignore[attr-defined]
+
+    def run(self, path: Path, arguments: Mapping[str, str]) -> tuple[Document, tuple[Finding, ...]]:
+        module = self._module
+        document = read_document(path)
+        self._current = document.documentElement
+        module.init_stacks(str(path))
+        try:
+            module.process_doc(document, mappings=dict(arguments), verbosity=0)
+        except InvalidInput:
+            raise
+        except RecursionError as error:
+            raise invalid("XACRO001", "macros, properties or elements are nested too deep", self._place()) from error
+        except MemoryError as error:
+            raise invalid("XACRO001", "the description needs too much memory", self._place()) from error
+        except Exception as error:
+            raise self._failed(error) from error
+        unknown = [name for name in arguments if name not in self._known_arguments]
+        if unknown:
+            known = ", ".join(sorted(self._known_arguments)) or "none"
+            raise invalid(
+                "XACRO003",
+                f"the description has no argument {', '.join(repr(name) for name in unknown)}; it has: {known}",
+                place_of(document.documentElement) if document.documentElement else None,
+            )
+        return document, tuple(self._findings)
+
+    def _place(self) -> Place | None:
+        return place_of(self._current) if self._current is not None else None
+
+    def _failed(self, error: Exception) -> InvalidInput:
+        cause: BaseException | None = error
+        refused = False
+        while cause is not None:
+            refused = refused or isinstance(cause, Refused)
+            cause = getattr(cause, "exc", None) or cause.__cause__
+        message = "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(error)
+        around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
+        hint = "expanded from " + ", from ".join(around[:8]) if around else None
+        if refused:
+            hint = "descriptions are data: expressions compute numbers and text and cannot run code"
+        return invalid("XACRO002" if refused else "XACRO001", message, self._place(), hint)
+
+    def _warn(self, *words: object, **options: object) -> str:
+        message = " ".join(str(word) for word in words)
+        self._findings.append(Finding("XACRO010", message, self._place(), severity="warning"))
+        return ""
+
+    # --- the doors, in the library's signatures ---
+
+    def _door_parse(self, inp: object, filename: str | None = None) -> Document:
+        if len(self._module.filestack) > MAX_INCLUDE_DEPTH:
+            raise Refused(f"files include each other more than {MAX_INCLUDE_DEPTH} deep")
+        return read_document(Path(str(filename)))
+
+    def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
+        return self._evaluate(expr, globals)
+
+    def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
+        return bounded(self._eval_text(text, symbols))
+
+    def _door_eval_all(self, node: DomElement, macros: object, symbols: object) -> None:
+        self._count()
+        self._current = node if place_of(node) is not None else self._current
+        self._eval_all(node, macros, symbols)
+
+    def _door_macro_call(self, node: DomElement, macros: object, symbols: object) -> bool:
+        if not node.tagName.startswith("xacro:"):
+            return False
+        self._current = node
+        if node.tagName == "xacro:call":
+            return bool(self._macro_call(node, macros, symbols))
+        self._count()
+        if len(self._calls) >= MAX_MACRO_DEPTH:
+            raise Refused(f"macros call each other more than {MAX_MACRO_DEPTH} deep")
+        self._calls.append(node)
+        done = bool(self._macro_call(node, macros, symbols))
+        self._calls.pop()
+        return done
+
+    def _count(self) -> None:
+        self._expansions += 1
+        if self._expansions > MAX_EXPANSIONS:
+            raise Refused(f"more than {MAX_EXPANSIONS} elements are expanded")
+
+    def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
+        self._current = tag
+        found: list[str | None] = self._check(tag, required, optional)
+        if tag.tagName == "xacro:arg":
+            self._known_arguments.add(str(found[0]))
+        return found
+
+    def _door_reqd_attrs(self, tag: DomElement, names: list[str]) -> list[str]:
+        self._current = tag
+        found: list[str] = self._required(tag, names)
+        return found
+
+    def _door_include_files(self, filename_spec: str, symbols: Mapping[str, object]) -> Iterator[str]:
+        spec = str(self._door_eval_text(filename_spec, symbols))
+        if any(character in spec for character in "*[?"):
+            folder = self._folder() / Path(spec).parent
+            names = sorted(str(path) for path in folder.glob(Path(spec).name))
+            if not names:
+                self._warn(f"'{spec}' matches no file")
+        else:
+            names = [spec]
+        for name in names:
+            try:
+                yield str(self._packages.resolve(name, relative_to=self._folder()))
+            except NotFound as error:
+                raise self._exception(error.message, exc=FileNotFoundError(error.hint or "")) from error
+
+    def _exception(self, message: str, **details: object) -> Exception:
+        created: Exception = self._module.XacroException(message, **details)
+        return created
+
+    def _folder(self) -> Path:
+        return Path(str(self._module.filestack[-1])).parent
+
+    def _door_extension(self, text: str) -> object:
+        command, _, rest = text[2:-1].strip().partition(" ")
+        rest = rest.strip()
+        if command == "find":
+            return str(self._packages.root(rest))
+        if command == "arg":
+            return self._argument(rest)
+        if command == "dirname":
+            return str(self._folder())
+        if command == "eval":
+            names: dict[str, object] = {**math_symbols(), **python_symbols(), "true": True, "false": False}
+            names |= {name: _typed(value) for name, value in self._arguments().items()}
+            names["arg"] = lambda name: _typed(self._argument(name))
+            names["find"] = lambda name: str(self._packages.root(name))
+            return str(self._evaluate(rest, names))
+        if command in {"env", "optenv", "command", "cwd", "anon"}:
+            raise Refused(f"$({command} ...) is not allowed in a description; pass an argument ($(arg NAME)) instead")
+        raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
+
+    def _arguments(self) -> dict[str, str]:
+        found: dict[str, str] = self._module.substitution_args_context["arg"]
+        return found
+
+    def _argument(self, name: str) -> str:
+        self._known_arguments.add(name)
+        try:
+            return self._arguments()[name]
+        except KeyError:
+            raise NameError(f"argument '{name}' is not given and has no default") from None
+
+    def _load_yaml(self, name: str) -> object:
+        path = self._packages.resolve(name, relative_to=self._folder())
+        return self._module.YamlListWrapper.wrap(load_yaml(path, lambda text: self._evaluate(text, math_symbols())))
+
+    def _absolute(self, name: str) -> str:
+        return str(self._folder() / name)
+
+    def _fatal(self, *words: object) -> object:
+        raise self._exception(" ".join(str(word) for word in words))
+
+    def _symbols(self) -> dict[str, object]:
+        def namespace(symbols: dict[str, object]) -> Any:
+            created = self._module.NameSpace()
+            for name, value in symbols.items():
+                dict.__setitem__(created, name, value)
+            return created
+
+        own: dict[str, object] = {
+            "load_yaml": self._load_yaml,
+            "abs_filename": self._absolute,
+            "dotify": self._module.YamlDictWrapper,
+        }
+        speak = {"warning": self._warn, "error": self._warn, "message": lambda *words: "", "fatal": self._fatal}
+        plain = python_symbols()
+        everything: dict[str, object] = {**math_symbols(), **plain, **own}
+        return everything | {
+            "python": namespace(plain),
+            "math": namespace(math_symbols()),
+            "xacro": namespace({**own, **speak, "tokenize": _tokenize, "arg": self._argument}),
+        }
+
+
+def _typed(text: str) -> object:
+    """An argument as `$(eval)` sees it: a number or truth value where it is one."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)
+
+
+def _tokenize(text: str, sep: str = ",; ", skip_empty: bool = True) -> list[str]:
+    for character in sep:
+        text = text.replace(character, "\0")
+    return [token for token in text.split("\0") if token or not skip_empty]
