@@ -12,15 +12,10 @@ import re
 import sys
 from typing import TextIO
 
+from manipcli.core.text import escape
+
 _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[": "36", "hint:": "36"}
 _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
-# C0 without tab and newline, DEL, C1, and the marks that reverse the direction of text.
-_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-
-
-def escape(text: str) -> str:
-    """`text` without anything that a terminal obeys instead of showing."""
-    return _CONTROL.sub(lambda match: match.group().encode("unicode_escape").decode("ascii"), text)
 
 
 def prepare() -> None:
@@ -64,7 +59,7 @@ def _is_terminal(stream: TextIO | None) -> bool:
 
 
 def _dressed(text: str, stream: TextIO | None) -> str:
-    text = escape(text)
+    text = "\n".join(map(escape, text.split("\n")))
     if not _is_terminal(stream) or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return text
     return _PAINTED.sub(lambda match: f"\x1b[{_COLOURS[match.group()]}m{match.group()}\x1b[0m", text)

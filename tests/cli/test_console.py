@@ -17,18 +17,21 @@ class Terminal(io.StringIO):
 
 
 @given(st.text())
-def test_escaped_text_holds_no_control_character(text: str) -> None:
-    for character in console.escape(text):
-        assert character in "\n\t" or (ord(character) >= 0x20 and not 0x7F <= ord(character) <= 0x9F)
+def test_no_control_character_reaches_the_terminal(text: str) -> None:
+    terminal = Terminal()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NO_COLOR", "1")
+        patch.setattr("sys.stdout", terminal)
+        console.result(text)
+    for character in terminal.getvalue():
+        assert character == "\n" or (ord(character) >= 0x20 and not 0x7F <= ord(character) <= 0x9F)
 
 
-@given(st.text(st.characters(exclude_categories=["Cc", "Cf"])))
-def test_ordinary_text_is_left_alone(text: str) -> None:
-    assert console.escape(text) == text
-
-
-def test_a_title_in_a_file_cannot_recolour_the_terminal() -> None:
-    assert console.escape("\x1b[31mred\u202e") == "\\x1b[31mred\\u202e"
+def test_a_title_in_a_file_cannot_recolour_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = io.StringIO()
+    monkeypatch.setattr("sys.stdout", plain)
+    console.result("\x1b[31mred\u202e\nnext")
+    assert plain.getvalue() == "\\x1b[31mred\\u202e\nnext\n"
 
 
 @pytest.mark.parametrize(

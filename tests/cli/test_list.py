@@ -1,0 +1,74 @@
+"""`manipcli list`: the words that the registries hold, and the files that lie below this folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from manipcli.cli.app import main
+
+FILES = {
+    "tasks/b.yaml": "task: b\nrobot: r.yaml\n",
+    "tasks/a.yml": "task: a\n",
+    "robots/r.yaml": "robot: r\n",
+    "controllers/own.yaml": "controllers: {}\n",
+    "controllers/ros1.yaml": "arm_controller: {type: effort_controllers/JointTrajectoryController}\n",
+    "controllers/ros2.yaml": "controller_manager: {ros__parameters: {}}\n",
+    ".hidden/c.yaml": "task: c\n",
+    "broken.yaml": "task: [\n",
+    "other.yaml": "- 1\n",
+    "notes.yxml": "task: no\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, text in FILES.items():
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        ("tasks", ["tasks/a.yml", "tasks/b.yaml"]),
+        ("robots", ["robots/r.yaml"]),
+        ("controllers", ["controllers/own.yaml", "controllers/ros1.yaml", "controllers/ros2.yaml"]),
+    ],
+)
+def test_files_are_known_by_their_top_level_key(
+    folder: Path, capsys: pytest.CaptureFixture[str], kind: str, names: list[str]
+) -> None:
+    assert main(["list", kind]) == 0
+    assert capsys.readouterr().out.splitlines() == names
+
+
+@pytest.mark.parametrize(
+    ("kind", "some"),
+    [
+        ("steps", {"move", "pick", "pour"}),
+        ("conditions", {"inside", "upright", "near"}),
+        ("expectations", {"inside", "tracking", "duration", "step_done", "no_collision"}),
+        ("engines", {"pybullet", "kinematic"}),
+        ("shapes", {"box", "sphere", "cylinder", "cup", "tray"}),
+    ],
+)
+def test_words_are_those_of_the_registries(capsys: pytest.CaptureFixture[str], kind: str, some: set[str]) -> None:
+    assert main(["list", kind]) == 0
+    listed = set(capsys.readouterr().out.split())
+    assert listed >= some
+    assert "pose" not in listed
+
+
+def test_all_kinds_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "--format", "json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["robots"] == ["robots/r.yaml"]
+    assert "move" in answer["steps"]
+    assert main(["list"]) == 0
+    assert "robots: robots/r.yaml" in capsys.readouterr().out
