@@ -1,0 +1,276 @@
+"""Where bodies come to stand, and every fault of a scene that is found before anything runs."""
+
+from __future__ import annotations
+
+import itertools
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.model.build_scene import build_scene
+from manipcli.model.robot import Box, Cylinder
+from manipcli.model.scene import Scene
+from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
+
+DESK: dict[str, Any] = {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0, 0.2]}, "fixed": True}
+CUP: dict[str, Any] = {"cup": {"radius": 0.036, "height": 0.11, "wall": 0.004}, "mass": 0.15}
+BALL: dict[str, Any] = {"sphere": {"radius": 0.014}, "mass": 0.01}
+CUBE: dict[str, Any] = {"box": {"size": [0.1, 0.1, 0.1]}, "mass": 1.0}
+
+
+def task(scene: dict[str, Any], **more: Any) -> TaskSpec:
+    return TaskSpec.model_construct(
+        **{
+            "task": "t",
+            "scene": {name: BodySpec.model_validate(body) for name, body in scene.items()},
+            "frames": {name: FrameSpec.model_validate(f) for name, f in more.pop("frames", {}).items()},
+            **more,
+        }
+    )
+
+
+def built(scene: dict[str, Any], **more: Any) -> Scene:
+    return build_scene(task(scene, **more))
+
+
+def findings(scene: dict[str, Any], **more: Any) -> tuple[Finding, ...]:
+    with pytest.raises(InvalidInput) as caught:
+        built(scene, **more)
+    return caught.value.findings
+
+
+def only(scene: dict[str, Any], **more: Any) -> Finding:
+    (found,) = findings(scene, **more)
+    return found
+
+
+def test_floor_comes_first_and_its_top_is_at_zero() -> None:
+    scene = built({"desk": DESK, "cup": CUP | {"rests_on": "desk", "at": [0.75, 0.0]}})
+    assert [body.name for body in scene.bodies] == ["floor", "desk", "cup"]
+    floor = scene.body("floor")
+    assert floor.fixed
+    assert floor.X_WO.p[2] + floor.size[2] / 2 == pytest.approx(0.0, abs=1e-15)
+    assert [body.name for body in scene.movable] == ["cup"]
+
+
+def test_a_scene_without_floor_has_none() -> None:
+    assert [body.name for body in built({"desk": DESK}, floor=False).bodies] == ["desk"]
+
+
+@pytest.mark.parametrize(
+    ("body", "height"),
+    [(CUP, 0.4), (CUBE, 0.45), (BALL, 0.414), ({"cylinder": {"radius": 0.1, "height": 0.2}, "mass": 1.0}, 0.4)],
+)
+def test_what_rests_on_a_desk_touches_its_top(body: dict[str, Any], height: float) -> None:
+    made = built({"desk": DESK, "thing": body | {"rests_on": "desk", "at": [0.7, 0.1], "yaw": 0.3}}).body("thing")
+    np.testing.assert_allclose(made.X_WO.p, [0.7, 0.1, height], atol=1e-15)
+    np.testing.assert_allclose(made.X_WO.rpy, [0.0, 0.0, 0.3], atol=1e-15)
+
+
+def test_a_tower_is_built_whatever_its_order() -> None:
+    tower = {
+        "top": CUBE | {"rests_on": "middle", "at": [0.0, 0.0]},
+        "middle": CUBE | {"rests_on": "bottom", "at": [0.0, 0.0]},
+        "bottom": {"cylinder": {"radius": 0.2, "height": 0.3}, "mass": 1.0, "rests_on": "floor", "at": [0.0, 0.0]},
+    }
+    for order in itertools.permutations(tower):
+        scene = built({name: tower[name] for name in order})
+        assert [body.name for body in scene.bodies] == ["floor", *order]
+        heights = [scene.body(name).X_WO.p[2] for name in ("bottom", "middle", "top")]
+        np.testing.assert_allclose(heights, [0.0, 0.35, 0.45], atol=1e-15)
+
+
+def test_what_is_inside_a_cup_lies_on_its_floor() -> None:
+    cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
+    scene = built({"ball": BALL | {"inside": "cup"}, "desk": DESK, "cup": cup})
+    np.testing.assert_allclose(scene.body("ball").X_WO.p, [0.75, 0.0, 0.4 + 0.004 + 0.014], atol=1e-15)
+
+
+def test_what_is_inside_a_tilted_tray_lies_on_its_floor() -> None:
+    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [1, 2, 3], "rpy": [0.5, 0, 0]}, "mass": 1}
+    scene = built({"tray": tray, "ball": BALL | {"inside": "tray"}})
+    up = np.array([0.0, -np.sin(0.5), np.cos(0.5)])
+    np.testing.assert_allclose(scene.body("ball").X_WO.p, [1, 2, 3] + (0.01 + 0.014) * up, atol=1e-12)
+
+
+def test_hollow_of_cup_and_tray_end_at_walls_floor_and_rim() -> None:
+    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [2, 0, 0]}, "mass": 1}
+    scene = built({"cup": CUP | {"rests_on": "floor", "at": [0.0, 0.0]}, "tray": tray})
+    cup, hollow = scene.body("cup").interior, scene.body("tray").interior
+    assert cup is not None
+    assert hollow is not None
+    assert isinstance(cup.shape, Cylinder)
+    assert (cup.shape.radius, cup.shape.length) == pytest.approx((0.032, 0.106))
+    np.testing.assert_allclose(cup.X_OS.p, [0.0, 0.0, 0.057])
+    assert isinstance(hollow.shape, Box)
+    assert hollow.shape.size == pytest.approx((0.28, 0.18, 0.04))
+    np.testing.assert_allclose(hollow.X_OS.p, [0.0, 0.0, 0.03])
+
+
+def test_no_wall_of_a_cup_reaches_into_its_hollow_and_no_gap_is_left_between_walls() -> None:
+    cup = built({"cup": CUP | {"rests_on": "floor", "at": [0.0, 0.0]}}).body("cup")
+    angles = np.linspace(0.0, 2 * np.pi, 721)
+    for radius, filled in ((0.03199, False), (0.034, True), (0.0359, True)):
+        points = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full_like(angles, 0.05)], axis=-1)
+        hit = np.zeros(len(points), dtype=bool)
+        for wall in cup.geometries[1:]:
+            assert isinstance(wall.shape, Box)
+            hit |= np.all(np.abs((points - wall.X_LS.p) @ wall.X_LS.R) <= np.array(wall.shape.size) / 2, axis=-1)
+        # Outside the middle of the walls neighbours gape at the outer corners; that is no way through.
+        assert np.all(hit == filled) if radius < 0.035 else np.mean(hit) > 0.9
+
+
+def test_fixed_bodies_weigh_nothing_and_movable_ones_what_is_written() -> None:
+    scene = built({"desk": DESK | {"mass": 20.0}, "cube": CUBE | {"rests_on": "desk", "at": [0.7, 0.0]}})
+    assert scene.body("desk").mass == 0.0
+    assert scene.body("cube").mass == 1.0
+    np.testing.assert_allclose(scene.body("cube").inertia, np.eye(3) * (0.01 / 6), rtol=1e-12)
+
+
+def test_frames_hang_on_world_and_bodies() -> None:
+    scene = built({"desk": DESK}, frames={"drop": {"parent": "desk", "pose": {"xyz": [0, 0, 0.3]}}, "view": {}})
+    assert [(frame.name, frame.parent) for frame in scene.frames] == [("drop", "desk"), ("view", "world")]
+    np.testing.assert_allclose(scene.frames[0].X_PF.p, [0, 0, 0.3])
+
+
+def test_a_finding_carries_its_place() -> None:
+    where = {("scene", "ball", "inside"): Place("pour.yaml", 7, 40)}
+    spec = task({"desk": DESK, "cup": CUP | {"rests_on": "desk", "at": [0.75, 0]}, "ball": BALL | {"inside": "cop"}})
+    with pytest.raises(InvalidInput) as caught:
+        build_scene(spec, place=where.get)
+    (found,) = caught.value.findings
+    assert found.place == Place("pour.yaml", 7, 40)
+    assert "'cop' is not in the scene" in found.message
+    assert found.hint == "did you mean 'cup'?"
+
+
+@pytest.mark.parametrize(
+    ("scene", "code", "words"),
+    [
+        ({"x": {"mass": 1, "pose": {}}}, "TASK221", "no shape"),
+        ({"x": CUBE | BALL | {"pose": {"xyz": [0, 0, 1]}}}, "TASK221", "2 shapes (box, sphere)"),
+        ({"x": {"cup": {"radius": 0.03, "height": 0.1, "wall": 0.03}, "mass": 1, "pose": {}}}, "TASK222", "no hollow"),
+        ({"x": {"tray": {"size": [0.3, 0.01, 0.1]}, "mass": 1, "pose": {}}}, "TASK222", "no hollow"),
+        ({"x": {"box": {"size": [1, 1, 1]}, "pose": {"xyz": [0, 0, 1]}}}, "TASK223", "no mass"),
+        ({"x": CUBE}, "TASK224", "no place"),
+        ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "inside": "x"}}, "TASK224", "placed twice"),
+        ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "yaw": 1.0}}, "TASK224", "`pose` and `yaw`"),
+        ({"x": CUBE | {"rests_on": "floor"}}, "TASK224", "needs `at"),
+        ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "at": [0, 0]}}, "TASK224", "`at` without"),
+        ({"desk": DESK, "x": CUBE | {"rests_on": "desk", "at": [0.5, 0]}}, "TASK224", "beside 'desk'"),
+        ({"desk": DESK, "x": BALL | {"inside": "desk"}}, "TASK224", "no inside"),
+        ({"x": CUBE | {"rests_on": "x", "at": [0, 0]}}, "TASK225", "x -> x"),
+        ({"world": CUBE | {"pose": {"xyz": [0, 0, 1]}}}, "TASK220", "cannot be called 'world'"),
+        ({"a/b": CUBE | {"pose": {"xyz": [0, 0, 1]}}}, "TASK220", "no '/'"),
+    ],
+)
+def test_each_fault_is_found(scene: dict[str, Any], code: str, words: str) -> None:
+    found = only(scene)
+    assert found.code == code
+    assert words in found.message
+
+
+def test_nothing_rests_on_a_container_a_ball_or_a_slope() -> None:
+    cup = CUP | {"rests_on": "floor", "at": [0.0, 0.0]}
+    assert only({"cup": cup, "x": BALL | {"rests_on": "cup", "at": [0, 0]}}).hint == "say `inside: cup`"
+    ball = BALL | {"rests_on": "floor", "at": [0.0, 0.0]}
+    assert "no flat top" in only({"ball": ball, "x": CUBE | {"rests_on": "ball", "at": [0, 0]}}).message
+    slope = CUBE | {"pose": {"xyz": [0, 0, 1], "rpy": [0.1, 0, 0]}}
+    assert "tilted" in only({"slope": slope, "x": CUBE | {"rests_on": "slope", "at": [0, 0]}}).message
+
+
+def test_what_is_wider_than_the_hollow_is_refused_with_the_excess() -> None:
+    cup = CUP | {"rests_on": "floor", "at": [0.0, 0.0]}
+    found = only({"cup": cup, "ball": {"sphere": {"radius": 0.034}, "mass": 0.01, "inside": "cup"}})
+    assert "2.0 mm too wide" in found.message
+    tray = {"tray": {"size": [0.12, 0.12, 0.05], "wall": 0.005}, "rests_on": "floor", "at": [0, 0], "mass": 1.0}
+    assert built({"tray": tray, "cube": CUBE | {"inside": "tray"}})
+    found = only({"tray": tray, "cube": CUBE | {"inside": "tray", "yaw": np.pi / 4}})
+    assert "15.7 mm too wide" in found.message  # half the diagonal, 70.7 mm, in a hollow of 55 mm to each side
+
+
+def test_all_faults_of_a_scene_are_told_at_once() -> None:
+    codes = [found.code for found in findings({"a": {"mass": 1, "pose": {}}, "b": CUBE, "c": CUBE | {"inside": "z"}})]
+    assert sorted(codes) == ["TASK221", "TASK224", "TASK225"]
+
+
+def test_a_circle_of_bodies_is_told_once() -> None:
+    circle = {"a": CUBE | {"rests_on": "b", "at": [0, 0]}, "b": CUBE | {"rests_on": "a", "at": [0, 0]}}
+    assert "a -> b -> a" in only(circle).message
+
+
+def test_a_frame_needs_a_parent_and_a_name_of_its_own() -> None:
+    found = only({"desk": DESK}, frames={"drop": {"parent": "dsk"}})
+    assert (found.code, found.hint) == ("TASK227", "did you mean 'desk'?")
+    assert "taken" in only({"desk": DESK}, frames={"desk": {}}).message
+
+
+def test_bodies_that_start_inside_each_other_are_refused_and_touching_ones_are_not() -> None:
+    def pair(gap: float) -> dict[str, Any]:
+        at = {"xyz": [0.1 + gap, 0, 0.05]}
+        return {"a": CUBE | {"rests_on": "floor", "at": [0, 0]}, "b": CUBE | {"pose": at}}
+
+    assert built(pair(0.0))
+    found = only(pair(-0.02))
+    assert (found.code, found.message) == ("TASK226", "'a' and 'b' start 20.0 mm inside each other")
+
+
+def test_bounding_boxes_that_overlap_are_no_fault() -> None:
+    # Two balls, one diagonally above the other: their boxes overlap by 10 mm, they are 21 mm apart.
+    balls = {
+        "a": {"sphere": {"radius": 0.05}, "mass": 1, "pose": {"xyz": [0, 0, 0.05]}},
+        "b": {"sphere": {"radius": 0.05}, "mass": 1, "pose": {"xyz": [0.09, 0, 0.14]}},
+    }
+    assert built(balls)
+
+
+def test_two_fixed_bodies_may_overlap() -> None:
+    assert built(
+        {"desk": DESK, "rail": {"box": {"size": [1, 0.1, 0.1]}, "pose": {"xyz": [0.85, 0, 0.4]}, "fixed": True}}
+    )
+
+
+def stl(path: Path, triangles: list[list[tuple[float, float, float]]]) -> None:
+    data = bytes(80) + struct.pack("<I", len(triangles))
+    for triangle in triangles:
+        data += struct.pack("<12fH", 0.0, 0.0, 0.0, *itertools.chain.from_iterable(triangle), 0)
+    path.write_bytes(data)
+
+
+def cuboid(low: tuple[float, float, float], high: tuple[float, float, float]) -> list[list[tuple[float, float, float]]]:
+    corners = [tuple((low, high)[(k >> i) & 1][i] for i in range(3)) for k in range(8)]
+    quads = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    return [[corners[i] for i in part] for a, b, c, d in quads for part in ((a, b, c), (a, c, d))]  # type: ignore[misc]
+
+
+def test_a_mesh_of_a_box_weighs_and_stands_like_the_box(tmp_path: Path) -> None:
+    stl(tmp_path / "part.stl", cuboid((0.0, 0.0, 0.0), (100.0, 200.0, 300.0)))
+    part = {"mesh": {"file": "part.stl", "scale": 0.001}, "mass": 2.0, "rests_on": "floor", "at": [0, 0]}
+    made = build_scene(task({"part": part}), resolve=lambda name: tmp_path / name).body("part")
+    np.testing.assert_allclose(made.X_WO.p, [0, 0, 0], atol=1e-7)
+    np.testing.assert_allclose(made.size, [0.1, 0.2, 0.3], rtol=1e-6)
+    np.testing.assert_allclose(made.X_OI.p, [0.05, 0.1, 0.15], rtol=1e-6)
+    along_body = made.X_OI.R @ made.inertia @ made.X_OI.R.T
+    box = 2.0 / 12 * np.diag([0.2**2 + 0.3**2, 0.1**2 + 0.3**2, 0.1**2 + 0.2**2])
+    np.testing.assert_allclose(along_body, box, rtol=1e-6, atol=1e-9)  # the file's numbers are single precision
+
+
+def test_a_mesh_that_is_absent_flat_or_no_mesh_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "text.stl").write_text("not a mesh")
+    (tmp_path / "part.step").write_text("")
+    stl(tmp_path / "flat.stl", [[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(1, 0, 0), (1, 1, 0), (0, 1, 0)]])
+    for name, words in (
+        ("none.stl", "no file"),
+        ("text.stl", "cannot be used"),
+        ("part.step", "must end in"),
+        ("flat.stl", "cannot be used"),
+    ):
+        with pytest.raises(InvalidInput) as caught:
+            build_scene(task({"x": {"mesh": {"file": name}, "mass": 1, "pose": {}}}), resolve=lambda n: tmp_path / n)
+        (found,) = caught.value.findings
+        assert found.code == "TASK222"
+        assert words in found.message
