@@ -32,6 +32,9 @@ from manipcli.spec.controllers import GainsSpec
 REACHED = 1e-9
 """rad or m: a reference this close to its target has arrived."""
 
+UNTIL_CHANGED = 1 << 62
+"""Ticks: more than any run has."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GripperGoal:
@@ -119,6 +122,9 @@ class GripperController:
         self._moved: list[float] = []
         self._texts: list[str] = []
         self._moving = np.zeros(n)
+        self._targets: list[float] = [0.0] * n
+        self._ticks_left = 0
+        self._period = math.nan
 
     def _parted(self, fingers: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
         n = len(self.joints)
@@ -158,7 +164,9 @@ class GripperController:
         self._target, self._force, self._fingers = target, goal.force, fingers
         self._stops = [None] * len(fingers)
         self._texts = [""] * len(fingers)
+        self._targets = target.tolist()
         self._moving = np.ones(n)
+        self._ticks_left = 0
         self._starts = True
         self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
         return self._goal
@@ -200,7 +208,8 @@ class GripperController:
                 self._began = time
                 self._moved = [time] * len(self._fingers)
             self._judge(time, measured, contact_force)
-            self._ramp(period)
+            if self._goal is not None:
+                self._ramp(period)
         np.subtract(self._reference, measured.position, out=self._error)
         np.subtract(self._velocity, measured.velocity, out=self._error_rate)
         command = self._pid.update(self._error, period, self._error_rate)
@@ -212,39 +221,57 @@ class GripperController:
 
     def _ramp(self, period: float) -> None:
         """Moves the references of the fingers that have not stopped towards their targets."""
+        if self._ticks_left <= 0 or period != self._period:
+            self._plan_ramp(period)
+        self._ticks_left -= 1
+        self._reference += self._step
+
+    def _plan_ramp(self, period: float) -> None:
+        """The step of every joint's reference, and for how many ticks it stays the same."""
         step, limit = self._step, self._speed * period
-        np.subtract(self._target, self._reference, out=step)
-        step *= self._moving
-        np.minimum(step, limit, out=step)
-        np.maximum(step, -limit, out=step)
-        self._reference += step
+        way = (self._target - self._reference) * self._moving
+        np.minimum(np.maximum(way, -limit), limit, out=step)
         np.divide(step, period, out=self._velocity)
+        self._period = period
+        moves = step != 0.0
+        ticks = np.floor(way[moves] / step[moves])
+        self._ticks_left = int(ticks.min()) if ticks.size else UNTIL_CHANGED
 
     def _judge(self, time: float, measured: JointState, contact_force: Array | None) -> None:
         """Stops the fingers that met something or arrived; ends the goal when all have."""
-        away = np.abs(self._target - measured.position).tolist()
-        left = np.abs(self._target - self._reference).tolist()
-        speed = np.abs(measured.velocity).tolist()
-        force = contact_force.tolist() if contact_force is not None and self._force is not None else None
+        position: list[float] = measured.position.tolist()
+        velocity: list[float] = measured.velocity.tolist()
+        wanted = self._force
+        force = contact_force.tolist() if contact_force is not None and wanted is not None else None
         tolerance, slow = self._goal_tolerance, self._stall_velocity
         for f, finger in enumerate(self._fingers):
             if self._stops[f] is not None:
                 continue
-            if force is not None and self._force is not None:
-                pressed = sum(force[j] for j in finger)
-                if pressed >= self._force:
-                    self._stop(f, "contact", f"contact at {pressed:.3g} N (asked {self._force:.3g} N)")
+            if force is not None and wanted is not None:
+                pressed = 0.0
+                for j in finger:
+                    pressed += force[j]
+                if pressed >= wanted:
+                    self._stop(f, "contact", f"contact at {pressed:.3g} N (asked {wanted:.3g} N)")
                     continue
-            far = [j for j in finger if away[j] > tolerance]
+            far = still = False
+            for j in finger:
+                if abs(self._targets[j] - position[j]) > tolerance:
+                    far = True
+                    if -slow <= velocity[j] <= slow:
+                        still = True
+                    else:
+                        still = False
+                        break
             if not far:
-                if all(left[j] <= REACHED for j in finger):
+                if all(abs(self._target[j] - self._reference[j]) <= REACHED for j in finger):
                     self._stop(f, "reached", "reached its target")
-                continue
-            if any(speed[j] > slow for j in far):
+            elif not still:
                 self._moved[f] = time
             elif time - self._moved[f] >= self._stall_time:
-                j = max(far, key=away.__getitem__)
-                self._stop(f, "stalled", f"stalled {away[j]:.3g} before the target of '{self.joints[j]}'")
+                away = [abs(self._targets[j] - position[j]) for j in finger]
+                k = away.index(max(away))
+                self._stop(f, "stalled", f"stalled {away[k]:.3g} before the target of '{self.joints[finger[k]]}'")
         if self._goal is not None and None not in self._stops:
             stops = tuple(stop for stop in self._stops if stop is not None)
             names = (self.joints[finger[0]] for finger in self._fingers)
@@ -254,12 +281,13 @@ class GripperController:
 
     def _stop(self, f: int, why: FingerStop, text: str) -> None:
         self._stops[f], self._texts[f] = why, text
-        for j in self._fingers[f]:
-            self._moving[j] = 0.0
+        self._moving[list(self._fingers[f])] = 0.0
+        self._ticks_left = 0
 
     def _end_motion(self) -> None:
         self._goal = None
         self._moving[:] = 0.0
+        self._step[:] = 0.0
         self._velocity[:] = 0.0
 
     def _cancel(self, handle: GoalHandle) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal, overload
 
 import numpy as np
@@ -13,6 +14,7 @@ from manipcli.core.geometry import Array
 
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 Compat = Literal["ros1", "ros2"]
+Step = Callable[[Array, float, Array | None], Array]
 
 
 class Pid:
@@ -163,7 +165,10 @@ class Pid:
             return float(self._command[0]) if self._scalar else self._command.copy()
         if rate is None and self._has_d:
             rate = (e - self._last_error) / dt if self._has_last or not self._ros1 else np.zeros(self._size)
-        command = self._step_ros1(e, dt, rate) if self._ros1 else self._step(e, dt, rate)
+        step = self._step_ros1 if self._ros1 else self._step
+        # Infinity times 0 is NaN too, so one product tells whether everything is finite; overflow is sorted out there.
+        finite = math.isfinite(e.dot(e if rate is None else rate))
+        command = step(e, dt, rate) if finite else self._masked(step, e, dt, rate)
         return float(command[0]) if self._scalar else command
 
     def _step(self, e: Array, dt: float, rate: Array | None) -> Array:
@@ -174,9 +179,6 @@ class Pid:
             command += scratch
         if self._has_i:
             command += self._term
-        # A gain of 0 times infinity is NaN, so one sum tells whether every error was finite.
-        if not math.isfinite(np.add.reduce(command)):
-            return self._step_non_finite(e, dt, rate)
         unsaturated = command
         if self._clamps_u:
             command = np.minimum(np.maximum(unsaturated, self._u_min), self._u_max)
@@ -197,8 +199,6 @@ class Pid:
         return self._remember(e, command)
 
     def _step_ros1(self, e: Array, dt: float, rate: Array | None) -> Array:
-        if not np.isfinite(e).all() or (rate is not None and not np.isfinite(rate).all()):
-            return self._step_non_finite(e, dt, rate)
         integral = self._integral
         integral += dt * e
         if self._antiwindup == "conditional_integration":
@@ -210,19 +210,14 @@ class Pid:
         command = np.minimum(np.maximum(command, self._u_min), self._u_max)
         return self._remember(e, command)
 
-    def _step_non_finite(self, e: Array, dt: float, rate: Array | None) -> Array:
+    def _masked(self, step: Step, e: Array, dt: float, rate: Array | None) -> Array:
         """NaN for the joints whose error is not finite, their state kept; the others as ever."""
         bad = ~np.isfinite(e)
         if rate is not None:
             bad |= ~np.isfinite(rate)
-        if not bad.any():  # the command itself overflowed: nothing in the state would stay meaningful
-            return np.full(self._size, np.nan)
         kept = [self._term[bad], self._integral[bad], self._last_error[bad]]
-        good_rate = None if rate is None else np.where(bad, 0.0, rate)
-        step = self._step_ros1 if self._ros1 else self._step
-        command = step(np.where(bad, 0.0, e), dt, good_rate)
+        command = step(np.where(bad, 0.0, e), dt, None if rate is None else np.where(bad, 0.0, rate)).copy()
         self._term[bad], self._integral[bad], self._last_error[bad] = kept
-        command = command.copy()
         command[bad] = np.nan
         return command
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import JointLimits, JointType
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -66,11 +66,10 @@ def check_goal(trajectory: JointTrajectory, facts: JointFacts, *, allow_end_velo
     """
     for name in trajectory.names:
         if name not in facts.joints:
-            near = difflib.get_close_matches(name, facts.joints, n=1)
             raise InvalidArgument(
                 "CTRL120",
                 f"joint '{name}' is not one of the controller's: {', '.join(facts.joints)}",
-                hint=f"did you mean '{near[0]}'?" if near else None,
+                hint=did_you_mean(name, facts.joints, kind="joints"),
             )
     for name in facts.joints:
         if name not in trajectory.names:

@@ -22,6 +22,8 @@ Samples = tuple[Array, Array, Array]
 
 LINEAR, CUBIC, QUINTIC = 0, 1, 2
 
+SINGULAR = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration"}
+
 
 class Waypoint(Protocol):
     """What a point of a trajectory has: trajectory_msgs/JointTrajectoryPoint. Not given is None or empty."""
@@ -261,7 +263,7 @@ def _validate(trajectory: JointTrajectory) -> None:
         if not np.isfinite(array).all():
             k, j = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
             raise InvalidArgument(
-                "TRAJ105", f"{field[:-1]} of joint '{names[j]}' at point {k} is {array[k, j]}; expected a finite number"
+                "TRAJ105", f"{SINGULAR[field]} of joint '{names[j]}' at point {k} is {array[k, j]}; expected a finite number"
             )
     if trajectory.accelerations is not None and trajectory.velocities is None:
         raise InvalidArgument(

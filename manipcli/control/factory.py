@@ -1,0 +1,192 @@
+"""From the controllers file to controllers that fit a robot: every finding of the file at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from manipcli.control.controller import Controller, FeedForward
+from manipcli.control.gripper import GripperController
+from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.manager import ControllerManager
+from manipcli.control.pid import Compat
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.text import did_you_mean
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import ControllerSpec, ControllersSpec, GripperSpec, JointTrajectorySpec
+
+Where = Callable[[tuple[str | int, ...]], Place | None]
+"""The place in the file of a value, by its keys from the top: ("controllers", "arm", "joints", 0)."""
+
+
+def _nowhere(_: tuple[str | int, ...]) -> None:
+    return None
+
+
+def build_controllers(
+    spec: ControllersSpec,
+    robot: RobotModel,
+    period: float,
+    place: Where = _nowhere,
+    *,
+    compat: Compat = "ros2",
+) -> ControllerManager:
+    """The controllers of a file, for a robot, updated every `period` [s].
+
+    Raises:
+        InvalidInput: all findings at once: unknown, fixed, mimic, repeated or unclaimed joints; a joint claimed twice;
+            gains or tolerances of joints that a controller does not have; gains all zero; feed-forward on an interface
+            that has no effort.
+    """
+    findings = list(_findings(spec, robot, place))
+    if findings:
+        raise InvalidInput(findings)
+    return ControllerManager(
+        [_build(name, one, robot, compat) for name, one in spec.controllers.items()],
+        joints=robot.joint_names,
+        period=period,
+        following=[joint.name for joint in robot.moving_joints if joint.mimic is not None],
+    )
+
+
+def _build(name: str, spec: ControllerSpec, robot: RobotModel, compat: Compat) -> Controller:
+    joints = [robot.joint(joint) for joint in spec.joints]
+    wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
+    if isinstance(spec, JointTrajectorySpec):
+        return JointTrajectoryController(
+            name=name,
+            joints=spec.joints,
+            interface=spec.command_interface,
+            gains=spec.gains,
+            constraints=spec.constraints,
+            limits=[joint.limits for joint in joints],
+            types=[joint.type for joint in joints],
+            feed_forward="inverse_dynamics" if spec.inverse_dynamics else wants,
+            compat=compat,
+        )
+    own = math.inf if spec.max_effort is None else spec.max_effort
+    return GripperController(
+        name=name,
+        joints=spec.joints,
+        gains=spec.gains,
+        fingers=fingers_of(spec.joints, robot),
+        speed=spec.speed,
+        max_effort=np.array([min(own, math.inf if j.limits.effort is None else j.limits.effort) for j in joints]),
+        stall_velocity=spec.stall_velocity,
+        stall_time=spec.stall_time,
+        goal_tolerance=spec.goal_tolerance,
+        feed_forward=wants,
+        compat=compat,
+    )
+
+
+def fingers_of(joints: tuple[str, ...], robot: RobotModel) -> tuple[tuple[int, ...], ...]:
+    """Indices into `joints` of each finger: the joints that hang below the same first one of `joints`."""
+    mover = {joint.child: joint for joint in robot.joints}
+    fingers: dict[str, list[int]] = {}
+    for k, name in enumerate(joints):
+        first, link = name, robot.joint(name).parent
+        while link in mover:
+            if mover[link].name in joints:
+                first = mover[link].name
+            link = mover[link].parent
+        fingers.setdefault(first, []).append(k)
+    return tuple(tuple(finger) for finger in fingers.values())
+
+
+def _findings(spec: ControllersSpec, robot: RobotModel, place: Where) -> Iterator[Finding]:
+    owners: dict[str, str] = {}
+    for name, one in spec.controllers.items():
+        at = ("controllers", name)
+        if not one.joints:
+            yield Finding(code="CTRL101", message=f"controller '{name}' has no joints", place=place((*at, "joints")))
+        for k, joint in enumerate(one.joints):
+            yield from _joint_findings(name, joint, robot, place((*at, "joints", k)))
+            if joint in owners:
+                message = (
+                    f"joint '{joint}' stands twice in controller '{name}'"
+                    if owners[joint] == name
+                    else f"controllers '{owners[joint]}' and '{name}' both claim joint '{joint}'"
+                )
+                yield Finding(code="CTRL142", message=message, place=place((*at, "joints", k)))
+            owners.setdefault(joint, name)
+        yield from _gain_findings(name, one, place)
+        yield from _feed_forward_findings(name, one, place)
+    idle = [joint.name for joint in robot.moving_joints if joint.independent and joint.name not in owners]
+    if idle:
+        yield Finding(
+            code="CTRL145",
+            message=f"no controller commands {', '.join(repr(joint) for joint in idle)} of robot '{robot.name}'",
+            place=place(("controllers",)),
+            hint="add them to a controller: a joint that nobody commands falls",
+        )
+
+
+def _joint_findings(name: str, joint: str, robot: RobotModel, place: Place | None) -> Iterator[Finding]:
+    known = {other.name: other for other in robot.joints}
+    if joint not in known:
+        commandable = [other.name for other in robot.joints if other.independent]
+        yield Finding(
+            code="CTRL144",
+            message=f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
+            place=place,
+            hint=did_you_mean(joint, commandable, kind="joints"),
+        )
+        return
+    found = known[joint]
+    if not found.moves:
+        message = f"controller '{name}': joint '{joint}' is fixed; it cannot be commanded"
+        yield Finding(code="CTRL146", message=message, place=place)
+    elif found.mimic is not None:
+        message = f"controller '{name}': joint '{joint}' mimics '{found.mimic.joint}'; it cannot be commanded"
+        hint = f"claim '{found.mimic.joint}' instead"
+        yield Finding(code="CTRL143", message=message, place=place, hint=hint)
+
+
+def _gain_findings(name: str, spec: ControllerSpec, place: Where) -> Iterator[Finding]:
+    at = ("controllers", name)
+    for joint in spec.gains:
+        if joint not in spec.joints:
+            yield Finding(
+                code="CTRL102",
+                message=f"controller '{name}': '{joint}' has gains, but is not one of its joints",
+                place=place((*at, "gains", joint)),
+                hint=did_you_mean(joint, spec.joints, kind="joints"),
+            )
+    tolerances = spec.constraints.joints if isinstance(spec, JointTrajectorySpec) else {}
+    for joint in tolerances:
+        if joint not in spec.joints:
+            yield Finding(
+                code="CTRL104",
+                message=f"controller '{name}': '{joint}' has tolerances, but is not one of its joints",
+                place=place((*at, "constraints", "joints", joint)),
+                hint=did_you_mean(joint, spec.joints, kind="joints"),
+            )
+    if spec.command_interface == "position":
+        return
+    for joint in spec.joints:
+        gains = spec.gains.get(joint)
+        if gains is None or gains.p == gains.i == gains.d == gains.ff_velocity_scale == 0.0:
+            where = ("gains", joint) if gains is not None else ("gains",) if spec.gains else ()
+            yield Finding(
+                code="CTRL103",
+                message=f"controller '{name}': the gains of joint '{joint}' are all zero; "
+                f"on the {spec.command_interface} interface it would not move",
+                place=place((*at, *where)),
+                hint=f"give gains.{joint}.p",
+            )
+
+
+def _feed_forward_findings(name: str, spec: ControllerSpec, place: Where) -> Iterator[Finding]:
+    if isinstance(spec, GripperSpec) or spec.command_interface == "effort":
+        return
+    for key in ("gravity_compensation", "inverse_dynamics"):
+        if getattr(spec, key):
+            yield Finding(
+                code="CTRL147",
+                message=f"controller '{name}': {key} adds an effort, but its interface is {spec.command_interface}",
+                place=place(("controllers", name, key)),
+                hint="use command_interface: effort, or leave it out",
+            )
