@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -86,7 +86,9 @@ class CollisionChecker:
             frame = model.frames[model.getFrameId(link.name)]
             for g in link.collisions:
                 placement = frame.placement * _se3(g.X_LS)
-                self._links.append(_Part(f"robot/{link.name}", True, frame.parentJoint, placement, coal_shape(g.shape)))
+                self._links.append(
+                    _Part(f"robot/{link.name}", "link", frame.parentJoint, placement, coal_shape(g.shape))
+                )
         self._near = _neighbours(model)
         self._ignored = {frozenset((f"robot/{a}", f"robot/{b}")) for a, b in ignore}
         self._ignored |= self._touching_at_zero()
@@ -112,12 +114,14 @@ class CollisionChecker:
             where |= {body.name: pose for body, pose in zip(self.scene.movable, poses, strict=True)}
         parts = list(self._links)
         for body, shapes in self._bodies.items():
+            role: Literal["carried", "scene"] = "scene"
             joint, X_JO = 0, _se3(where[body])
             if carried is not None and carried.body == body:
                 model = self._kinematics.model
                 frame = model.frames[model.getFrameId(carried.link)]
+                role = "carried"
                 joint, X_JO = frame.parentJoint, frame.placement * _se3(carried.X_LO)
-            parts += [_Part(body, False, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
+            parts += [_Part(body, role, joint, X_JO * _se3(X_OS), shape) for X_OS, shape in shapes]
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
@@ -156,9 +160,7 @@ class Situation:
         for i, a in enumerate(parts):
             for j in range(i + 1, len(parts)):
                 b = parts[j]
-                if a.joint == b.joint or frozenset((a.name, b.name)) in allowed:
-                    continue
-                if not (a.link and b.link and (a.joint, b.joint) in near):
+                if _may_meet(a, b, near) and frozenset((a.name, b.name)) not in allowed:
                     self._geometry.addCollisionPair(pin.CollisionPair(i, j))
         self._data = kinematics.model.createData()
         self._state = pin.GeometryData(self._geometry)
@@ -175,14 +177,14 @@ class Situation:
 
     def touches(self, q: npt.ArrayLike) -> bool:
         """Whether anything touches at `q` (n): the fast question."""
-        model, configuration = self._kinematics.model, self._kinematics.configuration(q)
-        return bool(self._pin.computeCollisions(model, self._data, self._broad, configuration, True))
+        q = np.asarray(q, dtype=np.float64)
+        return bool(self._pin.computeCollisions(self._kinematics.model, self._data, self._broad, q, True))
 
     def every(self, q: npt.ArrayLike) -> tuple[CollisionHit, ...]:
         """Every touching pair of parts at `q` (n), the deepest contact of each, sorted by name."""
         pin, geometry = self._pin, self._geometry
-        configuration = self._kinematics.configuration(q)
-        pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, configuration, False)
+        q = np.asarray(q, dtype=np.float64)
+        pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
         deepest: dict[Pair, float] = {}
         for pair, result in zip(geometry.collisionPairs, self._state.collisionResults, strict=True):
             if result.isCollision():
@@ -224,10 +226,19 @@ class _Part:
     """One shape of a robot's link or of a body: `placement` in the joint frame of `joint` (0: the world)."""
 
     name: str
-    link: bool
+    role: Literal["link", "carried", "scene"]
     joint: int
     placement: pin.SE3
     shape: coal.CollisionGeometry
+
+
+def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
+    """Whether two parts move against each other, and not just because one joint turns."""
+    if a.role == b.role == "link":
+        return a.joint != b.joint and (a.joint, b.joint) not in near
+    if a.role == b.role:
+        return False
+    return a.joint != b.joint or "link" not in (a.role, b.role)
 
 
 def _neighbours(model: pin.Model) -> frozenset[tuple[int, int]]:

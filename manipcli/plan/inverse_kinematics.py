@@ -12,8 +12,8 @@ again. Positions are then clamped to the limits, so every iterate is admissible.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -90,6 +90,7 @@ class InverseKinematics:
         self._free_axis = None if free_axis is None else frozen(free_axis)
         self._columns = np.array(self.columns, dtype=np.intp)
         limits = [robot.joint(name).limits for name in self.joints]
+        self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower = np.array([-np.inf if limit.lower is None else limit.lower for limit in limits])
         self._upper = np.array([np.inf if limit.upper is None else limit.upper for limit in limits])
 
@@ -97,7 +98,14 @@ class InverseKinematics:
         """`X_WT` at `q` (n), all moving joints."""
         return self._kinematics.forward(np.asarray(q, dtype=np.float64), self.link) @ self._X_LT
 
-    def solve(self, X_WT: Transform, seed: npt.ArrayLike, rng: np.random.Generator) -> Array:
+    def solve(
+        self,
+        X_WT: Transform,
+        seed: npt.ArrayLike,
+        rng: np.random.Generator,
+        *,
+        refuse: Callable[[Array], object | None] | None = None,
+    ) -> Array:
         """Joint positions (n) with the tool at `X_WT`, near `seed`.
 
         The first try starts from `seed` and is taken when it converges. Else tries start from uniformly random
@@ -107,16 +115,21 @@ class InverseKinematics:
             X_WT: the goal.
             seed: (n) all moving joints.
             rng: draws the restarts.
+            refuse: (n) -> why these positions are no good (a collision), or None. Refused solutions do not count.
 
         Raises:
             NotPlannable: none converges; tells the best error, the distance to the goal, the joints at their limits.
+                Or all that converge are refused; tells why.
         """
         seed = np.asarray(seed, dtype=np.float64)
         if not (np.isfinite(X_WT.p).all() and np.isfinite(X_WT.R).all() and np.isfinite(seed).all()):
             raise NotPlannable("the goal pose or the seed of the inverse kinematics is not finite")
         best = self.track(X_WT, seed)
+        refusal: object | None = None
         if best.converged:
-            return best.q
+            refusal = None if refuse is None else refuse(best.q)
+            if refusal is None:
+                return best.q
         lower = np.where(np.isfinite(self._lower), self._lower, seed[self._columns] - _UNLIMITED)
         upper = np.where(np.isfinite(self._upper), self._upper, seed[self._columns] + _UNLIMITED)
         found: list[Solution] = []
@@ -125,6 +138,11 @@ class InverseKinematics:
             start[self._columns] = rng.uniform(lower, upper)
             attempt = self.track(X_WT, start)
             if attempt.converged:
+                attempt = self._unwound(attempt, seed)
+                reason = None if refuse is None else refuse(attempt.q)
+                if reason is not None:
+                    refusal = refusal or reason
+                    continue
                 found.append(attempt)
                 if len(found) == _ENOUGH:
                     break
@@ -134,6 +152,11 @@ class InverseKinematics:
             return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
         distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
         place = ", ".join(f"{value:.3f}" for value in X_WT.p)
+        if refusal is not None:
+            raise NotPlannable(
+                f"the arm reaches ({place}) m only where {refusal}",
+                hint="move the goal away from what is touched, or change the orientation of the tool",
+            )
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint="move the goal nearer, or change the orientation of the tool",
@@ -166,12 +189,13 @@ class InverseKinematics:
 
     def singularity(self, q: npt.ArrayLike) -> str:
         """The smallest singular value of the tool's Jacobian at `q` (n), as text."""
-        J = self._jacobian(np.asarray(q, dtype=np.float64))
+        J = self._kinematics.jacobian(np.asarray(q, dtype=np.float64), self.link, self._X_LT)[:, self._columns]
         return f"smallest singular value {np.linalg.svd(J, compute_uv=False)[-1]:.3f}"
 
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
         """Judged by forward kinematics alone."""
-        error, angle = self._error(X_WT, self.forward(q))
+        X_WC = self.forward(q)
+        error, angle = self._error(X_WT, X_WC.R, X_WC.p)
         here = q[self._columns]
         at_limit = (here <= self._lower + _AT_LIMIT) | (here >= self._upper - _AT_LIMIT)
         return Solution(
@@ -181,27 +205,33 @@ class InverseKinematics:
             at_limit=tuple(name for name, held in zip(self.joints, at_limit, strict=True) if held),
         )
 
+    def _unwound(self, solution: Solution, seed: Array) -> Solution:
+        """The same pose with each turning joint less than half a turn from `seed`, where its limits allow."""
+        here = solution.q[self._columns]
+        turned = here - 2.0 * np.pi * np.round((here - seed[self._columns]) / (2.0 * np.pi))
+        inside = self._turning & (turned >= self._lower) & (turned <= self._upper)
+        q = np.array(solution.q)
+        q[self._columns] = np.where(inside, turned, here)
+        return replace(solution, q=frozen(q))
+
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
-        X_WC = self.forward(q)
-        error, angle = self._error(X_WT, X_WC)
-        J = self._jacobian(q)
+        R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
+        error, angle = self._error(X_WT, R, p)
+        J = whole[:, self._columns]
         if self._free_axis is not None:
-            axis = X_WC.R @ self._free_axis
+            axis = R @ self._free_axis
             J[3:] -= np.outer(axis, axis @ J[3:])
         return error, J, angle
 
-    def _jacobian(self, q: Array) -> Array:
-        return np.array(self._kinematics.jacobian(q, self.link, offset=self._X_LT)[:, self._columns])
-
-    def _error(self, X_WG: Transform, X_WT: Transform) -> tuple[Array, float]:
+    def _error(self, X_WG: Transform, R_WT: Array, p_WT: Array) -> tuple[Array, float]:
         """Pose error (6) in the world, and its angle [rad]."""
         error = np.empty(6)
-        error[:3] = X_WG.p - X_WT.p
+        error[:3] = X_WG.p - p_WT
         if self._free_axis is None:
-            error[3:] = rotation_vector(X_WG.R @ X_WT.R.T)
+            error[3:] = rotation_vector(X_WG.R @ R_WT.T)
         else:
-            error[3:] = _between(X_WT.R @ self._free_axis, X_WG.R @ self._free_axis)
+            error[3:] = _between(R_WT @ self._free_axis, X_WG.R @ self._free_axis)
         return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
 
 

@@ -27,8 +27,9 @@ from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import on_ticks
 from manipcli.plan.trajectory import JointTrajectory
 
-_GRID = 100, 500  # fewest and most grid points; the time found falls by less than 0.1 % beyond
+_GRID = 300, 500  # fewest and most grid points: 300 cost 0.12 % of time against 1000 (100: 0.7 %), at 7 ms
 _PER_WAYPOINT = 4  # grid points between two waypoints, up to the most
+_WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero need one, full reversals two
 _ROUNDING = 1e-9
 
 
@@ -61,16 +62,22 @@ def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: fl
     _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
     if speeds is None or not np.isfinite(speeds).all():
         raise NotPlannable("the path has no timing within the velocity and acceleration limits: it is not smooth")
-    progress, nominal = _progress(grid, speeds)
-    if np.isfinite(limits.jerk).any():
-        progress, nominal = _averaged(progress, nominal, float(np.max(limits.acceleration / limits.jerk)), period)
+    optimal, nominal = _progress(grid, speeds)
 
-    def curve(times: Array) -> tuple[Array, Array, Array]:
-        s, ds, dds = progress(times)
-        first, second = spline(s, 1), spline(s, 2)
-        return spline(s), first * ds[:, None], second * (ds * ds)[:, None] + first * dds[:, None]
+    def sampled(progress: Progress, length: float, wished: float | None) -> JointTrajectory:
+        def curve(times: Array) -> tuple[Array, Array, Array]:
+            s, ds, dds = progress(times)
+            first, second = spline(s, 1), spline(s, 2)
+            return spline(s), first * ds[:, None], second * (ds * ds)[:, None] + first * dds[:, None]
 
-    return on_ticks(curve, nominal, target=points[-1], limits=limits, period=period, duration=duration)
+        return on_ticks(curve, length, target=points[-1], limits=limits, period=period, duration=wished)
+
+    if not np.isfinite(limits.jerk).any():
+        return sampled(optimal, nominal, duration)
+    window = float(np.max(limits.acceleration / limits.jerk))
+    smooth = [_averaged(optimal, nominal, factor * window, period) for factor in _WINDOWS]
+    progress, length = min(smooth, key=lambda timing: sampled(timing[0], timing[1], None).duration)
+    return sampled(progress, length, duration)
 
 
 Progress = Callable[[Array], tuple[Array, Array, Array]]

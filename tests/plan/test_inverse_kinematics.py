@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.plan.inverse_kinematics import (
+    ANGLE_TOLERANCE,
+    POSITION_TOLERANCE,
+    InverseKinematics,
+    rotation_vector,
+)
+
+ARM = tuple(f"joint_{k}" for k in range(1, 8))
+X_LT = Transform.of(xyz=(0.02, 0.0, 0.15), rpy=(0.1, 0.2, 0.3))
+
+
+@pytest.fixture(scope="module")
+def solver(make_arm7: Callable[..., RobotModel]) -> InverseKinematics:
+    return InverseKinematics(Kinematics(make_arm7()), ARM, "link_7", X_LT=X_LT)
+
+
+def arm_forward(q: Array) -> Transform:
+    """The fixture's chain by hand: products of rotations about z and y with offsets along z."""
+    X = Transform.identity()
+    for k, (angle, offset) in enumerate(zip(q, (0.16, 0.16, 0.2, 0.22, 0.2, 0.2, 0.2), strict=True)):
+        axis = (0.0, 0.0, 1.0) if k % 2 == 0 else (0.0, 1.0, 0.0)
+        X = X @ Transform.of(xyz=(0, 0, offset), R=matrix_from_axis_angle(axis, float(angle)))
+    return X @ X_LT
+
+
+def random_positions(robot_limits: tuple[Array, Array], count: int, seed: int) -> Array:
+    lower, upper = robot_limits
+    return np.random.default_rng(seed).uniform(lower, upper, (count, len(lower)))
+
+
+LIMITS = np.array([-2.9, -2.0, -2.9, -2.0, -2.9, -2.0, -3.0]), np.array([2.9, 2.0, 2.9, 2.0, 2.9, 2.0, 3.0])
+
+
+def test_every_reachable_pose_is_reached_within_the_limits(solver: InverseKinematics, middle: Array) -> None:
+    """Poses of random positions inside the limits are reachable by construction; the chain by hand is the oracle."""
+    rng = np.random.default_rng(0)
+    for arm in random_positions(LIMITS, 60, 1):
+        goal = arm_forward(arm)
+        q = solver.solve(goal, middle, rng)
+        reached = arm_forward(q[:7])
+        assert np.linalg.norm(reached.p - goal.p) <= POSITION_TOLERANCE
+        assert np.linalg.norm(rotation_vector(reached.R.T @ goal.R)) <= ANGLE_TOLERANCE
+        assert (q[:7] >= LIMITS[0]).all()
+        assert (q[:7] <= LIMITS[1]).all()
+        np.testing.assert_array_equal(q[7:], middle[7:])
+
+
+def test_a_goal_near_the_seed_gives_positions_near_the_seed(solver: InverseKinematics, middle: Array) -> None:
+    near = middle.copy()
+    near[:7] += 0.02
+    q = solver.solve(solver.forward(near), middle, np.random.default_rng(0))
+    assert np.max(np.abs(q - middle)) < 0.1
+
+
+def test_same_seed_same_answer(solver: InverseKinematics, middle: Array) -> None:
+    goal = arm_forward(random_positions(LIMITS, 1, 5)[0])
+    first, second = (solver.solve(goal, middle, np.random.default_rng(3)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_goal_out_of_reach_names_error_and_distance(solver: InverseKinematics, middle: Array) -> None:
+    with pytest.raises(
+        NotPlannable, match=r"3\.000 m from the robot's base: the nearest pose is \d+\.\d mm"
+    ) as refused:
+        solver.solve(Transform.of(xyz=(3.0, 0.0, 0.0)), middle, np.random.default_rng(0))
+    assert refused.value.hint is not None
+
+
+def test_limits_that_hold_the_arm_back_are_named(make_arm7: Callable[..., RobotModel], middle: Array) -> None:
+    """Joint 1 alone turns the tool about z; 3.1 rad is past its limit of 2.9."""
+    solver = InverseKinematics(Kinematics(make_arm7()), ("joint_1",), "link_7")
+    past = middle.copy()
+    past[0] = 3.1
+    with pytest.raises(NotPlannable, match="held back by the limits of joint_1"):
+        solver.solve(solver.forward(past), middle, np.random.default_rng(0))
+
+
+def test_a_free_axis_frees_the_rotation_about_it_alone(make_arm7: Callable[..., RobotModel], middle: Array) -> None:
+    solver = InverseKinematics(Kinematics(make_arm7()), ARM, "link_7", X_LT=X_LT, free_axis=(0.0, 0.0, 1.0))
+    goal = solver.forward(middle)
+    turned = goal @ Transform.of(xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 1.5))
+    q = solver.solve(turned, middle, np.random.default_rng(0))
+    np.testing.assert_allclose(q, middle, atol=1e-9)
+    tilted = turned @ Transform.of(rpy=(0.3, 0.0, 0.0))
+    reached = solver.forward(solver.solve(tilted, middle, np.random.default_rng(0)))
+    np.testing.assert_allclose(reached.R[:, 2], tilted.R[:, 2], atol=2 * ANGLE_TOLERANCE)
+    np.testing.assert_allclose(reached.p, tilted.p, atol=POSITION_TOLERANCE)
+
+
+def test_refused_solutions_are_passed_over_and_named_when_all_are(solver: InverseKinematics, middle: Array) -> None:
+    goal = solver.forward(middle)
+    other = solver.solve(goal, middle, np.random.default_rng(0), refuse=lambda q: "elbow up" if q[3] < 0.0 else None)
+    assert other[3] >= 0.0
+    with pytest.raises(NotPlannable, match="only where the hand is in the wall"):
+        solver.solve(goal, middle, np.random.default_rng(0), refuse=lambda _: "the hand is in the wall")
+
+
+def test_nan_is_refused(solver: InverseKinematics, middle: Array) -> None:
+    with pytest.raises(NotPlannable, match="not finite"):
+        solver.solve(Transform.of(xyz=(np.nan, 0.0, 0.0)), middle, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 1.0, 3.0, np.pi - 1e-6, np.pi])
+def test_rotation_vector_inverts_axis_and_angle(angle: float) -> None:
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    vector = rotation_vector(matrix_from_axis_angle(axis, angle))
+    sign = 1.0 if vector @ axis >= 0.0 else -1.0  # at pi, both axes are the same rotation
+    np.testing.assert_allclose(sign * vector, axis * angle, atol=1e-8)

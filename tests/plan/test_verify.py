@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.plan.limits import MotionLimits
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.verify import verify
+
+T = np.arange(1001) * 1e-3
+
+
+def limits(**changed: float) -> MotionLimits:
+    """One joint whose sine q = sin(2 t) touches each limit: |q| 1, |q'| 2, |q''| 4, |q'''| 8."""
+    touched = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "acceleration": 4.0, "jerk": 8.0} | changed
+    return MotionLimits(("j",), **{name: np.array([value]) for name, value in touched.items()})
+
+
+def sine(*, velocities: bool = True, accelerations: bool = True) -> JointTrajectory:
+    def column(values: Array) -> Array:
+        return np.asarray(values[:, None])
+
+    return JointTrajectory(
+        ("j",),
+        T,
+        column(np.sin(2 * T)),
+        column(2 * np.cos(2 * T)) if velocities else None,
+        column(-4 * np.sin(2 * T)) if accelerations else None,
+    )
+
+
+def test_a_motion_that_touches_every_limit_passes() -> None:
+    verify(sine(), limits())
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "message"),
+    [
+        ("upper", 0.9, r"joint 'j' goes to 1\.0000 at t = 0\.785 s, beyond its upper limit 0\.9000"),
+        ("lower", 0.1, r"joint 'j' goes to 0\.0000 at t = 0\.000 s, beyond its lower limit 0\.1000"),
+        ("velocity", 1.98, r"velocity 2 at t = 0\.000 s; its limit is 1\.98"),
+        ("acceleration", 3.97, r"acceleration 4 at t = 0\.785 s; its limit is 3\.97"),
+        ("jerk", 7.9, r"jerk 8 at t = 0\.000 s; its limit is 7\.9"),
+    ],
+)
+def test_one_percent_beyond_a_limit_is_refused_with_joint_value_limit_and_time(
+    limit: str, value: float, message: str
+) -> None:
+    with pytest.raises(NotPlannable, match=message):
+        verify(sine(), limits(**{limit: value}))
+
+
+def test_half_a_percent_is_forgiven() -> None:
+    verify(sine(), limits(velocity=2 / 1.004, acceleration=4 / 1.004, jerk=8 / 1.004))
+
+
+def test_positions_alone_betray_their_velocity() -> None:
+    with pytest.raises(NotPlannable, match="velocity 2 "):
+        verify(sine(velocities=False, accelerations=False), limits(velocity=1.9))
+
+
+def test_velocities_alone_betray_their_acceleration() -> None:
+    with pytest.raises(NotPlannable, match="acceleration 4 "):
+        verify(sine(accelerations=False), limits(acceleration=3.9))
+
+
+def test_points_that_understate_what_the_positions_do_are_refused() -> None:
+    honest = sine()
+    assert honest.velocities is not None
+    lying = JointTrajectory(("j",), T, honest.positions, 0.5 * honest.velocities, honest.accelerations)
+    with pytest.raises(NotPlannable, match="velocity 2 "):
+        verify(lying, limits(velocity=1.5))
