@@ -43,5 +43,5 @@ def plan(
         with csv.open("w", encoding="utf-8", newline="") as stream:
             write_csv(motions, stream)
     render = render_json if format_ == "json" else render_text
-    console.result(render(loaded.name, motions, loaded.robot))
+    console.result(render(loaded.spec.task, motions, loaded.robot))
     return ExitCode.PASSED

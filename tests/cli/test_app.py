@@ -226,7 +226,7 @@ def _motion() -> SimpleNamespace:
 def test_plan_names_the_joint_that_limits_and_writes_every_point(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    pipeline.load_task = lambda *_, **__: SimpleNamespace(name="home", robot=_robot())
+    pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     pipeline.plan_task = lambda _: SimpleNamespace(motions=(_motion(),))
     csv = tmp_path / "plan.csv"
     assert main(["plan", "t.yaml", "--csv", str(csv)]) == 0
@@ -245,7 +245,7 @@ def test_plan_names_the_joint_that_limits_and_writes_every_point(
 def test_plan_that_cannot_write_its_csv_says_so(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    pipeline.load_task = lambda *_, **__: SimpleNamespace(name="home", robot=_robot())
+    pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     pipeline.plan_task = lambda _: SimpleNamespace(motions=())
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
     assert "No such file or directory" in capsys.readouterr().err
