@@ -8,13 +8,13 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
+from manipcli.core.text import did_you_mean
 from manipcli.model.description import read_description
 from manipcli.model.named_poses import build_groups, build_poses
 from manipcli.model.normalise import portable_urdf
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
 from manipcli.model.urdf import Parts, read_parts
-from manipcli.model.urdf_numbers import nearest
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
 
 Loc = tuple[str | int, ...]
@@ -128,7 +128,7 @@ class _Descriptions:
         try:
             path = self._sources.resolve(uri, relative_to=self._folder)
         except NotFound as error:
-            self._reporter.error("ROBOT201", f"description: {error.message}", loc, hint=error.hint)
+            self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
         packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
         try:
@@ -155,7 +155,7 @@ class _Body:
         names = [link.name for link in self.links]
         if spec.parent not in names:
             message = f"link '{spec.parent}' is not in the description"
-            reporter.error("ROBOT202", message, ("attach", k, "parent"), hint=nearest(spec.parent, names))
+            reporter.error("ROBOT302", message, ("attach", k, "parent"), hint=did_you_mean(spec.parent, names))
             return
         taken = {f"link '{name}'" for name in names} | {f"joint '{joint.name}'" for joint in self.joints}
         added = [f"link '{prefix}{link.name}'" for link in parts.links]
@@ -164,7 +164,7 @@ class _Body:
         for what in (*added, f"joint '{joint_name}'"):
             if what in taken:
                 message = f"{what} is already there"
-                reporter.error("ROBOT203", message, ("attach", k), hint="give this attachment a prefix")
+                reporter.error("ROBOT303", message, ("attach", k), hint="give this attachment a prefix")
         self.links += [dataclasses.replace(link, name=prefix + link.name) for link in parts.links]
         self.joints.append(
             Joint(
@@ -215,7 +215,7 @@ def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...])
     for name in spec.limits:
         if name not in moving:
             message = f"limits: joint '{name}' is not a moving joint of the robot"
-            reporter.error("ROBOT204", message, ("limits", name), hint=nearest(name, moving))
+            reporter.error("ROBOT304", message, ("limits", name), hint=did_you_mean(name, moving))
     without: list[str] = []
     result = []
     for joint in joints:
@@ -234,7 +234,7 @@ def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...])
             f"{spec.default_acceleration:g} rad/s2 or m/s2, is used"
         )
         hint = f"state it in the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
-        reporter.note("ROBOT230", message, ("limits",), hint=hint)
+        reporter.note("ROBOT330", message, ("limits",), hint=hint)
     return tuple(result)
 
 
@@ -250,14 +250,14 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
         if wider:
             message = f"joint '{joint.name}': {key} {bound:g} widens the description's {base.lower:g} to {base.upper:g}"
             hint = "the robot file may only narrow it"
-            reporter.error("ROBOT205", message, ("limits", joint.name, key), hint=hint)
+            reporter.error("ROBOT305", message, ("limits", joint.name, key), hint=hint)
         elif key == "lower":
             lower = bound
         else:
             upper = bound
     if lower is not None and upper is not None and lower > upper:
         message = f"joint '{joint.name}': lower {lower:g} is above upper {upper:g}"
-        reporter.error("ROBOT205", message, ("limits", joint.name))
+        reporter.error("ROBOT305", message, ("limits", joint.name))
     return JointLimits(
         lower=lower,
         upper=upper,
@@ -271,7 +271,7 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
 def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) -> bool:
     names = [link.name for link in links]
     if name not in names:
-        reporter.error("ROBOT206", f"link '{name}' is not in the robot", loc, hint=nearest(name, names))
+        reporter.error("ROBOT306", f"link '{name}' is not in the robot", loc, hint=did_you_mean(name, names))
     return name in names
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Group, Joint, Link, NamedPose
-from manipcli.model.urdf_numbers import nearest
 from manipcli.spec.robot import GroupSpec, RobotSpec
 
 if TYPE_CHECKING:
@@ -34,11 +34,11 @@ def _group(
     link_names = [link.name for link in links]
     if (spec.chain is None) == (spec.joints is None):
         message = f"group '{name}' needs either a chain or a list of joints"
-        reporter.error("ROBOT210", message, ("groups", name))
+        reporter.error("ROBOT310", message, ("groups", name))
         return None
     if spec.tip is not None and spec.tip not in link_names:
         message = f"group '{name}': tip link '{spec.tip}' is not in the robot"
-        reporter.error("ROBOT206", message, ("groups", name, "tip"), hint=nearest(spec.tip, link_names))
+        reporter.error("ROBOT306", message, ("groups", name, "tip"), hint=did_you_mean(spec.tip, link_names))
         return None
     if spec.joints is not None:
         return _listed(reporter, name, spec.joints, spec.tip, joints)
@@ -46,7 +46,7 @@ def _group(
     for key, link in (("base", spec.chain.base), ("tip", spec.chain.tip)):
         if link not in link_names:
             message = f"group '{name}': {key} link '{link}' is not in the robot"
-            reporter.error("ROBOT206", message, ("groups", name, "chain", key), hint=nearest(link, link_names))
+            reporter.error("ROBOT306", message, ("groups", name, "chain", key), hint=did_you_mean(link, link_names))
             return None
     by_child = {joint.child: joint for joint in joints}
     way: list[Joint] = []
@@ -56,12 +56,12 @@ def _group(
         at = by_child[at].parent
     if at != spec.chain.base:
         message = f"group '{name}': link '{spec.chain.tip}' does not stand below '{spec.chain.base}'"
-        reporter.error("ROBOT211", message, ("groups", name, "chain"))
+        reporter.error("ROBOT311", message, ("groups", name, "chain"))
         return None
     names = tuple(joint.name for joint in reversed(way) if joint.independent)
     if not names:
         message = f"group '{name}': no joint moves between '{spec.chain.base}' and '{spec.chain.tip}'"
-        reporter.error("ROBOT211", message, ("groups", name, "chain"))
+        reporter.error("ROBOT311", message, ("groups", name, "chain"))
         return None
     return Group(name=name, joints=names, base=spec.chain.base, tip=spec.tip or spec.chain.tip)
 
@@ -73,7 +73,7 @@ def _listed(
     usable = [joint.name for joint in joints if joint.independent]
     good = bool(listed)
     if not listed:
-        reporter.error("ROBOT210", f"group '{name}' has no joint", ("groups", name, "joints"))
+        reporter.error("ROBOT310", f"group '{name}' has no joint", ("groups", name, "joints"))
     for k, joint in enumerate(listed):
         if joint in usable and joint not in listed[:k]:
             continue
@@ -87,8 +87,8 @@ def _listed(
             message = f"group '{name}': joint '{joint}' is fixed"
         else:
             message = f"group '{name}': joint '{joint}' is listed twice"
-        hint = nearest(joint, usable) if known is None else None
-        reporter.error("ROBOT212", message, ("groups", name, "joints", k), hint=hint)
+        hint = did_you_mean(joint, usable) if known is None else None
+        reporter.error("ROBOT312", message, ("groups", name, "joints", k), hint=hint)
     return Group(name=name, joints=tuple(listed), base=None, tip=tip) if good else None
 
 
@@ -115,8 +115,8 @@ class _Poses:
         for group in self._spec.poses[name]:
             if group not in self._spec.groups:
                 message = f"pose '{name}': there is no group '{group}'"
-                hint = nearest(group, self._spec.groups)
-                self._reporter.error("ROBOT220", message, ("poses", name, group), hint=hint)
+                hint = did_you_mean(group, self._spec.groups)
+                self._reporter.error("ROBOT320", message, ("poses", name, group), hint=hint)
             elif group in self._groups:  # one that could not be built has been reported
                 values |= self._part(name, group, ())
         return NamedPose(name=name, joints=tuple(values), positions=tuple(values.values()))
@@ -130,11 +130,11 @@ class _Poses:
             having = [other for other, parts in self._spec.poses.items() if group in parts and other != name]
             if part in seen or part == name:
                 circle = " -> ".join([*seen, name, part])
-                self._reporter.error("ROBOT221", f"pose '{name}' refers to itself: {circle}", loc)
+                self._reporter.error("ROBOT321", f"pose '{name}' refers to itself: {circle}", loc)
                 return {}
             if part not in having:
                 message = f"pose '{name}': there is no pose '{part}' of group '{group}'"
-                self._reporter.error("ROBOT221", message, loc, hint=nearest(part, having))
+                self._reporter.error("ROBOT321", message, loc, hint=did_you_mean(part, having))
                 return {}
             return self._part(part, group, (*seen, name))
         if seen:  # the values themselves are checked where they are written
@@ -143,13 +143,13 @@ class _Poses:
             for joint in part:
                 if joint not in joints:
                     message = f"pose '{name}': joint '{joint}' is not in group '{group}'"
-                    hint = nearest(joint, joints)
-                    self._reporter.error("ROBOT222", message, ("poses", name, group, joint), hint=hint)
+                    hint = did_you_mean(joint, joints)
+                    self._reporter.error("ROBOT322", message, ("poses", name, group, joint), hint=hint)
             named = {joint: value for joint, value in part.items() if joint in joints}
             return self._checked(name, named, {joint: (*loc, joint) for joint in named})
         if len(part) != len(joints):
             message = f"pose '{name}': {len(part)} values for the {len(joints)} joints of group '{group}'"
-            self._reporter.error("ROBOT222", message, loc, hint=f"in this order: {', '.join(joints)}")
+            self._reporter.error("ROBOT322", message, loc, hint=f"in this order: {', '.join(joints)}")
             return {}
         return self._checked(name, dict(zip(joints, part, strict=True)), {j: (*loc, k) for k, j in enumerate(joints)})
 
@@ -162,5 +162,5 @@ class _Poses:
             high = limits.upper is not None and value > limits.upper + LIMIT_TOLERANCE
             if low or high:
                 message = f"pose '{name}': joint '{joint}' at {value:g} is outside {limits.lower:g} to {limits.upper:g}"
-                self._reporter.error("ROBOT223", message, locs[joint])
+                self._reporter.error("ROBOT323", message, locs[joint])
         return values

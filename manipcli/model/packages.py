@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
+from manipcli.model.located_xml import shown_path
+
 LEVELS_ABOVE = 5
 """How many folders above a description are looked at for a folder of a package's name."""
 SUBFOLDERS = frozenset({"urdf", "xacro", "robots", "robot", "description", "cfg"})
@@ -73,7 +75,7 @@ class Packages:
             if installed is not None:
                 self._found[name] = installed
                 return installed
-        places = ", ".join(_shown(place) for place in searched)
+        places = ", ".join(shown_path(place) for place in searched)
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
             hint=f"add the folder that holds '{name}' with --package-path DIR",
@@ -108,7 +110,7 @@ class Packages:
             root = self.root(name)
             path, roots = root / inside, [root]
         elif separator and scheme == "file":
-            path = Path(unquote(rest.removeprefix("localhost")))
+            path = Path("/" + unquote(rest.removeprefix("localhost")).lstrip("/"))
         elif separator:
             raise NotFound(f"'{uri}': scheme '{scheme}' is not read", hint="use package://NAME/path or a relative path")
         else:
@@ -123,7 +125,7 @@ class Packages:
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            raise NotFound(f"'{uri}' is not found; searched {_shown(path)}") from error
+            raise NotFound(f"'{uri}' is not found; searched {shown_path(path)}") from error
         if not self._allow_outside and not any(real.is_relative_to(root) for root in roots):
             raise NotFound(
                 f"'{uri}' lies outside of the description's folder and packages",
@@ -164,11 +166,3 @@ def _installed_package(name: str) -> Path | None:
         return None
     places = list(spec.submodule_search_locations or ()) if spec is not None else []
     return Path(places[0]).resolve() if places and Path(places[0]).is_dir() else None
-
-
-def _shown(path: Path) -> str:
-    """A path as a message shows it: relative to the working folder where it lies below that."""
-    try:
-        return str(path.relative_to(Path.cwd()))
-    except ValueError:
-        return str(path)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from manipcli.core.errors import Place
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Joint
-from manipcli.model.urdf_numbers import Reader, nearest
+from manipcli.model.urdf_numbers import Reader
 
 
 def check_tree(
@@ -32,7 +33,7 @@ def check_tree(
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 message = f"joint '{name}': {role} link '{link}' is not in the description"
-                reader.report("URDF006", message, place, hint=nearest(link, links))
+                reader.report("URDF006", message, place, hint=did_you_mean(link, links))
         if joint.parent == joint.child:
             reader.report("URDF007", f"joint '{name}' joins link '{joint.parent}' to itself", place)
         elif joint.child in parent_joint:

@@ -59,6 +59,7 @@ def read_parts(description: Description) -> Parts:
     top = check_tree(reader, tuple(links), joints, places) if links else ""
     known = resolve_mimics(reader, known, tuple(joints), places)
     transmissions = read_transmissions(reader, root, tuple(joints))
+    _check_point_masses(reader, links, known, places)
     ordered = depth_first(top, known) if top else tuple(known.values())
     order = [top, *(joint.child for joint in ordered)] if top else list(links)
     return Parts(
@@ -70,6 +71,22 @@ def read_parts(description: Description) -> Parts:
         places=places,
         findings=(*description.findings, *reader.findings),
     )
+
+
+def _check_point_masses(
+    reader: Reader, links: Mapping[str, Link], joints: Mapping[str, Joint], places: Mapping[tuple[str, str], Place]
+) -> None:
+    """A link with mass and no moments of inertia may stand only where it is fixed to another."""
+    moved = {joint.child for joint in joints.values() if joint.moves}
+    for name, link in links.items():
+        if link.inertial is None or link.inertial.inertia.any():
+            continue
+        message = f"link '{name}' has a mass but no moments of inertia"
+        hint = "compute them from the shape and the mass of the link"
+        if name in moved:
+            reader.report("URDF011", message, places.get(("link", name)), hint=hint)
+        else:
+            reader.report("URDF037", f"{message}: a point mass", places.get(("link", name)), severity="warning")
 
 
 def _named(reader: Reader, root: Element, tag: str, places: dict[tuple[str, str], Place]) -> dict[str, Element]:

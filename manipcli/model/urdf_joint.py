@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import did_you_mean
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, TransmissionTag
-from manipcli.model.urdf_numbers import Reader, nearest
+from manipcli.model.urdf_numbers import Reader
 
 _TYPES: dict[str, JointType] = {
     "revolute": "revolute",
@@ -29,7 +30,7 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
     kind = _TYPES.get(text or "")
     if kind is None:
         what = f"unknown type '{text}'" if text else "no attribute 'type'"
-        hint = nearest(text or "", _TYPES)
+        hint = did_you_mean(text or "", _TYPES)
         if text in {"floating", "planar"}:
             what, hint = f"type '{text}', which is not supported", "use several joints of one degree of freedom"
         reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=hint)
@@ -169,7 +170,7 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
     for joint, joint_name in zip(joint_elements, joint_names, strict=True):
         if joint_name is not None and joint_name not in joints:
             message = f"transmission '{name}' names joint '{joint_name}', which is not in the description"
-            reader.report("URDF015", message, joint.place, hint=nearest(joint_name, joints))
+            reader.report("URDF015", message, joint.place, hint=did_you_mean(joint_name, joints))
     if not joint_elements:
         reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
     reductions = [_reduction(reader, each, name) for each in (*joint_elements, *actuator_elements)]

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from manipcli.core.geometry import Transform, frozen
+from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import did_you_mean
 from manipcli.model.located_xml import Element
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, Shape, Sphere
-from manipcli.model.urdf_numbers import Reader, nearest
+from manipcli.model.urdf_numbers import Reader
 
 Rgba = tuple[float, float, float, float]
 TRIANGLE_TOLERANCE = 1e-2
@@ -75,7 +76,9 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
     return Inertial(mass=mass, X_LI=X_LI, inertia=I)
 
 
-def _plausible(reader: Reader, I: np.ndarray, name: str, element: Element) -> bool:  # noqa: E741
+def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741
+    if not I.any():
+        return True  # a point mass: `read_parts` refuses it where a joint moves it
     principal = np.linalg.eigvalsh(I)
     shown = ", ".join(f"{value:.4g}" for value in principal)
     if principal[0] <= 0.0:
@@ -119,7 +122,7 @@ def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Sh
         return Cylinder(radius=radius[0], length=length[0]) if radius and length else None
     if element.tag == "mesh":
         return _mesh(reader, element, tag, packages)
-    reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=nearest(element.tag, _SHAPES))
+    reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=did_you_mean(element.tag, _SHAPES))
     return None
 
 
@@ -164,8 +167,3 @@ def _colour(reader: Reader, element: Element, materials: Mapping[str, Rgba]) -> 
         rgba = reader.numbers(colour, "rgba", 4)
         return (rgba[0], rgba[1], rgba[2], rgba[3]) if rgba is not None else None
     return materials.get(material.attributes.get("name", ""))
-
-
-def placed(X_PL: Transform, inertial: Inertial) -> Inertial:
-    """The same inertial, given in another link that X_PL places this one in."""
-    return Inertial(mass=inertial.mass, X_LI=X_PL @ inertial.X_LI, inertia=inertial.inertia)

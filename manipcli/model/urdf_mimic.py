@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 from manipcli.core.errors import Place
+from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Joint, Mimic
-from manipcli.model.urdf_numbers import Reader, nearest
+from manipcli.model.urdf_numbers import Reader
 
 
 def resolve_mimics(
@@ -52,7 +53,7 @@ def resolve_mimics(
             )
         if mimic is not None and mimic.joint not in declared:
             message = f"joint '{name}' mimics '{mimic.joint}', which is not in the description"
-            reader.report("URDF014", message, places.get(("joint", name)), hint=nearest(mimic.joint, declared))
+            reader.report("URDF014", message, places.get(("joint", name)), hint=did_you_mean(mimic.joint, declared))
             mimic = None
         found[name] = dataclasses.replace(joint, mimic=mimic)
     return found

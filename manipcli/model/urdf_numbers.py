@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterable
 
 from manipcli.core.errors import Finding, Place, Severity
 from manipcli.core.geometry import Transform
 from manipcli.model.located_xml import Element
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """A hint that names what is most like `name` among `known`."""
-    names = list(dict.fromkeys(known))
-    close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    if close:
-        return "did you mean " + " or ".join(f"'{candidate}'" for candidate in close) + "?"
-    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    return f"known: {listed}" if names else "there is none"
 
 
 class Reader:
