@@ -1,0 +1,352 @@
+"""Verdicts on small synthetic recordings."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipcli.core.geometry import Transform, frozen
+from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.judge.judge import judge
+from manipcli.judge.verdict import ExpectationOutcome, Verdict
+from manipcli.model.build_scene import build_scene
+from manipcli.model.robot import Group, Joint, JointLimits, Link, RobotModel
+from manipcli.model.state import Contact, WorldState
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, TaskEvent
+from manipcli.spec.base import Model
+from manipcli.spec.task import BodySpec, TaskSpec
+
+PERIOD = 0.01
+T = 201  # 2 s
+
+
+def joint(name: str, parent: str, child: str, sliding: bool = False) -> Joint:
+    kind = "prismatic" if sliding else "revolute"
+    return Joint(name, kind, parent, child, Transform.identity(), frozen([0, 0, 1]), JointLimits())  # type: ignore[arg-type]
+
+
+ROBOT = RobotModel(
+    name="arm",
+    root="base",
+    links=tuple(Link(name, None, (), ()) for name in ("base", "one", "finger")),
+    joints=(joint("j1", "base", "one"), joint("slide", "one", "finger", sliding=True)),
+    groups=(Group("arm", ("j1",)), Group("all", ("j1", "slide"))),
+    poses=(),
+    transmissions=(),
+    X_WB=Transform.identity(),
+    urdf="",
+)
+BODIES: dict[str, Any] = {
+    "desk": {"box": {"size": [1, 1, 0.4]}, "pose": {"xyz": [0, 0, 0.2]}, "fixed": True},
+    "ball": {"sphere": {"radius": 0.02}, "mass": 0.01, "rests_on": "desk", "at": [0.3, 0.0]},
+    "cube": {"box": {"size": [0.1, 0.1, 0.1]}, "mass": 1.0, "rests_on": "desk", "at": [0.0, 0.0]},
+}
+SCENE = build_scene(
+    TaskSpec.model_construct(
+        task="t", floor=False, scene={name: BodySpec.model_validate(body) for name, body in BODIES.items()}
+    )
+)
+
+
+def recording(**changes: Any) -> Recording:
+    """2 s of everything at rest; two steps, both done."""
+    movable = SCENE.movable
+    times = np.arange(T) * PERIOD
+    states = WorldState(
+        time=times,
+        position=np.zeros((T, 2)),
+        velocity=np.zeros((T, 2)),
+        effort=np.zeros((T, 2)),
+        body_position=np.tile([body.X_WO.p for body in movable], (T, 1, 1)),
+        body_quat_xyzw=np.tile([body.X_WO.quat_xyzw for body in movable], (T, 1, 1)),
+        body_linear=np.zeros((T, 2, 3)),
+        body_angular=np.zeros((T, 2, 3)),
+    )
+    trace = ControllerTrace(
+        name="arm_controller",
+        joints=("j1", "slide"),
+        times=times,
+        reference_position=np.zeros((T, 2)),
+        reference_velocity=np.zeros((T, 2)),
+        position=np.zeros((T, 2)),
+        output=np.zeros((T, 2)),
+    )
+    plan = {"steps": [{"id": "go", "verb": "move", "planned_duration": 0.9}, _planned("wait_1")]}
+    made = Recording(
+        joint_names=("j1", "slide"),
+        body_names=("ball", "cube"),
+        states=states,
+        controllers=(trace,),
+        contacts=(ContactSnapshot(0.0, (Contact("cube", "desk", 9.81, -1e-5),)),),
+        events=(*step("go", 0.0, 1.0), *step("wait_1", 1.0, 2.0)),
+        metadata={
+            "run": {
+                "task": "t",
+                "seed": "7",
+                "engine": "pybullet",
+                "physics": "full",
+                "period": "0.01",
+                "status": "complete",
+            }
+        },
+        attachments={"plan.json": json.dumps(plan).encode()},
+        lost=None,
+    )
+    return replace(made, **changes)
+
+
+def _planned(name: str) -> dict[str, object]:
+    return {"id": name, "verb": "wait", "planned_duration": 1.0}
+
+
+def step(name: str, start: float, end: float, outcome: str = "done", text: str = "") -> tuple[TaskEvent, TaskEvent]:
+    return (
+        TaskEvent(start, "step_started", name, "move", "", "", "t.yaml:9"),
+        TaskEvent(end, "step_ended", name, "move", outcome, text, "t.yaml:9"),
+    )
+
+
+def run(**metadata: str) -> dict[str, dict[str, str]]:
+    return {"run": recording().metadata["run"] | metadata}
+
+
+def judged(made: Recording, *expect: tuple[str, dict[str, Any]]) -> Verdict:
+    specs: list[tuple[str, Model]] = [(name, EXPECTATIONS[name].spec.model_validate(body)) for name, body in expect]
+    for name, spec in specs:
+        assert EXPECTATIONS[name].check(spec, ROBOT, SCENE, ("go", "wait_1")) == ()
+    return judge(made, expect=specs, robot=ROBOT, scene=SCENE)
+
+
+def one(made: Recording, name: str, **written: Any) -> ExpectationOutcome:
+    (found,) = judged(made, (name, written)).expectations
+    return found
+
+
+def moved(body: int, from_tick: int, by: tuple[float, float, float], to_tick: int = T) -> Recording:
+    """The recording with a body elsewhere from one tick to another."""
+    made = recording()
+    position = made.states.body_position.copy()
+    position[from_tick:to_tick, body] += by
+    return replace(made, states=replace(made.states, body_position=position))
+
+
+def test_a_task_without_expectations_passes_when_its_steps_are_done_and_says_so() -> None:
+    verdict = judged(recording())
+    assert verdict.verdict == "passed"
+    assert verdict.text == "all 2 steps done; the task states no expectations"
+    assert (verdict.task, verdict.seed, verdict.engine) == ("t", 7, "pybullet")
+    assert verdict.simulated_time == pytest.approx(2.0)
+    assert [(s.id, s.verb, s.outcome, s.started, s.ended, s.planned_duration) for s in verdict.steps] == [
+        ("go", "move", "done", 0.0, 1.0, 0.9),
+        ("wait_1", "wait", "done", 1.0, 2.0, 1.0),
+    ]
+
+
+def test_met_expectations_pass_with_their_margins() -> None:
+    verdict = judged(
+        recording(),
+        ("near", {"object": "cube", "to": "start", "within": 0.02}),
+        ("upright", {"object": "cube", "within": 0.1}),
+        ("duration", {"below": 60}),
+        ("tracking", {"group": "all", "within": 0.05}),
+        ("no_collision", {"pairs": [["robot", "desk"]]}),
+        ("step_done", {"step": "go"}),
+    )
+    assert verdict.verdict == "passed"
+    assert [(e.name, e.outcome, e.margin, e.unit) for e in verdict.expectations] == [
+        ("near", "passed", 0.02, "m"),
+        ("upright", "passed", 0.1, "rad"),
+        ("duration", "passed", 58.0, "s"),
+        ("tracking", "passed", 0.05, "rad"),
+        ("no_collision", "passed", 0.0, "N"),
+        ("step_done", "passed", 1.0, ""),
+    ]
+
+
+def test_what_holds_at_the_end_must_have_held_for_half_a_second() -> None:
+    near = {"object": "cube", "to": "start", "within": 0.02}
+    away_early = one(moved(1, 0 + 1, (0.05, 0, 0), 150), "near", **near)
+    assert (away_early.outcome, away_early.margin) == ("passed", pytest.approx(0.02))
+    for first, last in ((150, 151), (160, 170), (200, 201)):
+        found = one(moved(1, first, (0.05, 0, 0), last), "near", **near)
+        assert (found.outcome, found.unit) == ("failed", "m")
+        assert found.margin == pytest.approx(-0.03)
+        assert found.at == pytest.approx(first * PERIOD)
+
+
+def test_a_recording_shorter_than_the_window_is_judged_whole() -> None:
+    made = recording()
+    short = replace(made, states=WorldState(**{f: getattr(made.states, f)[:3] for f in WorldState.__slots__}))
+    assert one(short, "at_rest", object="cube").outcome == "passed"
+
+
+def test_bodies_and_joints_are_matched_by_name() -> None:
+    made = recording()
+    swapped = replace(
+        made,
+        body_names=("cube", "ball"),
+        states=replace(made.states, body_position=made.states.body_position[:, ::-1].copy()),
+    )
+    assert one(swapped, "near", object="ball", to=[0.3, 0.0, 0.42], within=0.01).margin == pytest.approx(0.01)
+
+
+def test_the_word_of_a_second_expectation_is_numbered() -> None:
+    near = ("near", {"object": "cube", "to": "start", "within": 0.02})
+    assert [e.name for e in judged(recording(), near, near, ("duration", {"below": 3})).expectations] == [
+        "near",
+        "near_2",
+        "duration",
+    ]
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_tracking_names_the_worst_joint_its_unit_and_its_moment(column: int) -> None:
+    made = recording()
+    trace = made.controllers[0]
+    position = trace.position.copy()
+    position[70, column] = -0.08
+    position[90, 1 - column] = 0.06
+    found = one(replace(made, controllers=(replace(trace, position=position),)), "tracking", group="all", within=0.05)
+    assert found.outcome == "failed"
+    assert found.margin == pytest.approx(-0.03)
+    assert found.at == pytest.approx(0.7)
+    assert (found.unit, found.text) == (("rad", "joint 'j1'"), ("m", "joint 'slide'"))[column]
+
+
+def test_tracking_without_a_reference_is_not_evaluated() -> None:
+    found = one(recording(controllers=()), "tracking", group="arm", within=0.05)
+    assert (found.outcome, found.margin) == ("not_evaluated", None)
+    assert "joint 'j1'" in found.text
+
+
+def touches(*contacts: tuple[float, str, str, float]) -> Recording:
+    return recording(contacts=tuple(ContactSnapshot(t, (Contact(a, b, f, -1e-4),)) for t, a, b, f in contacts))
+
+
+def test_no_collision_gives_the_hardest_touch() -> None:
+    made = touches((0.3, "desk", "robot/one", 2.0), (0.5, "desk", "robot/finger", 5.0), (0.7, "ball", "desk", 9.0))
+    found = one(made, "no_collision", pairs=[["robot", "desk"]])
+    assert (found.outcome, found.margin, found.unit, found.at) == ("failed", -5.0, "N", 0.5)
+    assert "'robot/finger'" in found.text
+    assert one(made, "no_collision", pairs=[["desk", "robot/one"]]).margin == -2.0
+    assert one(made, "no_collision", pairs=[["robot", "ball"], ["cube", "ball"]]).margin == 0.0
+    assert one(made, "no_collision", pairs=[["robot", "desk"]], below=6.0).margin == 1.0
+
+
+def test_parts_that_are_near_without_pressing_do_not_count() -> None:
+    assert one(touches((0.1, "desk", "robot/one", 0.0)), "no_collision", pairs=[["robot", "desk"]]).outcome == "passed"
+
+
+def test_without_physics_nothing_that_moves_by_physics_is_evaluated_and_the_verdict_is_failed() -> None:
+    ideal = recording(metadata=run(engine="kinematic", physics="none"))
+    for name, written in (
+        ("near", {"object": "cube", "to": "start", "within": 0.02}),
+        ("upright", {"object": "cube", "within": 0.1}),
+        ("no_collision", {"pairs": [["robot", "desk"]]}),
+    ):
+        verdict = judged(ideal, (name, written))
+        assert verdict.expectations[0].outcome == "not_evaluated"
+        assert verdict.expectations[0].margin is None
+        assert verdict.verdict == "failed"
+        assert "not evaluated" in verdict.text
+    fixed = judged(ideal, ("upright", {"object": "desk", "within": 0.1}), ("tracking", {"group": "arm", "within": 0.1}))
+    assert fixed.verdict == "passed"
+
+
+def test_a_recording_without_states_evaluates_nothing() -> None:
+    made = recording()
+    empty = replace(made, states=WorldState(**{f: getattr(made.states, f)[:0] for f in WorldState.__slots__}))
+    verdict = judged(empty, ("duration", {"below": 60}), ("near", {"object": "cube", "to": "start", "within": 1}))
+    assert [e.outcome for e in verdict.expectations] == ["not_evaluated", "not_evaluated"]
+    assert verdict.verdict == "failed"
+    assert verdict.simulated_time == 0.0
+
+
+def test_a_body_that_was_not_recorded_is_named() -> None:
+    made = recording(body_names=("ball", "other"))
+    found = one(made, "near", object="cube", to="start", within=1)
+    assert (found.outcome, found.text) == ("not_evaluated", "the recording does not hold body 'cube'")
+
+
+def test_a_state_that_is_not_finite_is_never_a_pass() -> None:
+    found = one(moved(1, 180, (np.nan, 0, 0)), "near", object="cube", to="start", within=1)
+    assert found.outcome == "not_evaluated"
+    assert "t = 1.800 s" in found.text
+
+
+@pytest.mark.parametrize("outcome", ["failed", "timeout"])
+def test_a_step_that_is_not_done_fails_the_run_before_any_expectation(outcome: str) -> None:
+    events = (*step("go", 0.0, 1.0), *step("wait_1", 1.0, 2.0, outcome, "no contact"))
+    verdict = judged(recording(events=events), ("duration", {"below": 1}))
+    assert verdict.verdict == "failed"
+    assert verdict.text == f"step 'wait_1' {outcome}: no contact"
+    assert [s.outcome for s in verdict.steps] == ["done", outcome]
+    assert one(recording(events=events), "step_done", step="wait_1").margin == -1.0
+
+
+def test_steps_that_never_ran_or_never_ended_are_told_apart() -> None:
+    started = step("go", 0.0, 1.0)[:1]
+    assert [s.outcome for s in judged(recording(events=started)).steps] == ["failed", "not_run"]
+    assert [s.outcome for s in judged(recording(events=())).steps] == ["not_run", "not_run"]
+    stopped = judged(recording(events=started, metadata=run(status="interrupted")))
+    assert [s.outcome for s in stopped.steps] == ["interrupted", "not_run"]
+
+
+def test_a_log_without_plan_knows_the_steps_that_started_and_one_without_steps_fails() -> None:
+    assert [s.id for s in judged(recording(attachments={})).steps] == ["go", "wait_1"]
+    assert [s.id for s in judged(recording(attachments={"plan.json": b"]"})).steps] == ["go", "wait_1"]
+    assert judged(recording(attachments={}, events=())).verdict == "failed"
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"metadata": run(status="interrupted")}, "RUN101"),
+        ({"metadata": run(status="crashed")}, "RUN102"),
+        ({"metadata": run(status="running")}, "RUN103"),
+        ({"metadata": {}}, "RUN103"),
+        ({"lost": "the file ends in a record"}, "RUN104"),
+    ],
+)
+def test_a_run_that_did_not_come_to_its_end_is_an_error_whatever_else_is_true(
+    changes: dict[str, Any], code: str
+) -> None:
+    verdict = judged(recording(**changes), ("duration", {"below": 1}))
+    assert verdict.verdict == "error"
+    assert [finding.code for finding in verdict.errors] == [code]
+
+
+def test_a_run_that_physics_ended_is_failed_and_not_an_error() -> None:
+    events = (*step("go", 0.0, 1.0), *step("wait_1", 1.0, 1.5, "failed", "'cube' explodes at t = 1.500 s"))
+    verdict = judged(recording(events=events, metadata=run(status="failed")))
+    assert (verdict.verdict, verdict.errors) == ("failed", ())
+
+
+def test_the_same_recording_gives_the_same_verdict() -> None:
+    expect = [
+        ("near", {"object": "cube", "to": "start", "within": 0.02}),
+        ("tracking", {"group": "all", "within": 0.1}),
+    ]
+    assert judged(recording(), *expect) == judged(recording(), *expect)
+
+
+@pytest.mark.parametrize(
+    ("name", "written", "loc", "hint"),
+    [
+        ("tracking", {"group": "ram", "within": 1}, ("group",), "did you mean 'arm'?"),
+        ("no_collision", {"pairs": [["robot", "deks"]]}, ("pairs", 0, 1), "did you mean 'desk'?"),
+        ("no_collision", {"pairs": [["robot/fingr", "desk"]]}, ("pairs", 0, 0), "did you mean 'robot/finger'?"),
+        ("step_done", {"step": "wait_2"}, ("step",), "did you mean 'wait_1'?"),
+        ("near", {"object": "cub", "to": "start", "within": 1}, ("object",), "did you mean 'cube'?"),
+    ],
+)
+def test_unknown_names_are_told_before_anything_runs(
+    name: str, written: dict[str, Any], loc: tuple[str | int, ...], hint: str
+) -> None:
+    member = EXPECTATIONS[name]
+    (problem,) = member.check(member.spec.model_validate(written), ROBOT, SCENE, ("go", "wait_1"))
+    assert (problem.loc, problem.hint) == (loc, hint)
