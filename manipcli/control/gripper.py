@@ -56,7 +56,8 @@ class GripperGoal:
 class GripperController:
     """One goal at a time; holds in between. The goal succeeds when every finger has stopped; see `GoalResult.fingers`.
 
-    A finger has *contact* when the sum of its joints' contact forces meets the goal's force; it is *stalled* when none
+    A finger has *contact* when the sum of its joints' contact forces meets the goal's force, after a low pass of the time
+    constant `contact_time`, so that the knock of the first touch does not count as a grip; it is *stalled* when none
     of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity` for
     `stall_time`; it has *reached* when all its joints are within `goal_tolerance` and their references have arrived.
 
@@ -68,6 +69,7 @@ class GripperController:
         speed: [rad/s or m/s] of the references.
         max_effort: (n) or a number, N m or N; None: unlimited here.
         stall_velocity, stall_time, goal_tolerance: see above.
+        contact_time: [s] of the low pass on contact forces; 0 takes them as they are.
         feed_forward: what the caller of `update` shall pass for this controller.
         compat: order of the PID integration.
 
@@ -89,6 +91,7 @@ class GripperController:
         stall_velocity: float = 0.02,
         stall_time: float = 0.2,
         goal_tolerance: float = 0.05,
+        contact_time: float = 0.02,
         feed_forward: FeedForward = "none",
         compat: Compat = "ros2",
     ) -> None:
@@ -104,6 +107,7 @@ class GripperController:
         unlimited = np.full(n, math.inf)
         self._default_effort = unlimited if max_effort is None else np.broadcast_to(max_effort, (n,)).astype(np.float64)
         self._stall_velocity, self._stall_time, self._goal_tolerance = stall_velocity, stall_time, goal_tolerance
+        self._contact_time = contact_time
 
         self._reference, self._velocity, self._acceleration, self._command = np.zeros((4, n))
         self._error, self._error_rate, self._step, self._measured = np.zeros((4, n))
@@ -120,6 +124,7 @@ class GripperController:
         self._force: float | None = None
         self._stops: list[FingerStop | None] = []
         self._moved: list[float] = []
+        self._felt: list[float] = []
         self._texts: list[str] = []
         self._moving = np.zeros(n)
         self._targets: list[float] = [0.0] * n
@@ -164,6 +169,7 @@ class GripperController:
         self._target, self._force, self._fingers = target, goal.force, fingers
         self._stops = [None] * len(fingers)
         self._texts = [""] * len(fingers)
+        self._felt = [0.0] * len(fingers)
         self._targets = target.tolist()
         self._moving = np.ones(n)
         self._ticks_left = 0
@@ -207,7 +213,7 @@ class GripperController:
                 self._starts = False
                 self._began = time
                 self._moved = [time] * len(self._fingers)
-            self._judge(time, measured, contact_force)
+            self._judge(time, period, measured, contact_force)
             if self._goal is not None:
                 self._ramp(period)
         np.subtract(self._reference, measured.position, out=self._error)
@@ -237,12 +243,13 @@ class GripperController:
         ticks = np.floor(way[moves] / step[moves])
         self._ticks_left = int(ticks.min()) if ticks.size else UNTIL_CHANGED
 
-    def _judge(self, time: float, measured: JointState, contact_force: Array | None) -> None:
+    def _judge(self, time: float, period: float, measured: JointState, contact_force: Array | None) -> None:
         """Stops the fingers that met something or arrived; ends the goal when all have."""
         position: list[float] = measured.position.tolist()
         velocity: list[float] = measured.velocity.tolist()
         wanted = self._force
         force = contact_force.tolist() if contact_force is not None and wanted is not None else None
+        share = period / (period + self._contact_time)
         tolerance, slow = self._goal_tolerance, self._stall_velocity
         for f, finger in enumerate(self._fingers):
             if self._stops[f] is not None:
@@ -251,8 +258,9 @@ class GripperController:
                 pressed = 0.0
                 for j in finger:
                     pressed += force[j]
-                if pressed >= wanted:
-                    self._stop(f, "contact", f"contact at {pressed:.3g} N (asked {wanted:.3g} N)")
+                felt = self._felt[f] = self._felt[f] + share * (pressed - self._felt[f])
+                if felt >= wanted:
+                    self._stop(f, "contact", f"contact at {felt:.3g} N (asked {wanted:.3g} N)")
                     continue
             far = still = False
             for j in finger:

@@ -1,0 +1,187 @@
+"""The gripper on a fake hand: springs for contacts, walls for stalls, nothing at all."""
+
+import numpy as np
+import pytest
+
+from manipcli.control.action import ErrorCode
+from manipcli.control.controller import JointState
+from manipcli.control.gripper import GripperController, GripperGoal
+from manipcli.core.errors import InvalidArgument
+from manipcli.spec.controllers import GainsSpec
+
+JOINTS = ("thumb_1", "thumb_2", "finger_1", "finger_2")
+FINGERS = ((0, 1), (2, 3))
+PERIOD = 0.001
+INERTIA = 1e-3
+
+
+def make(**more):
+    settings = {
+        "gains": {j: GainsSpec(p=3.0, d=0.1) for j in JOINTS},
+        "fingers": FINGERS,
+        "speed": 2.0,
+        "max_effort": 2.0,
+        "goal_tolerance": 0.02,
+    }
+    return GripperController(name="hand", joints=JOINTS, **(settings | more))
+
+
+class Hand:
+    """Light joints; each has a wall (a stiff, damped spring) beyond which it presses. Contact force per joint."""
+
+    def __init__(self, walls):
+        self.q, self.v = np.zeros(4), np.zeros(4)
+        self.walls = np.array(walls, dtype=float)
+        self.time = 0.0
+        self.references = []
+
+    def run(self, controller, seconds):
+        for _ in range(round(seconds / PERIOD)):
+            depth = np.maximum(self.q - self.walls, 0.0)
+            force = 500.0 * depth  # N, on a lever of 0.1 m
+            measured = JointState(position=self.q.copy(), velocity=self.v.copy(), effort=np.zeros(4))
+            output = controller.update(self.time, PERIOD, measured, contact_force=force)
+            self.references.append(output.position.copy())
+            torque = output.command - 0.1 * force - 0.02 * self.v * (depth > 0)
+            self.v += PERIOD * torque / INERTIA
+            self.q += PERIOD * self.v
+            self.time += PERIOD
+        return output
+
+
+FREE = [9, 9, 9, 9]
+
+
+def test_nothing_in_the_hand_means_every_finger_reached():
+    controller, hand = make(), Hand(FREE)
+    handle = controller.send_goal(GripperGoal(target=np.array([1, 0.5, 1, 0.5]), force=2.0))
+    hand.run(controller, 1.0)
+    assert (handle.status, handle.result.code) == ("succeeded", ErrorCode.SUCCESSFUL)
+    assert handle.result.fingers == ("reached", "reached")
+    assert hand.q == pytest.approx([1, 0.5, 1, 0.5], abs=0.01)
+
+
+def test_references_move_at_the_speed_and_never_past_the_target():
+    controller, hand = make(), Hand(FREE)
+    controller.send_goal(GripperGoal(target=np.array([1, 0.5, -0.3, 0.0])))
+    hand.run(controller, 0.7)
+    references = np.array(hand.references)
+    assert np.abs(np.diff(references, axis=0)).max() <= 2.0 * PERIOD * (1 + 1e-9)
+    assert references[249] == pytest.approx([0.5, 0.5, -0.3, 0.0], abs=1e-9)
+    assert references[-1] == pytest.approx([1, 0.5, -0.3, 0.0], abs=1e-12)
+    assert references[:, 1].max() <= 0.5 + 1e-12
+
+
+def test_each_finger_stops_on_its_own_at_the_force_and_keeps_pressing():
+    controller, hand = make(), Hand([0.3, 9, 0.6, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1]), force=3.0))
+    output = hand.run(controller, 1.5)
+    assert handle.result.fingers == ("contact", "contact")
+    assert "thumb_1" in handle.result.text
+    assert "contact at 3" in handle.result.text
+    references = np.array(hand.references)
+    stopped = [int(np.flatnonzero(np.diff(references[:, j]))[-1]) for j in (0, 2)]
+    assert stopped[0] < stopped[1]
+    force = 500.0 * np.maximum(hand.q - hand.walls, 0.0)
+    assert force[[0, 2]] == pytest.approx([3.0, 3.0], rel=0.3)  # the frozen spring holds about what stopped it
+    assert output.velocity.tolist() == [0, 0, 0, 0]
+
+
+def test_the_knock_of_the_first_touch_is_no_grip():
+    controller = make()
+    still = JointState(position=np.zeros(4), velocity=np.ones(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=np.ones(4), force=3.0))
+    for k in range(60):
+        knock = np.full(4, 20.0 if k == 10 else 0.0)
+        controller.update(k * PERIOD, PERIOD, still, contact_force=knock)
+    assert handle.active
+    for k in range(60, 160):
+        controller.update(k * PERIOD, PERIOD, still, contact_force=np.array([2.0, 2.0, 0.0, 5.0]))
+    assert handle.result.fingers == ("contact", "contact")
+
+
+def test_a_finger_that_is_blocked_stalls_and_its_effort_is_clamped():
+    controller, hand = make(max_effort=0.5), Hand([0.3, 9, 9, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1])))
+    output = hand.run(controller, 1.5)
+    assert handle.result.fingers == ("stalled", "reached")
+    assert output.command[0] == 0.5
+    assert output.position[0] < 1.5  # frozen where it stalled or at the target's ramp, never beyond
+    assert "stalled" in handle.result.text
+
+
+def test_stall_takes_its_time():
+    controller = make(stall_time=0.05)
+    frozen = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=np.ones(4)))
+    for k in range(50):
+        controller.update(k * PERIOD, PERIOD, frozen)
+    assert handle.active
+    for k in range(50, 53):
+        controller.update(k * PERIOD, PERIOD, frozen)
+    assert handle.result.fingers == ("stalled", "stalled")
+
+
+def test_opening_ignores_contact():
+    controller, hand = make(), Hand([0.3, 9, 9, 9])
+    controller.send_goal(GripperGoal(target=np.array([1.0, 0, 1.0, 0]), force=2.0))
+    hand.run(controller, 1.0)
+    handle = controller.send_goal(GripperGoal(target=np.zeros(4)))
+    hand.run(controller, 1.0)
+    assert handle.result.fingers == ("reached", "reached")
+    assert hand.q == pytest.approx(np.zeros(4), abs=0.01)
+
+
+def test_effort_of_a_goal_replaces_the_controllers_and_includes_the_feed_forward():
+    controller = make()
+    still = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
+    controller.send_goal(GripperGoal(target=np.zeros(4), max_effort=np.array([0.1, 0.2, 0.3, 0.4])))
+    output = controller.update(0.0, PERIOD, still, np.array([1.0, -1.0, 0.25, 0.0]))
+    assert output.command.tolist() == [0.1, -0.2, 0.25, 0.0]
+
+
+def test_a_goal_finds_its_fingers_in_the_goal_first():
+    controller = make()
+    still = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=np.zeros(4), fingers=((0,), (1,), (2, 3))))
+    controller.update(0.0, PERIOD, still)
+    assert handle.result.fingers == ("reached",) * 3
+
+
+def test_cancel_and_preemption_and_deactivation():
+    controller, hand = make(), Hand(FREE)
+    first = controller.send_goal(GripperGoal(target=np.ones(4)))
+    hand.run(controller, 0.1)
+    second = controller.send_goal(GripperGoal(target=np.ones(4)))
+    assert (first.status, first.result.code) == ("aborted", ErrorCode.INVALID_GOAL)
+    hand.run(controller, 0.1)
+    second.cancel()
+    assert second.status == "canceled"
+    held = hand.run(controller, 0.1).position.copy()
+    assert np.array_equal(held, hand.run(controller, 0.1).position)
+    third = controller.send_goal(GripperGoal(target=np.ones(4)))
+    controller.deactivate(hand.time)
+    assert third.result.code is ErrorCode.INVALID_GOAL
+    measured = hand.q.copy()
+    assert np.array_equal(hand.run(controller, PERIOD).position, measured)
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        GripperGoal(target=np.zeros(3)),
+        GripperGoal(target=np.full(4, np.nan)),
+        GripperGoal(target=np.zeros(4), force=0.0),
+        GripperGoal(target=np.zeros(4), max_effort=np.zeros(4)),
+        GripperGoal(target=np.zeros(4), fingers=((0, 1), (1, 2, 3))),
+        GripperGoal(target=np.zeros(4), fingers=((0, 1),)),
+    ],
+)
+def test_goals_that_make_no_sense_are_refused(goal):
+    with pytest.raises(InvalidArgument):
+        make().send_goal(goal)
+
+
+def test_gains_all_zero_are_refused():
+    with pytest.raises(InvalidArgument, match="thumb_2"):
+        make(gains={j: GainsSpec(p=1.0) for j in JOINTS if j != "thumb_2"})
