@@ -24,11 +24,10 @@ from manipcli.model.kinematics import Kinematics
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
-_ITERATIONS = 60  # of one try; the median is 6
+_ITERATIONS = 40  # of one try; fewer than 30 cost more restarts than they save
 _TRIES = 40  # random restarts; past these a pose is called unreachable
 _ENOUGH = 3  # solutions among which the nearest to the seed is taken
 _AT_LIMIT = 1e-6  # rad or m
-_STEP = 0.8  # rad or m: largest change of one joint in one iteration
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
 
 
@@ -181,9 +180,6 @@ class InverseKinematics:
             previous = cost
             here = q[columns]
             step = _damped_step(J, error, cost + 1e-9, here, lower, upper)
-            largest = float(np.max(np.abs(step)))
-            if largest > _STEP:
-                step *= _STEP / largest
             q[columns] = np.minimum(np.maximum(here + step, lower), upper)
         return self._solution(X_WT, q)
 

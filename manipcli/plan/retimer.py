@@ -76,8 +76,9 @@ def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: fl
         return sampled(optimal, nominal, duration)
     window = float(np.max(limits.acceleration / limits.jerk))
     smooth = [_averaged(optimal, nominal, factor * window, period) for factor in _WINDOWS]
-    progress, length = min(smooth, key=lambda timing: sampled(timing[0], timing[1], None).duration)
-    return sampled(progress, length, duration)
+    motions = [sampled(progress, length, None) for progress, length in smooth]
+    best = min(range(len(motions)), key=lambda k: motions[k].duration)
+    return motions[best] if duration is None else sampled(*smooth[best], duration)
 
 
 Progress = Callable[[Array], tuple[Array, Array, Array]]
