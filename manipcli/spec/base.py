@@ -16,7 +16,8 @@ _NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function
 
 def _make_strict(schema: object) -> None:
     if isinstance(schema, dict):
-        if schema.get("type") in _STRICT:
+        kind = schema.get("type")  # of a schema; a dict of fields may have a field called `type`
+        if isinstance(kind, str) and kind in _STRICT:
             schema["strict"] = True
         for key, value in schema.items():
             if key not in _NO_SCHEMA:

@@ -1,0 +1,229 @@
+"""The plan carried out: the loop over steps, between the engine that moves and the recorder that sees."""
+
+from __future__ import annotations
+
+import time as wall_clock
+from collections.abc import Sequence
+from typing import Final, Protocol
+
+import numpy as np
+
+from manipcli.control.controller import ControllerOutput
+from manipcli.control.factory import build_controllers
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import SimulationFailed
+from manipcli.flow.load import Task
+from manipcli.flow.plan import Plan, PlannedStep
+from manipcli.judge.verdict import StepOutcome, StepWord
+from manipcli.model.condition import World
+from manipcli.model.conditions import CONDITIONS
+from manipcli.model.state import Contact, WorldState
+from manipcli.record.recorder import Recorder
+from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.executor import DONE, Executor, MotionEnd, Until
+from manipcli.simulate.quiet import stdout_to_stderr
+from manipcli.simulate.session import Session
+from manipcli.spec.task import StepSpec
+
+DEFAULT_UNTIL_TIME: Final = 30.0
+"""How long [s] an `until` without `timeout` is waited for."""
+SETTLED_SPEED: Final = 0.02
+"""Bodies slower than this [m/s] have settled."""
+SETTLED_SHIFT: Final = 0.01
+"""A body that moves further than this [m] while settling was put where it cannot stay."""
+AFTERMATH: Final = 0.6
+"""How long [s] the world is watched after the last step, so that "at rest" can be judged."""
+PROGRESS_TICKS: Final = 50
+
+
+class Progress(Protocol):
+    """Whoever shows how far a run is."""
+
+    def step_started(self, step: PlannedStep, index: int, total: int) -> None:
+        """Step `index` (from 0) of `total` begins."""
+        ...
+
+    def tick(self, simulated_time: float, wall: float) -> None:
+        """Now and then; both [s] from the start."""
+        ...
+
+    def step_ended(self, outcome: StepOutcome) -> None:
+        """A step is over, well or not."""
+        ...
+
+
+class Watch:
+    """Hands every tick to the recorder, and now and then the time to whoever shows the progress."""
+
+    def __init__(self, recorder: Recorder, progress: Progress | None, period: float) -> None:
+        self._recorder = recorder
+        self._progress = progress
+        self._period = period
+        self._began = wall_clock.perf_counter()
+
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+        self._recorder.tick(tick, state, outputs)
+        if self._progress is not None and tick % PROGRESS_TICKS == 0:
+            self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
+
+    def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
+        self._recorder.contacts(tick, contacts)
+
+
+def controllers(task: Task) -> ControllerManager:
+    """The task's controllers, for its robot and control period."""
+    file = task.controllers_file
+    period = task.spec.simulation.control_period
+    return build_controllers(file.spec, task.robot, period, place=lambda loc: file.place(*loc))
+
+
+def simulate(
+    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
+) -> None:
+    """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
+
+    Raises:
+        SimulationFailed: the world does not stand still before the start, or leaves the plausible.
+    """
+    simulation = task.spec.simulation
+    settings = EngineSettings(
+        step=simulation.step,
+        substeps=round(simulation.control_period / simulation.step),
+        interfaces=manager.interfaces,
+        start=plan.start.position,
+    )
+    engine = ENGINES[simulation.engine].open(task.robot, task.scene, settings)
+    try:
+        with stdout_to_stderr():
+            session = Session(
+                robot=task.robot,
+                scene=task.scene,
+                engine=engine,
+                manager=manager,
+                kinematics=plan.planner.kinematics,
+                period=simulation.control_period,
+            )
+            _settle(task, session)
+            session.restart_clock(Watch(recorder, progress, simulation.control_period))
+            _Run(task, plan, session, recorder, progress).steps()
+    finally:
+        engine.close()
+
+
+def _settle(task: Task, session: Session) -> None:
+    """Let everything come to rest, and refuse a start from which something slides, falls or is thrown.
+
+    Raises:
+        SimulationFailed: names the body, and how far or how fast it moved.
+    """
+    Executor(session).hold(task.spec.simulation.settle)
+    state = session.engine.read()
+    for k, body in enumerate(task.scene.movable):
+        shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
+        speed = float(np.linalg.norm(state.body_linear[k]))
+        if not shift < SETTLED_SHIFT:
+            raise SimulationFailed(
+                f"'{body.name}' moved by {1000 * shift:.1f} mm before the start: "
+                "it overlaps something, or stands on nothing",
+                time=0.0,
+            )
+        if not speed < SETTLED_SPEED:
+            raise SimulationFailed(f"'{body.name}' does not come to rest ({speed:.3g} m/s before the start)", time=0.0)
+
+
+class _Run:
+    """One pass over the steps."""
+
+    def __init__(
+        self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None
+    ) -> None:
+        self._task = task
+        self._plan = plan
+        self._session = session
+        self._recorder = recorder
+        self._progress = progress
+        self._executor = Executor(session)
+        self._world: World | None = None
+
+    def steps(self) -> None:
+        """Every step in order, until one is not done."""
+        total = len(self._plan.steps)
+        for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
+            if self._progress is not None:
+                self._progress.step_started(planned, index, total)
+            outcome = self._step(index, step, planned)
+            if self._progress is not None:
+                self._progress.step_ended(outcome)
+            if outcome.outcome != "done":
+                break
+        self._executor.hold(AFTERMATH)
+
+    def _step(self, index: int, step: StepSpec, planned: PlannedStep) -> StepOutcome:
+        place = self._task.log_place("steps", index)
+        started = self._session.time
+        self._event("step_started", planned, "", "", place)
+        end = self._motions(step, planned, started, place)
+        words: dict[str, StepWord] = {"done": "done", "failed": "failed", "timeout": "timeout"}
+        self._event("step_ended", planned, words[end.outcome], end.text, place)
+        return StepOutcome(
+            id=planned.id,
+            verb=planned.verb,
+            outcome=words[end.outcome],
+            started=started,
+            ended=self._session.time,
+            planned_duration=planned.plan.duration,
+            text=end.text,
+        )
+
+    def _motions(self, step: StepSpec, planned: PlannedStep, started: float, place: str) -> MotionEnd:
+        until = self._until(step)
+        deadline = None if step.timeout is None else started + step.timeout
+        awaited = until is not None
+        texts = []
+        for motion in planned.plan.motions:
+            self._event("phase_started", planned, "", motion.label, place)
+            if motion.awaits and until is not None and deadline is None:
+                deadline = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
+            end = self._executor.run(motion, until=until, deadline=deadline)
+            if end.outcome != "done":
+                return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
+            awaited = awaited and not motion.awaits
+            texts += [end.text] if end.text else []
+        if awaited and until is not None:
+            return self._executor.wait(until, deadline=deadline or self._session.time + DEFAULT_UNTIL_TIME)
+        return MotionEnd("done", "; ".join(texts)) if texts else DONE
+
+    def _until(self, step: StepSpec) -> Until | None:
+        """The step's condition as a question about the live state."""
+        if step.until is None:
+            return None
+        condition = CONDITIONS[step.until.name]
+        body, world = step.until.body, self._started_world()
+        return lambda state: bool(condition.margin(body, world, state) >= 0.0)
+
+    def _started_world(self) -> World:
+        """What conditions are asked in; the start is the state at time 0."""
+        if self._world is None:
+            state = self._session.engine.read()
+            self._world = World(self._task.robot, self._task.scene, _copied(state))
+        return self._world
+
+    def _event(self, kind: str, step: PlannedStep, outcome: str, text: str, place: str) -> None:
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=place
+        )
+
+
+def _copied(state: WorldState) -> WorldState:
+    """The engine overwrites its own arrays."""
+    return WorldState(
+        time=state.time.copy(),
+        position=state.position.copy(),
+        velocity=state.velocity.copy(),
+        effort=state.effort.copy(),
+        body_position=state.body_position.copy(),
+        body_quat_xyzw=state.body_quat_xyzw.copy(),
+        body_linear=state.body_linear.copy(),
+        body_angular=state.body_angular.copy(),
+    )

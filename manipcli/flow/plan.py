@@ -1,0 +1,137 @@
+"""The whole task planned before anything moves: every step from the predicted end of the one before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, frozen
+from manipcli.flow.load import Task
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Motion, Situation, StepPlan
+from manipcli.plan.steps import STEPS
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import GripperSpec
+from manipcli.spec.task import StepSpec
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStep:
+    """A step as written, and what was planned for it."""
+
+    id: str
+    verb: str
+    plan: StepPlan
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMotion:
+    """One motion of one step, for tables and files."""
+
+    step_id: str
+    verb: str
+    label: str
+    trajectory: JointTrajectory | None
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What will be done. `planner` can plan a step again from what was measured."""
+
+    steps: tuple[PlannedStep, ...]
+    start: Situation
+    planner: Planner
+
+    @property
+    def motions(self) -> tuple[PlannedMotion, ...]:
+        """All motions in order."""
+        return tuple(
+            PlannedMotion(step.id, step.verb, motion.label, motion.trajectory, motion.duration)
+            for step in self.steps
+            for motion in step.plan.motions
+        )
+
+    def to_json(self) -> bytes:
+        """What the log carries: ids, verbs, durations, and each trajectory's ends."""
+        steps = [
+            {
+                "id": step.id,
+                "verb": step.verb,
+                "planned_duration": step.plan.duration,
+                "motions": [_described(motion) for motion in step.plan.motions],
+            }
+            for step in self.steps
+        ]
+        return json.dumps({"steps": steps}, indent=1).encode()
+
+
+def plan_task(task: Task) -> Plan:
+    """Plan every step.
+
+    Raises:
+        NotPlannable: names the step and why; no later step was planned.
+    """
+    planner = _planner(task)
+    start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    return Plan(steps=tuple(_steps(task, planner, start)), start=start, planner=planner)
+
+
+def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:
+    """Plan one step; whatever refuses it is told with its id."""
+    try:
+        return STEPS[step.verb].plan(step.body, planner, situation)
+    except NotPlannable as refusal:
+        raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint) from refusal
+
+
+def start_position(task: Task) -> Array:
+    """(n) where the robot starts: the task's `start` pose, else `home` if there is one, else zero within the limits."""
+    robot = task.robot
+    names = [pose.name for pose in robot.poses]
+    chosen = task.spec.start or ("home" if "home" in names else None)
+    q = np.zeros(len(robot.joint_names))
+    for k, joint in enumerate(robot.moving_joints):
+        q[k] = np.clip(0.0, joint.limits.lower, joint.limits.upper)
+    if chosen is not None:
+        pose = robot.pose(chosen)
+        q[robot.indices(pose.joints)] = pose.positions
+    for k, joint in enumerate(robot.moving_joints):
+        if joint.mimic is not None:
+            q[k] = joint.mimic.multiplier * q[robot.joint_names.index(joint.mimic.joint)] + joint.mimic.offset
+    return frozen(q)
+
+
+def _steps(task: Task, planner: Planner, situation: Situation) -> Iterator[PlannedStep]:
+    for step in task.spec.steps:
+        planned = plan_step(planner, step, situation)
+        yield PlannedStep(id=step.id, verb=step.verb, plan=planned)
+        situation = planned.end
+
+
+def _planner(task: Task) -> Planner:
+    grippers = [spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec)]
+    return Planner(
+        task.robot,
+        task.scene,
+        period=task.spec.simulation.control_period,
+        rng=np.random.default_rng(task.spec.simulation.seed),
+        gripper_joints=tuple(name for spec in grippers for name in spec.joints),
+        gripper_speed=min((spec.speed for spec in grippers), default=1.0),
+    )
+
+
+def _described(motion: Motion) -> dict[str, object]:
+    described: dict[str, object] = {"label": motion.label, "duration": motion.duration}
+    if motion.trajectory is not None:
+        described["joints"] = list(motion.trajectory.names)
+        described["from"] = motion.trajectory.positions[0].tolist()
+        described["to"] = motion.trajectory.positions[-1].tolist()
+    if motion.grip is not None:
+        described["hand"] = motion.grip.target.tolist()
+        described["force"] = motion.grip.force
+    return described

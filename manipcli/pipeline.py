@@ -1,0 +1,99 @@
+"""READ FIRST: the whole program. Files -> task -> plan -> recording -> verdict.
+
+`run_task` is the sentence; each word of it is a function of the stage that does it. The recording is the only witness:
+the verdict of a run is that of its log, read back from the file before it gets its name.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from manipcli.core.errors import Finding, SimulationFailed
+from manipcli.flow.check import check_files, kind_of, schema, words
+from manipcli.flow.execute import Progress, controllers, simulate
+from manipcli.flow.load import Task, load_task
+from manipcli.flow.log import RUNS, judge_log, open_log, verdict_metadata
+from manipcli.flow.plan import Plan, plan_task
+from manipcli.report.run_report import RunReport, Timing
+
+__all__ = [
+    "Finding",
+    "Plan",
+    "Task",
+    "check_files",
+    "judge_log",
+    "kind_of",
+    "load_task",
+    "plan_task",
+    "run_task",
+    "schema",
+    "words",
+]
+
+
+def run_task(
+    path: Path,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    log: Path | None = None,
+    force: bool = False,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+    progress: Progress | None = None,
+) -> RunReport:
+    """Load, plan, simulate, record and judge a task.
+
+    Args:
+        path: the task file.
+        overrides: `scene.cup.mass=80 g`, as after `--set`.
+        seed: instead of the task's.
+        log: where the log goes; default `runs/<task>.mcap`, which is replaced.
+        force: replace `log` if it exists.
+        package_path, allow_outside: see `load_task`.
+        progress: told of steps and ticks.
+
+    Returns:
+        The verdict on the log, and how long what took. A simulation that left the plausible, or was interrupted, is
+        in the verdict, too.
+
+    Raises:
+        InvalidInput: a file or the log's path cannot be used; nothing was simulated.
+        NotPlannable: a step has no plan; nothing was simulated.
+    """
+    began = time.perf_counter()
+    task = load_task(
+        path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside
+    )
+    loaded = time.perf_counter()
+    plan = plan_task(task)
+    planned = time.perf_counter()
+
+    manager = controllers(task)
+    where = log if log is not None else RUNS / f"{task.name}.mcap"
+    recorder = open_log(task, plan, manager, where, overwrite=force or log is None)
+    try:
+        simulate(task, plan, manager, recorder, progress)
+        status = "complete"
+    except SimulationFailed as failure:
+        recorder.say(failure)
+        status = "failed"
+    except KeyboardInterrupt:
+        status = "interrupted"
+    recorder.metadata("run", {"status": status})
+    simulated = time.perf_counter()
+
+    verdict = judge_log(recorder.partial_path)
+    recorder.finish(verdict_metadata(verdict))
+    judged = time.perf_counter()
+    return RunReport(
+        verdict=verdict,
+        wall_time=judged - began,
+        real_time_factor=verdict.simulated_time / (simulated - planned),
+        log=str(where),
+        timing=Timing(
+            load=loaded - began, plan=planned - loaded, simulate=simulated - planned, judge=judged - simulated
+        ),
+    )
