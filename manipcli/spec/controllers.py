@@ -8,6 +8,7 @@ from pydantic import Field
 
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force, JointEffort, JointValue, JointVelocity, Time
+from manipcli.spec.robot import Version
 
 Interface = Literal["position", "velocity", "effort"]
 
@@ -15,54 +16,66 @@ Interface = Literal["position", "velocity", "effort"]
 class GainsSpec(Model):
     """PID gains of one joint. Units follow the command interface (effort: N m/rad, N m s/rad, N m/(rad s))."""
 
-    p: Annotated[float, Field(ge=0)] = 0.0
-    i: Annotated[float, Field(ge=0)] = 0.0
-    d: Annotated[float, Field(ge=0)] = 0.0
-    i_clamp: Annotated[float, Field(ge=0)] | None = None
-    ff_velocity_scale: float = 0.0
+    p: Annotated[float, Field(ge=0, description="Proportional, 0 or more. Default 0.")] = 0.0
+    i: Annotated[float, Field(ge=0, description="Integral, 0 or more. Default 0.")] = 0.0
+    d: Annotated[float, Field(ge=0, description="Derivative, 0 or more. Default 0.")] = 0.0
+    i_clamp: Annotated[float, Field(ge=0)] | None = Field(
+        None, description="Greatest effort of the integral term, 0 or more. Default: unlimited."
+    )
+    ff_velocity_scale: float = Field(0.0, description="Factor on the reference velocity, added. Default 0.")
 
 
 class JointConstraintSpec(Model):
     """Tolerances of one joint, rad or m; absent means not enforced."""
 
-    trajectory: Annotated[JointValue, Field(gt=0)] | None = None
-    goal: Annotated[JointValue, Field(gt=0)] | None = None
+    trajectory: Annotated[JointValue, Field(gt=0)] | None = Field(None, description="On the way [rad or m], above 0.")
+    goal: Annotated[JointValue, Field(gt=0)] | None = Field(None, description="At the end [rad or m], above 0.")
 
 
 class ConstraintsSpec(Model):
     """When a trajectory counts as failed or reached. `goal_time`: grace after its end."""
 
-    goal_time: Annotated[Time, Field(ge=0)] = 2.0
-    stopped_velocity_tolerance: Annotated[JointVelocity, Field(ge=0)] = 0.05
-    joints: dict[str, JointConstraintSpec] = {}
+    goal_time: Annotated[
+        Time, Field(ge=0, description="Time to reach the goal after the trajectory's end, 0 or more. Default 2 s.")
+    ] = 2.0
+    stopped_velocity_tolerance: Annotated[
+        JointVelocity, Field(ge=0, description="Greatest velocity at the goal, 0 or more. Default 0.05 rad/s.")
+    ] = 0.05
+    joints: dict[str, JointConstraintSpec] = Field({}, description="Tolerances by joint.")
 
 
 class JointTrajectorySpec(Model):
     """Follows joint trajectories: PID with feed-forward (effort, velocity), or passes the reference on (position)."""
 
-    type: Literal["joint_trajectory"]
-    joints: tuple[str, ...]
-    command_interface: Interface = "effort"
-    gains: dict[str, GainsSpec] = {}
-    gravity_compensation: bool = False
-    inverse_dynamics: bool = False
-    constraints: ConstraintsSpec = ConstraintsSpec()
+    type: Literal["joint_trajectory"] = Field(description="`joint_trajectory`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interface: Interface = Field("effort", description="What it commands. Default effort.")
+    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
+    gravity_compensation: bool = Field(False, description="Add the effort that holds against gravity. Default false.")
+    inverse_dynamics: bool = Field(False, description="Add the effort that the reference needs. Default false.")
+    constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
 
 
 class GripperSpec(Model):
     """Closes or opens a hand: each joint's reference moves at `speed`; a finger stops on contact or stall."""
 
-    type: Literal["gripper"]
-    joints: tuple[str, ...]
-    command_interface: Literal["effort"] = "effort"
-    gains: dict[str, GainsSpec] = {}
-    gravity_compensation: bool = True
-    speed: Annotated[JointVelocity, Field(gt=0)] = 1.0
-    max_effort: Annotated[JointEffort, Field(gt=0)] | None = None
-    stall_velocity: Annotated[JointVelocity, Field(gt=0)] = 0.02
-    stall_time: Annotated[Time, Field(gt=0)] = 0.2
-    goal_tolerance: Annotated[JointValue, Field(gt=0)] = 0.05
-    default_force: Annotated[Force, Field(gt=0)] = 5.0
+    type: Literal["gripper"] = Field(description="`gripper`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interface: Literal["effort"] = Field("effort", description="What it commands: effort.")
+    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
+    gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
+    speed: Annotated[JointVelocity, Field(gt=0, description="Of the reference, above 0. Default 1 rad/s or m/s.")] = 1.0
+    max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
+        None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
+    )
+    stall_velocity: Annotated[
+        JointVelocity, Field(gt=0, description="Slower counts as stalled, above 0. Default 0.02 rad/s.")
+    ] = 0.02
+    stall_time: Annotated[Time, Field(gt=0, description="Stalled for so long is stopped, above 0. Default 0.2 s.")] = 0.2
+    goal_tolerance: Annotated[
+        JointValue, Field(gt=0, description="Distance that counts as arrived, above 0. Default 0.05 rad.")
+    ] = 0.05
+    default_force: Annotated[Force, Field(gt=0, description="Of a finger where the step states none. Default 5 N.")] = 5.0
 
 
 ControllerSpec = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]
@@ -71,4 +84,5 @@ ControllerSpec = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminato
 class ControllersSpec(Model):
     """The file as a whole, after ROS's own forms have been rewritten to this one."""
 
-    controllers: dict[str, ControllerSpec]
+    version: Version = None
+    controllers: dict[str, ControllerSpec] = Field(description="The controllers, by name.")

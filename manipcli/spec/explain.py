@@ -232,7 +232,7 @@ def _unknown_key(path: Path, tags: dict[int, str], model: type[BaseModel]) -> tu
     close = nearest(str(path[-1]), known)
     hint = did_you_mean(str(path[-1]), known, kind="known keys")
     if close and known[close[0]].description:
-        hint = f"{hint} {known[close[0]].description}"
+        hint = f"{hint} ({close[0]}: {known[close[0]].description})"
     return f"unknown key '{dotted((path[-1],))}'", hint
 
 

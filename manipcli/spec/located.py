@@ -83,7 +83,10 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()
     try:
         spec = model.model_validate(plain(source.root))
     except ValidationError as error:
-        raise InvalidInput([*told, *explain(error, source.root, model, source.area)]) from None
+        # A text whose expression failed stays in the tree; that it is no quantity either needs no second telling.
+        places = {finding.place for finding in told if finding.severity == "error"}
+        more = [f for f in explain(error, source.root, model, source.area) if f.place not in places]
+        raise InvalidInput([*told, *more]) from None
     except RecursionError:
         raise InvalidInput([*told, source.finding(205, (), "nested too deep")]) from None
     if any(finding.severity == "error" for finding in told):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
     Angle,
     JointAcceleration,
@@ -18,50 +19,83 @@ from manipcli.spec.quantity import (
 )
 
 Vector3 = tuple[Length, Length, Length]
+Version = Annotated[
+    str | None,
+    Field(description="The least version of manipcli that reads this file, as '0.1.0'.", pattern=r"^\d+\.\d+\.\d+$"),
+]
+Arguments = dict[str, str | int | float | bool]
+
+_UNIT_TOLERANCE = 1e-3
 
 
 class PoseSpec(Model):
     """A pose: translation, and at most one way to say the rotation (fixed-axis roll, pitch, yaw; or a quaternion)."""
 
-    xyz: Vector3 = (0.0, 0.0, 0.0)
-    rpy: tuple[Angle, Angle, Angle] | None = None
-    quat_xyzw: tuple[float, float, float, float] | None = None
+    xyz: Vector3 = Field((0.0, 0.0, 0.0), description="Translation [m]. Default [0, 0, 0].")
+    rpy: tuple[Angle, Angle, Angle] | None = Field(
+        None, description="Roll, pitch, yaw about the fixed x, y, z axes [rad]. Default: no rotation."
+    )
+    quat_xyzw: tuple[float, float, float, float] | None = Field(
+        None, description="Unit quaternion, real part last; of length 1 within 0.001."
+    )
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> PoseSpec:
+        if self.quat_xyzw is None:
+            return self
+        if self.rpy is not None:
+            raise problem("conflict", "the rotation is said twice: by rpy and by quat_xyzw", at=("quat_xyzw",), key=True)
+        norm = math.sqrt(sum(q * q for q in self.quat_xyzw))
+        if abs(norm - 1.0) > _UNIT_TOLERANCE:
+            hint = "the order is x, y, z, w: no rotation is [0, 0, 0, 1]"
+            raise problem("range", f"not a unit quaternion: its length is {norm:.6g}", at=("quat_xyzw",), hint=hint)
+        return self
 
 
 class ChainSpec(Model):
     """The independent joints on the way from link `base` to link `tip`."""
 
-    base: str
-    tip: str
+    base: str = Field(description="The link above the first joint.")
+    tip: str = Field(description="The link below the last joint.")
 
 
 class GroupSpec(Model):
     """Joints that are planned and named together: a `chain`, or a list of `joints` (`tip`: the link they end in)."""
 
-    chain: ChainSpec | None = None
-    joints: tuple[str, ...] | None = None
-    tip: str | None = None
+    chain: ChainSpec | None = Field(None, description="All independent joints between two links.")
+    joints: tuple[str, ...] | None = Field(None, description="The joints by name; their order is that of poses.")
+    tip: str | None = Field(None, description="The link that poses of the group speak of.")
 
 
 class LimitsSpec(Model):
     """What replaces or completes the URDF's limits of a joint; lower/upper may only narrow them."""
 
-    lower: JointValue | None = None
-    upper: JointValue | None = None
-    velocity: Annotated[JointVelocity, Field(gt=0)] | None = None
-    effort: Annotated[JointEffort, Field(gt=0)] | None = None
-    acceleration: Annotated[JointAcceleration, Field(gt=0)] | None = None
-    jerk: Annotated[JointJerk, Field(gt=0)] | None = None
+    lower: JointValue | None = Field(None, description="Least position [rad or m]; not below the URDF's.")
+    upper: JointValue | None = Field(None, description="Greatest position [rad or m]; not above the URDF's.")
+    velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(None, description="[rad/s or m/s], above 0.")
+    effort: Annotated[JointEffort, Field(gt=0)] | None = Field(None, description="[N m or N], above 0.")
+    acceleration: Annotated[JointAcceleration, Field(gt=0)] | None = Field(
+        None, description="[rad/s^2 or m/s^2], above 0. Default: `default_acceleration`."
+    )
+    jerk: Annotated[JointJerk, Field(gt=0)] | None = Field(
+        None, description="[rad/s^3 or m/s^3], above 0. Default: unlimited."
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LimitsSpec:
+        if self.lower is not None and self.upper is not None and self.lower > self.upper:
+            raise problem("conflict", f"lower ({self.lower:g}) is above upper ({self.upper:g})", at=("lower",))
+        return self
 
 
 class AttachSpec(Model):
     """A further description welded onto this one: its root link at `pose` of the link `parent`."""
 
-    description: str
-    args: dict[str, str | int | float | bool] = {}
-    parent: str
-    pose: PoseSpec = PoseSpec()
-    prefix: str = ""
+    description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
+    args: Arguments = Field({}, description="Arguments of the xacro file.")
+    parent: str = Field(description="The link that it is welded to.")
+    pose: PoseSpec = Field(PoseSpec(), description="Of its root link in `parent`. Default: coincident.")
+    prefix: str = Field("", description="Put before each of its link and joint names. Default: nothing.")
 
 
 PosePart = tuple[JointValue, ...] | dict[str, JointValue] | str
@@ -71,22 +105,25 @@ PosePart = tuple[JointValue, ...] | dict[str, JointValue] | str
 class ToolSpec(Model):
     """The tool frame T: a pose in a link. Its +z is the approach direction of `pick`."""
 
-    link: str
-    pose: PoseSpec = PoseSpec()
+    link: str = Field(description="The link that carries the tool.")
+    pose: PoseSpec = Field(PoseSpec(), description="Of the tool frame in the link. Default: the link's own frame.")
 
 
 class RobotSpec(Model):
     """One robot."""
 
-    robot: str
-    description: str
-    args: dict[str, str | int | float | bool] = {}
-    mount: PoseSpec = PoseSpec()
-    attach: tuple[AttachSpec, ...] = ()
-    groups: dict[str, GroupSpec] = {}
-    poses: dict[str, dict[str, PosePart]] = {}
-    tool: ToolSpec | None = None
-    limits: dict[str, LimitsSpec] = {}
-    default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = 10.0
-    collision_ignore: tuple[tuple[str, str], ...] = ()
-    compat: Literal["ros1", "ros2"] = "ros2"
+    robot: str = Field(description="The name of the robot.", min_length=1)
+    version: Version = None
+    description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
+    args: Arguments = Field({}, description="Arguments of the xacro file.")
+    mount: PoseSpec = Field(PoseSpec(), description="Of the root link in the world. Default: the origin.")
+    attach: tuple[AttachSpec, ...] = Field((), description="Further descriptions, welded on.")
+    groups: dict[str, GroupSpec] = Field({}, description="Groups of joints, by name.")
+    poses: dict[str, dict[str, PosePart]] = Field({}, description="Named poses: per group, joint values or a name.")
+    tool: ToolSpec | None = Field(None, description="The tool frame. Default: the tip of the first group.")
+    limits: dict[str, LimitsSpec] = Field({}, description="Limits by joint: what URDF cannot say, or narrower ones.")
+    default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = Field(
+        10.0, description="Limit of joints without their own [rad/s^2 or m/s^2], above 0. Default 10."
+    )
+    collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
+    compat: Literal["ros1", "ros2"] = Field("ros2", description="Whose rules hold where ROS 1 and 2 differ. Default ros2.")

@@ -6,13 +6,19 @@ imports no member. A step is a mapping with exactly one verb key beside the comm
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+import re
+from typing import Annotated, ClassVar
 
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
-from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Length, Mass, Time
-from manipcli.spec.robot import PoseSpec, Vector3
+from manipcli.spec.base import Model, problem
+from manipcli.spec.quantity import Acceleration, Angle, Length, Mass, Time
+from manipcli.spec.robot import PoseSpec, Vector3, Version
+
+__all__ = [
+    "BodySpec", "BoxSpec", "ConditionSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "Positive",
+    "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
+]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[Length, Field(gt=0)]
@@ -21,60 +27,76 @@ Positive = Annotated[Length, Field(gt=0)]
 class SimulationSpec(Model):
     """Engine and clock. `control_period` is a whole multiple of `step`; `settle` is simulated before the start."""
 
-    engine: str = "pybullet"
-    step: Annotated[Time, Field(gt=0, le=0.02)] = 0.001
-    control_period: Annotated[Time, Field(gt=0, le=0.1)] = 0.001
-    seed: Annotated[int, Field(ge=0)] = 0
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
-    settle: Annotated[Time, Field(ge=0)] = 0.5
+    engine: str = Field("pybullet", description="Which engine: `pybullet` (physics), `kinematic` (commands come true).")
+    step: Annotated[Time, Field(gt=0, le=0.02, description="Physics step, above 0 to 20 ms. Default 1 ms.")] = 0.001
+    control_period: Annotated[
+        Time, Field(gt=0, le=0.1, description="Time between control ticks, a multiple of `step`, to 100 ms. Default 1 ms.")
+    ] = 0.001
+    seed: Annotated[int, Field(ge=0, description="Of the planner and of noise, 0 or more. Default 0.")] = 0
+    gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
+        (0.0, 0.0, -9.81), description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
+    )
+    settle: Annotated[Time, Field(ge=0, description="Simulated before the start, 0 or more. Default 0.5 s.")] = 0.5
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> SimulationSpec:
+        steps = self.control_period / self.step
+        if round(steps) < 1 or abs(steps - round(steps)) > 1e-6 * steps:
+            message = (
+                f"control_period ({self.control_period:g} s) must be a whole multiple of step ({self.step:g} s), "
+                f"not {steps:.6g} times"
+            )
+            below = max(1, round(steps)) * self.step
+            raise problem("conflict", message, at=("control_period",), hint=f"write {below:g}, or change `step`")
+        return self
 
 
 class BoxSpec(Model):
     """A solid box; its frame is at its centre."""
 
-    size: tuple[Positive, Positive, Positive]
+    size: tuple[Positive, Positive, Positive] = Field(description="Full lengths along x, y, z [m], above 0.")
 
 
 class SphereSpec(Model):
     """A solid sphere; its frame is at its centre."""
 
-    radius: Positive
+    radius: Positive = Field(description="[m], above 0.")
 
 
 class CylinderSpec(Model):
     """A solid upright cylinder; its frame is in the middle of its bottom."""
 
-    radius: Positive
-    height: Positive
+    radius: Positive = Field(description="[m], above 0.")
+    height: Positive = Field(description="[m], above 0.")
 
 
 class CupSpec(Model):
-    """An open cup: a floor disc and a ring of `segments` wall boxes; outer radius; its frame is in the middle of its bottom."""
+    """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
 
-    radius: Positive
-    height: Positive
-    wall: Positive = 0.004
-    segments: Annotated[int, Field(ge=6, le=64)] = 16
+    radius: Positive = Field(description="Outer radius [m], above 0.")
+    height: Positive = Field(description="Outer height [m], above 0.")
+    wall: Positive = Field(0.004, description="Thickness of wall and floor [m], above 0. Default 4 mm.")
+    segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
 
 
 class TraySpec(Model):
-    """An open tray: floor and four walls; outer size; its frame is in the middle of its bottom."""
+    """An open tray: floor and four walls; its frame is in the middle of its bottom."""
 
-    size: tuple[Positive, Positive, Positive]
-    wall: Positive = 0.005
+    size: tuple[Positive, Positive, Positive] = Field(description="Outer lengths along x, y, z [m], above 0.")
+    wall: Positive = Field(0.005, description="Thickness of walls and floor [m], above 0. Default 5 mm.")
 
 
 class MeshSpec(Model):
     """A mesh file (STL, OBJ, Collada), used as its convex hull."""
 
-    file: str
-    scale: Annotated[float, Field(gt=0)] = 1.0
+    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
+    scale: Annotated[float, Field(gt=0, description="Factor on all three axes, above 0. Default 1.")] = 1.0
 
 
 class UrdfSpec(Model):
     """A single-link URDF file as an object."""
 
-    file: str
+    file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
 
 
 class BodySpec(Model):
@@ -83,54 +105,114 @@ class BodySpec(Model):
     Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`.
     """
 
-    box: BoxSpec | None = None
-    sphere: SphereSpec | None = None
-    cylinder: CylinderSpec | None = None
-    cup: CupSpec | None = None
-    tray: TraySpec | None = None
-    mesh: MeshSpec | None = None
-    urdf: UrdfSpec | None = None
-    pose: PoseSpec | None = None
-    rests_on: str | None = None
-    at: tuple[Length, Length] | None = None
-    yaw: Angle = 0.0
-    inside: str | None = None
-    fixed: bool = False
-    mass: Annotated[Mass, Field(gt=0)] | None = None
-    friction: Annotated[float, Field(ge=0)] = 0.8
-    rolling_friction: Annotated[float, Field(ge=0)] = 0.0
-    spinning_friction: Annotated[float, Field(ge=0)] = 0.0
-    restitution: Fraction = 0.0
-    color: tuple[Fraction, Fraction, Fraction, Fraction] | None = None
+    box: BoxSpec | None = Field(None, description="Shape: a solid box.")
+    sphere: SphereSpec | None = Field(None, description="Shape: a solid sphere.")
+    cylinder: CylinderSpec | None = Field(None, description="Shape: a solid upright cylinder.")
+    cup: CupSpec | None = Field(None, description="Shape: an open cup.")
+    tray: TraySpec | None = Field(None, description="Shape: an open tray.")
+    mesh: MeshSpec | None = Field(None, description="Shape: the convex hull of a mesh file.")
+    urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
+    pose: PoseSpec | None = Field(None, description="Where its frame starts, in the world.")
+    rests_on: str | None = Field(None, description="The body that it stands on; `at` says where.")
+    at: tuple[Length, Length] | None = Field(None, description="x, y in the world [m], with `rests_on`.")
+    yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
+    inside: str | None = Field(None, description="The container on whose floor it lies.")
+    fixed: bool = Field(False, description="Never moves. Default false.")
+    mass: Annotated[Mass, Field(gt=0)] | None = Field(None, description="[kg], above 0; needed unless `fixed` or `urdf`.")
+    friction: Annotated[float, Field(ge=0, description="Coefficient of sliding, 0 or more. Default 0.8.")] = 0.8
+    rolling_friction: Annotated[float, Field(ge=0, description="Coefficient of rolling, 0 or more. Default 0.")] = 0.0
+    spinning_friction: Annotated[float, Field(ge=0, description="Coefficient of turning on the spot. Default 0.")] = 0.0
+    restitution: Fraction = Field(0.0, description="Bounce, 0 to 1. Default 0.")
+    color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
+        None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
+    )
 
 
 class FrameSpec(Model):
     """A named frame, fixed in `parent`: `world` or a body of the scene."""
 
-    parent: str = "world"
-    pose: PoseSpec = PoseSpec()
+    parent: str = Field("world", description="`world` or a body. Default `world`.")
+    pose: PoseSpec = Field(PoseSpec(), description="Of the frame in its parent. Default: the parent's own.")
 
 
-class StepSpec(Model):
+class _KeyedSpec(Model):
+    """A block that is known by its one key `word`."""
+
+    word: ClassVar[str] = ""
+
+    @property
+    def body(self) -> Model:
+        """The validated block under the key."""
+        body = getattr(self, self.word)
+        assert isinstance(body, Model)
+        return body
+
+
+class ConditionSpec(_KeyedSpec):
+    """A condition: its name, and under it what it asks."""
+
+    @property
+    def name(self) -> str:
+        """Which condition this is."""
+        return self.word
+
+
+_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+
+
+class StepSpec(_KeyedSpec):
     """What every step has beside its one verb key. `body` is the validated block under the verb."""
 
-    id: str | None = None
-    until: Any = None
-    timeout: Annotated[Time, Field(gt=0)] | None = None
+    id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
+    until: ConditionSpec | None = Field(None, description="Ends the step as soon as this holds.")
+    timeout: Annotated[Time, Field(gt=0)] | None = Field(None, description="Fails the step after this [s], above 0.")
+
+    @property
+    def verb(self) -> str:
+        """Which step this is."""
+        return self.word
 
 
 class TaskSpec(Model):
     """The task. The loader replaces `steps` and `expect` by the unions that the registry offers."""
 
-    task: str
-    robot: str
-    controllers: str
-    description: str = ""
-    params: dict[str, float | str] = {}
-    simulation: SimulationSpec = SimulationSpec()
-    floor: bool = True
-    scene: dict[str, BodySpec] = {}
-    frames: dict[str, FrameSpec] = {}
-    start: str | None = None
-    steps: tuple[Any, ...] = Field(min_length=1)
-    expect: tuple[Any, ...] = ()
+    task: str = Field(description="The name of the task; names its log.", min_length=1)
+    version: Version = None
+    robot: str = Field(description="Path of the robot file, relative to this file.", min_length=1)
+    controllers: str = Field(description="Path of the controllers file, relative to this file.", min_length=1)
+    description: str = Field("", description="What it is for, in words.")
+    params: dict[str, bool | int | float | str] = Field(
+        {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
+    )
+    simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
+    floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
+    scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
+    frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
+    start: str | None = Field(None, description="The named pose that the robot starts in. Default: all joints at 0.")
+    steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
+    expect: tuple[ConditionSpec, ...] = Field((), description="What must hold at the end, or over the run.")
+
+    @field_validator("steps", mode="after")
+    @classmethod
+    def _named(cls, steps: tuple[StepSpec, ...]) -> tuple[StepSpec, ...]:
+        """Every step gets an id: its own, or its verb and the next free number."""
+        first: dict[str, int] = {}
+        for index, step in enumerate(steps):
+            if step.id is None:
+                continue
+            if not _ID.fullmatch(step.id):
+                hint = "an id is letters, digits, '_' and '-', and begins with a letter"
+                raise problem("conflict", f"'{step.id}' cannot be an id", at=(index, "id"), hint=hint)
+            if step.id in first:
+                message = f"the id '{step.id}' is taken by steps[{first[step.id]}]"
+                raise problem("duplicate", message, at=(index, "id"), hint="ids name steps in the log: give another")
+            first[step.id] = index
+        counts: dict[str, int] = {}
+        named: list[StepSpec] = []
+        for step in steps:
+            number = counts.get(step.verb, 0) + 1
+            while step.id is None and f"{step.verb}_{number}" in first:
+                number += 1
+            counts[step.verb] = number
+            named.append(step if step.id else step.model_copy(update={"id": f"{step.verb}_{number}"}))
+        return tuple(named)

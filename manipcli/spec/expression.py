@@ -1,0 +1,217 @@
+"""Parameters and arithmetic with units in a task's texts: `$tilt`, `$a / 2`, `2 * $tilt + 5 deg`.
+
+The grammar, which has no names but parameters and can therefore run nothing:
+
+    sum     = product (("+" | "-") product)*
+    product = sign (("*" | "/") sign)*
+    sign    = ("+" | "-")* value
+    value   = number [unit] | "$" name | "(" sum ")"
+
+A unit belongs to the number before it: `6 rad/s / 2` is 3 rad/s. `$$` writes a dollar sign.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import did_you_mean, shorten
+from manipcli.core.units import NUMBER, NUMBER_PATTERN, UNIT_PATTERN, Quantity, UnitError, format_quantity, parse_quantity
+from manipcli.spec.tree import Entry, MappingNode, Node, Path, Scalar, ScalarNode, SequenceNode, dotted
+
+_REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
+_ALONE = re.compile(r"\s*\$([A-Za-z_]\w*)\s*")
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<name>\$[A-Za-z_]\w*)|(?P<quantity>{NUMBER_PATTERN}(?:\s*{UNIT_PATTERN})?)|(?P<sign>[-+*/()]))"
+)
+_DEEPEST = 50
+
+Params = Mapping[str, Scalar]
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionError(Exception):
+    """An expression that has no value; `unknown`: because of a parameter's name."""
+
+    cause: str
+    hint: str | None = None
+    unknown: bool = False
+
+
+def is_expression(text: str) -> bool:
+    """Whether `text` refers to a parameter."""
+    return _REFERENCE.search(text) is not None
+
+
+def evaluate(text: str, params: Params) -> Scalar:
+    """The value of an expression: a parameter as it is, or a computed quantity as a text in SI (a plain number if it has no unit).
+
+    Raises:
+        ExpressionError: an unknown parameter, no expression, dimensions that cannot be added, division by zero.
+    """
+    alone = _ALONE.fullmatch(text)
+    if alone is not None:
+        return _param(alone.group(1), params)
+    value = _Parser(text, params).whole()
+    if not math.isfinite(value.value):
+        raise ExpressionError(f"'{shorten(text)}' is too large to be a number")
+    if value.dimension == NUMBER:
+        return int(value.value) if value.value.is_integer() and abs(value.value) < 2**53 else value.value
+    return format_quantity(value.value, value.dimension)
+
+
+def _param(name: str, params: Params) -> Scalar:
+    if name not in params:
+        hint = did_you_mean(name, params, kind="params") or "the task has no params: block"
+        raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
+    return params[name]
+
+
+class _Parser:
+    """Recursive descent over one text."""
+
+    def __init__(self, text: str, params: Params) -> None:
+        self.text = text
+        self.params = params
+        self.tokens = list(self._cut())
+        self.position = 0
+        self.depth = 0
+
+    def _cut(self) -> list[tuple[str, str]]:
+        tokens: list[tuple[str, str]] = []
+        position, end = 0, len(self.text.rstrip())
+        while position < end:
+            match = _TOKEN.match(self.text, position)
+            if match is None or match.lastgroup is None:
+                rest = shorten(self.text[position:].strip(), width=20)
+                hint = "write `$name`, or arithmetic: 2 * $tilt + 5 deg; `$$` is a plain dollar sign"
+                raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{rest}'", hint)
+            tokens.append((match.lastgroup, match.group(match.lastgroup)))
+            position = match.end()
+        return tokens
+
+    def whole(self) -> Quantity:
+        try:
+            value = self.sum()
+        except UnitError as error:
+            raise ExpressionError(error.cause, error.hint) from None
+        if self.position < len(self.tokens):
+            raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{self.tokens[self.position][1]}'")
+        return value
+
+    def taken(self, *signs: str) -> str | None:
+        """The next token if it is one of `signs`, taken."""
+        if self.position < len(self.tokens) and self.tokens[self.position][1] in signs:
+            self.position += 1
+            return self.tokens[self.position - 1][1]
+        return None
+
+    def sum(self) -> Quantity:
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            raise ExpressionError("too many parentheses")
+        value = self.product()
+        while (sign := self.taken("+", "-")) is not None:
+            other = self.product()
+            if other.dimension != value.dimension:
+                raise ExpressionError(f"cannot add {value.dimension.name} and {other.dimension.name}")
+            value = Quantity(value.value + (other.value if sign == "+" else -other.value), value.dimension)
+        self.depth -= 1
+        return value
+
+    def product(self) -> Quantity:
+        value = self.sign()
+        while (sign := self.taken("*", "/")) is not None:
+            other = self.sign()
+            if sign == "*":
+                value = Quantity(value.value * other.value, value.dimension * other.dimension)
+            elif other.value == 0.0:
+                raise ExpressionError(f"'{shorten(self.text)}' divides by zero")
+            else:
+                value = Quantity(value.value / other.value, value.dimension / other.dimension)
+        return value
+
+    def sign(self) -> Quantity:
+        factor = 1.0
+        while (sign := self.taken("+", "-")) is not None:
+            factor = -factor if sign == "-" else factor
+        value = self.value()
+        return Quantity(factor * value.value, value.dimension)
+
+    def value(self) -> Quantity:
+        if self.taken("(") is not None:
+            value = self.sum()
+            if self.taken(")") is None:
+                raise ExpressionError(f"a '(' is not closed in '{shorten(self.text)}'")
+            return value
+        kind, token = self.tokens[self.position] if self.position < len(self.tokens) else ("end", "")
+        self.position += 1
+        if kind == "quantity":
+            return parse_quantity(token)
+        if kind == "name":
+            return self.quantity(token[1:])
+        raise ExpressionError(f"a value is missing in '{shorten(self.text)}'")
+
+    def quantity(self, name: str) -> Quantity:
+        value = _param(name, self.params)
+        if isinstance(value, str):
+            return parse_quantity(value)
+        if value is None or isinstance(value, bool):
+            raise ExpressionError(f"the parameter '${name}' is no number")
+        return Quantity(float(value), NUMBER)
+
+
+def substitute(root: Node, area: str) -> tuple[Node, list[Finding]]:
+    """The task with every expression computed, and what could not be.
+
+    Parameters may use those above them in `params:`.
+    """
+    work = _Substitution(area)
+    if not isinstance(root, MappingNode):
+        return root, []
+    block = root.get("params")
+    if isinstance(block, MappingNode):
+        entries: dict[str, Entry] = {}
+        for name, entry in block.entries.items():
+            node = work.node(entry.node, ("params", name))
+            entries[name] = Entry(entry.key_place, node)
+            if isinstance(node, ScalarNode):
+                work.params[name] = node.value
+        root = root.with_entry("params", Entry(root.entries["params"].key_place, MappingNode(entries, block.place)))
+    done = {
+        key: entry if key == "params" else Entry(entry.key_place, work.node(entry.node, (key,)))
+        for key, entry in root.entries.items()
+    }
+    return MappingNode(done, root.place), work.findings
+
+
+class _Substitution:
+    def __init__(self, area: str) -> None:
+        self.area = area
+        self.params: dict[str, Scalar] = {}
+        self.findings: list[Finding] = []
+
+    def node(self, node: Node, path: Path) -> Node:
+        if isinstance(node, MappingNode):
+            entries = {k: Entry(e.key_place, self.node(e.node, (*path, k))) for k, e in node.entries.items()}
+            return MappingNode(entries, node.place)
+        if isinstance(node, SequenceNode):
+            return SequenceNode(tuple(self.node(item, (*path, k)) for k, item in enumerate(node.items)), node.place)
+        if not isinstance(node.value, str) or "$" not in node.value:
+            return node
+        if not is_expression(node.value):
+            return ScalarNode(node.value.replace("$$", "$"), node.place)
+        try:
+            return ScalarNode(evaluate(node.value, self.params), node.place, written=node.value)
+        except ExpressionError as error:
+            code = f"{self.area}{203 if error.unknown else 211}"
+            self.findings.append(Finding(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
+            return node
+
+
+def escaped(text: str) -> str:
+    """`text` so that `substitute` gives it back."""
+    return text.replace("$", "$$")

@@ -1,0 +1,159 @@
+"""The three files, loaded: text to tree to validated spec. Every finding of a file is raised at once, with its place."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.registry import Seam
+from manipcli.core.text import did_you_mean
+from manipcli.spec.base import Model
+from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.expression import substitute
+from manipcli.spec.located import Area, Located, Source, validate
+from manipcli.spec.override import Override, apply, read_overrides, seed_override
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.ros_form import rewrite
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.tree import MappingNode, Node
+from manipcli.spec.unions import SpecMember, task_model
+from manipcli.spec.yaml import MAX_BYTES, parse
+
+M = TypeVar("M", bound=Model)
+S = TypeVar("S", bound=SpecMember)
+C = TypeVar("C", bound=SpecMember)
+
+FileKind = Literal["task", "robot", "controllers"]
+
+
+def read_bytes(path: Path) -> bytes:
+    """The bytes of a file that a user named.
+
+    Raises:
+        InvalidInput: USE101 it is not there; USE102 no regular file; USE103 it cannot be read; YAML103 too large.
+    """
+    place = Place(str(path), 0, 0)
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            what = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            raise InvalidInput([Finding("USE102", f"this is {what}", place)])
+        if status.st_size > MAX_BYTES:
+            raise InvalidInput([Finding("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", place)])
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno in (errno.ENOENT, errno.ENOTDIR):
+            raise InvalidInput([Finding("USE101", "there is no such file", place, hint=_sibling(path))]) from None
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise InvalidInput([Finding("USE103", f"the file cannot be read: {reason}", place)]) from None
+
+
+def _sibling(path: Path) -> str | None:
+    """The file beside it that was meant."""
+    try:
+        names = sorted(entry.name for entry in os.scandir(path.parent))
+    except OSError:
+        return f"the folder '{path.parent}' is not there either"
+    return did_you_mean(path.name, names, kind="beside it")
+
+
+def load(path: Path, model: type[M], area: Area) -> Located[M]:
+    """A file of any model, without parameters and overrides."""
+    return validate(_source(read_bytes(path), str(path), area), model)
+
+
+def kind_of(path: Path) -> FileKind:
+    """Which of the three files this is, by its top-level keys.
+
+    Raises:
+        InvalidInput: it cannot be read, or is no YAML mapping.
+    """
+    root = parse(read_bytes(path), str(path))
+    if not isinstance(root, MappingNode):
+        message = "expected the mapping of a task, robot or controllers file"
+        raise InvalidInput([Finding("USE104", message, Place(str(path), 1, 1))])
+    if "task" in root.entries or "steps" in root.entries:
+        return "task"
+    return "robot" if "robot" in root.entries or "description" in root.entries else "controllers"
+
+
+def load_task(
+    path: Path,
+    *,
+    steps: Seam[S],
+    conditions: Seam[C],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+) -> Located[TaskSpec]:
+    """A task file.
+
+    Args:
+        path: the file.
+        steps: members whose names are the verbs.
+        conditions: members whose names are the conditions of `until` and `expect`.
+        overrides: of `--set`, for all three files; those of the other two are only read.
+        seed: replaces `simulation.seed`.
+
+    Raises:
+        InvalidInput: every finding of the file and of the overrides.
+    """
+    return load_task_text(
+        read_bytes(path), str(path), steps=steps, conditions=conditions, overrides=overrides, seed=seed
+    )
+
+
+def load_task_text(
+    text: str | bytes,
+    name: str,
+    *,
+    steps: Seam[S],
+    conditions: Seam[C],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+) -> Located[TaskSpec]:
+    """As `load_task`, from text; places call it `name`."""
+    wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
+    model = task_model(steps, conditions)
+    source, findings = _changed(_source(text, name, "TASK"), wanted, model)
+    root, more = substitute(source.root, "TASK")
+    return validate(Source(name, root, "TASK"), model, findings=[*findings, *more])
+
+
+def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
+    """A robot file; of the overrides those that begin with `robot.`."""
+    return load_robot_text(read_bytes(path), str(path), overrides=overrides)
+
+
+def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
+    """As `load_robot`, from text; places call it `name`."""
+    source, findings = _changed(_source(text, name, "ROBOT"), read_overrides(overrides), RobotSpec)
+    return validate(source, RobotSpec, findings=findings)
+
+
+def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
+    """A controllers file in our form or one of ROS's; of the overrides those that begin with `controllers.`."""
+    return load_controllers_text(read_bytes(path), str(path), overrides=overrides)
+
+
+def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
+    """As `load_controllers`, from text; places call it `name`."""
+    root, told = rewrite(_source(text, name, "CTRL").root)
+    source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
+    return validate(source, ControllersSpec, findings=[*told, *findings])
+
+
+def _source(text: str | bytes, name: str, area: Area) -> Source:
+    root: Node | None = parse(text, name)
+    return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area)
+
+
+def _changed(source: Source, overrides: Sequence[Override], model: type[Model]) -> tuple[Source, list[Finding]]:
+    if not isinstance(source.root, MappingNode) or not source.root.entries:
+        return source, []
+    root, findings = apply(source.root, overrides, model, source.area)
+    return Source(source.name, root, source.area), findings

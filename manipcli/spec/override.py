@@ -1,0 +1,169 @@
+"""Overrides: `--set PATH=VALUE` replaces or adds one value before anything is validated.
+
+PATH is dotted. `robot.` and `controllers.` with something after the dot lead into those files
+(`controllers.arm_controller.gains.joint_1.p`, whatever form the file has: after ROS's own forms were rewritten);
+everything else is a path of the task. Items of a list go by their index from 0, steps also by their id
+(`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`). Keys that the user chose (bodies, joints, poses, parameters) must
+exist, unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.text import did_you_mean, escape, listed, shorten
+from manipcli.spec import shape
+from manipcli.spec.base import Model
+from manipcli.spec.located import Area
+from manipcli.spec.task import StepSpec
+from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, dotted, shown
+from manipcli.spec.yaml import parse
+
+_FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
+
+
+@dataclass(frozen=True, slots=True)
+class Override:
+    """One override: which file, the path in it, the value, and what the user typed."""
+
+    area: Area
+    path: tuple[str, ...]
+    value: Node
+    place: Place
+
+
+def read_override(text: str) -> Override:
+    """An override from its argument, `PATH=VALUE`.
+
+    Raises:
+        InvalidInput: no `=`, an empty path or value, or a value that is not YAML.
+    """
+    place = Place(f"--set {shorten(text, width=80)}", 0, 0)
+    path_text, equals, value_text = text.partition("=")
+    parts = tuple(part.strip() for part in path_text.strip().split("."))
+    if not equals or not all(parts):
+        hint = "write --set scene.cup.mass='80 g'"
+        raise InvalidInput([Finding("TASK212", "an override is PATH=VALUE", place, hint=hint)])
+    if not value_text.strip():
+        raise InvalidInput([Finding("TASK212", "the value is missing", place, hint="null unsets an optional value")])
+    try:
+        value = parse(value_text, place.file)
+    except InvalidInput as error:
+        raise InvalidInput([Finding(f.code, f.message, place, hint=f.hint) for f in error.findings]) from None
+    area: Area = "TASK"
+    if len(parts) > 1 and parts[0] in _FILES:
+        area, parts = _FILES[parts[0]], parts if parts[0] == "controllers" else parts[1:]
+    return Override(area, parts, ScalarNode(None, place) if value is None else _moved(value, place), place)
+
+
+def seed_override(seed: int) -> Override:
+    """What `--seed N` means."""
+    place = Place(f"--seed {seed}", 0, 0)
+    return Override("TASK", ("simulation", "seed"), ScalarNode(seed, place), place)
+
+
+def read_overrides(texts: Sequence[str]) -> tuple[Override, ...]:
+    """All of them, or all their findings."""
+    overrides: list[Override] = []
+    findings: list[Finding] = []
+    for text in texts:
+        try:
+            overrides.append(read_override(text))
+        except InvalidInput as error:
+            findings.extend(error.findings)
+    if findings:
+        raise InvalidInput(findings)
+    return tuple(overrides)
+
+
+def apply(root: Node, overrides: Sequence[Override], model: type[Model], area: Area) -> tuple[Node, list[Finding]]:
+    """The tree with the overrides of this kind of file, one after the other, and those that fit nowhere."""
+    findings: list[Finding] = []
+    for override in overrides:
+        if override.area != area:
+            continue
+        try:
+            root = _set(root, override, (), override.path, model)
+        except InvalidInput as error:
+            findings.extend(error.findings)
+    return root, findings
+
+
+def _moved(node: Node, place: Place) -> Node:
+    if isinstance(node, MappingNode):
+        return MappingNode({key: Entry(place, _moved(entry.node, place)) for key, entry in node.entries.items()}, place)
+    if isinstance(node, SequenceNode):
+        return SequenceNode(tuple(_moved(item, place) for item in node.items), place)
+    return ScalarNode(node.value, place)
+
+
+def _set(node: Node, override: Override, done: Path, rest: tuple[str, ...], model: type[Model]) -> Node:
+    """`node` with the value put at `rest` below it; `done` leads to `node`."""
+    if not rest:
+        return override.value
+    part, further = rest[0], rest[1:]
+    if isinstance(node, SequenceNode):
+        index = _index(node, override, done, part)
+        items = list(node.items)
+        items[index] = _set(items[index], override, (*done, index), further, model)
+        return SequenceNode(tuple(items), node.place)
+    if isinstance(node, ScalarNode) and node.value is None:
+        node = MappingNode({}, override.place)
+    if isinstance(node, ScalarNode):
+        raise _nowhere(override, f"'{dotted(done)}' is {shown(node)}, which has no '{escape(part)}' in it", None)
+    entry = node.entries.get(part)
+    if entry is None:
+        if further:
+            _may_be_added(node, override, done, part, model)
+        entry = Entry(override.place, MappingNode({}, override.place))
+    below = _set(entry.node, override, (*done, part), further, model)
+    return node.with_entry(part, Entry(entry.key_place, below))
+
+
+def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, model: type[Model]) -> None:
+    kinds = shape.at(model, done, {})
+    fields = shape.keys_of(kinds)
+    if part in fields:
+        return
+    known = dict.fromkeys((*node.entries, *(() if shape.takes_any_key(kinds) else fields)))
+    where = f"in '{dotted(done)}'" if done else "at the top of the file"
+    raise _nowhere(override, f"there is no '{escape(part)}' {where}", did_you_mean(part, known, kind="there are"))
+
+
+def _index(node: SequenceNode, override: Override, done: Path, part: str) -> int:
+    ids = step_ids(node) if done == ("steps",) else ()
+    if part in ids:
+        return ids.index(part)
+    if part.isascii() and part.isdecimal() and len(part) < 7 and int(part) < len(node.items):
+        return int(part)
+    many = f"'{dotted(done)}' has {len(node.items)} items, counted from 0"
+    hint = did_you_mean(part, ids, kind="steps") if ids and not part.isdecimal() else None
+    raise _nowhere(override, f"there is no item '{escape(part)}': {many}", hint or (f"steps: {listed(ids)}" if ids else None))
+
+
+def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput:
+    return InvalidInput([Finding(f"{override.area}212", message, override.place, hint=hint)])
+
+
+def step_ids(steps: SequenceNode) -> tuple[str, ...]:
+    """The ids that the steps have or will get."""
+    given = {node.value for item in steps.items if isinstance(node := _get(item, "id"), ScalarNode)}
+    counts: dict[str, int] = {}
+    ids: list[str] = []
+    for item in steps.items:
+        own = _get(item, "id")
+        keys = item.entries if isinstance(item, MappingNode) else ()
+        verb = next((key for key in keys if key not in StepSpec.model_fields), "")
+        number = counts.get(verb, 0) + 1
+        is_named = isinstance(own, ScalarNode) and isinstance(own.value, str)
+        while not is_named and f"{verb}_{number}" in given:
+            number += 1
+        counts[verb] = number
+        ids.append(str(own.value) if isinstance(own, ScalarNode) and is_named else f"{verb}_{number}")
+    return tuple(ids)
+
+
+def _get(node: Node, key: str) -> Node | None:
+    return node.get(key) if isinstance(node, MappingNode) else None

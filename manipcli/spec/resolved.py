@@ -1,0 +1,90 @@
+"""A spec as YAML with everything written out: defaults, SI numbers, ids. Loading it gives an equal spec."""
+
+from __future__ import annotations
+
+import json
+import re
+
+from pydantic import BaseModel
+
+from manipcli.spec.expression import escaped
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.tree import Plain
+
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
+# The second line only means something to readers of YAML 1.1, which a log may well meet.
+_RESERVED = frozenset({"null", "true", "false"}) | frozenset({"yes", "no", "on", "off", "y", "n"})
+_UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+_WIDTH = 100
+
+
+def resolved(spec: BaseModel) -> str:
+    """The YAML text, keys in the order of the model and of the file."""
+    data = _data(spec, escape=isinstance(spec, TaskSpec))
+    assert isinstance(data, dict)
+    return "".join(f"{line}\n" for line in _lines(data))
+
+
+def _data(value: object, *, escape: bool) -> Plain:
+    """Plain data; a key that is not set and has no default but nothing is left out."""
+    if isinstance(value, BaseModel):
+        fields = type(value).model_fields
+        pairs = ((field.alias or name, field, getattr(value, name)) for name, field in fields.items())
+        return {key: _data(v, escape=escape) for key, field, v in pairs if not (v is None and field.default is None)}
+    if isinstance(value, dict):
+        return {str(key): _data(v, escape=escape) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_data(v, escape=escape) for v in value]
+    if isinstance(value, str):
+        return escaped(value) if escape else str(value)
+    if value is None or isinstance(value, bool | int | float):
+        return value
+    raise TypeError(f"a spec cannot hold {type(value).__name__}")
+
+
+def _lines(data: dict[str, Plain]) -> list[str]:
+    lines: list[str] = []
+    for key, value in data.items():
+        name = _text(key)
+        short = f"{name}: {_inline(value)}"
+        if len(short) <= _WIDTH or not isinstance(value, dict | list):
+            lines.append(short)
+        elif isinstance(value, dict):
+            lines.append(f"{name}:")
+            lines.extend(f"  {line}" for line in _lines(value))
+        else:
+            lines.append(f"{name}:")
+            lines.extend(f"  {line}" for line in _items(value))
+    return lines
+
+
+def _items(items: list[Plain]) -> list[str]:
+    lines: list[str] = []
+    for item in items:
+        inner = _lines(item) if isinstance(item, dict) and len(_inline(item)) > _WIDTH else [_inline(item)]
+        lines.append(f"- {inner[0]}")
+        lines.extend(f"  {line}" for line in inner[1:])
+    return lines
+
+
+def _inline(value: Plain) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_text(key)}: {_inline(v)}" for key, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if value is None:
+        return "null"
+    if isinstance(value, str):
+        return _text(value)
+    mantissa, exponent, power = repr(value).partition("e")
+    # 1e-05 has no point, without which YAML 1.1 takes it for a text.
+    return f"{mantissa}.0e{power}" if exponent and "." not in mantissa else f"{mantissa}{exponent}{power}"
+
+
+def _text(text: str) -> str:
+    """A word as it is; anything that YAML could read as something else in double quotes."""
+    if _WORD.fullmatch(text) and text.casefold() not in _RESERVED:
+        return text
+    return _UNSAFE.sub(lambda match: f"\\u{ord(match.group()):04x}", json.dumps(text, ensure_ascii=False))

@@ -1,0 +1,86 @@
+"""JSON Schema of the three files, for editors and for reference; the same text for the same members."""
+
+from __future__ import annotations
+
+import json
+from typing import TypeVar
+
+from pydantic import BaseModel
+
+from manipcli.core.registry import Seam
+from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.tree import Plain
+from manipcli.spec.unions import SpecMember, task_model
+
+S = TypeVar("S", bound=SpecMember)
+C = TypeVar("C", bound=SpecMember)
+
+_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+_LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+_REFERENCE = r"\$[A-Za-z_]"
+
+
+def task_schema(steps: Seam[S], conditions: Seam[C]) -> str:
+    """Of a task file: the verbs and the conditions are `oneOf`; any number may be an expression with `$name`."""
+    schema = _schema(task_model(steps, conditions), "manipcli task")
+    _allow_expressions(schema)
+    return _dump(schema)
+
+
+def robot_schema() -> str:
+    """Of a robot file."""
+    return _dump(_schema(RobotSpec, "manipcli robot"))
+
+
+def controllers_schema() -> str:
+    """Of a controllers file in our form."""
+    return _dump(_schema(ControllersSpec, "manipcli controllers"))
+
+
+def _schema(model: type[BaseModel], title: str) -> dict[str, Plain]:
+    schema: dict[str, Plain] = model.model_json_schema()
+    _tidy(schema, named=False)
+    return {"$schema": _DRAFT, **schema, "title": title}
+
+
+def _tidy(node: Plain, *, named: bool) -> None:
+    """Pydantic's own words for limits to those of JSON Schema, and no titles that only repeat a key.
+
+    Args:
+        node: changed in place.
+        named: its keys are names of properties or definitions, not words of JSON Schema.
+    """
+    if isinstance(node, list):
+        for item in node:
+            _tidy(item, named=False)
+    if not isinstance(node, dict):
+        return
+    if not named:
+        node.pop("title", None)
+        for own, word in _LIMITS.items():
+            if own in node:
+                node[word] = node.pop(own)
+    for key, value in node.items():
+        if key not in ("default", "enum", "const") or named:
+            _tidy(value, named=not named and key in ("properties", "$defs"))
+
+
+def _allow_expressions(node: Plain) -> None:
+    if isinstance(node, list):
+        for item in node:
+            _allow_expressions(item)
+    if not isinstance(node, dict):
+        return
+    kind = node.get("type")
+    if kind in ("number", "integer", "boolean"):
+        node["type"], node["pattern"] = [kind, "string"], _REFERENCE
+    if isinstance(node.get("enum"), list) and kind == "string":
+        node["anyOf"] = [{"enum": node.pop("enum")}, {"pattern": _REFERENCE}]
+    for key, value in node.items():
+        if key not in ("default", "enum", "const", "anyOf") or (key == "anyOf" and kind is None):
+            _allow_expressions(value)
+
+
+def _dump(schema: dict[str, Plain]) -> str:
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,133 @@
+"""The unions of a task: one model a verb and one a condition, made from the members of the seams.
+
+A step is a mapping with exactly one verb key beside the common keys `id`, `until` and `timeout`; a condition is a
+mapping with its name as the only key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache, reduce
+from operator import or_
+from typing import Annotated, Protocol, TypeVar, cast
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
+
+from manipcli.core.registry import Seam
+from manipcli.core.text import any_of, did_you_mean, listed
+from manipcli.spec.base import Model, problem
+from manipcli.spec.task import ConditionSpec, StepSpec, TaskSpec
+
+
+class SpecMember(Protocol):
+    """What the unions ask of a member: the word in YAML, and what stands under it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def spec(self) -> type[Model]: ...
+
+
+S = TypeVar("S", bound=SpecMember)
+C = TypeVar("C", bound=SpecMember)
+
+_COMMON = tuple(name for name in StepSpec.model_fields if name != "verb")
+
+
+def task_model(steps: Seam[S], conditions: Seam[C]) -> type[TaskSpec]:
+    """`TaskSpec` whose steps and conditions are those of the seams; the same class for the same members."""
+    return _task_model(
+        tuple((member.name, member.spec) for member in steps),
+        tuple((member.name, member.spec) for member in conditions),
+    )
+
+
+Members = tuple[tuple[str, type[Model]], ...]
+
+
+@lru_cache(maxsize=8)
+def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
+    condition = _union("condition", ConditionSpec, conditions, common=())
+    until = (condition | None, StepSpec.model_fields["until"])
+    step = _union("verb", StepSpec, steps, common=_COMMON, until=until)
+    model = create_model(
+        "TaskSpec",
+        __base__=TaskSpec,
+        __doc__=TaskSpec.__doc__,
+        steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
+        expect=(tuple[condition, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
+    )
+    return cast(type[TaskSpec], model)
+
+
+def _union(kind: str, base: type[Model], members: Members, *, common: Sequence[str], **fields: object) -> object:
+    """`Annotated[A | B | ..., which key, one key]` of one model a member."""
+    names = tuple(name for name, _ in members)
+    tagged = [Annotated[_wrapped(base, name, spec, fields), Tag(_tag(name))] for name, spec in members]
+    one_of = reduce(or_, tagged[1:], tagged[0]) if len(tagged) > 1 else tagged[0]
+    if len(tagged) > 1:
+        one_of = Annotated[one_of, Discriminator(_key_of(names))]
+    return Annotated[one_of, BeforeValidator(_check(kind, names, tuple(common)))]
+
+
+def _tag(name: str) -> str:
+    """What pydantic puts into locations for a branch: never a key, so that the two cannot be confused."""
+    return f"<{name}>"
+
+
+def _wrapped(base: type[Model], name: str, spec: type[Model], fields: dict[str, object]) -> type[Model]:
+    """`base` with the one field `name`, which holds the member's spec."""
+    description = (spec.__doc__ or "").strip().partition("\n")[0]
+    made = create_model(  # type: ignore[call-overload]
+        "".join(word.capitalize() for word in name.split("_")) + base.__name__.removesuffix("Spec"),
+        __base__=base,
+        __doc__=description,
+        **fields,
+        **{name: (Annotated[spec, BeforeValidator(_nothing_is_default)], Field(description=description))},
+    )
+    made.word = name
+    return cast(type[Model], made)
+
+
+def _nothing_is_default(body: object) -> object:
+    """`- release:` with nothing under it means all defaults."""
+    return {} if body is None else body
+
+
+def _key_of(names: tuple[str, ...]) -> Callable[[object], str | None]:
+    def key_of(value: object) -> str | None:
+        if isinstance(value, dict):
+            return next((_tag(name) for name in names if name in value), None)
+        return _tag(str(getattr(value, "word", "")))
+
+    return key_of
+
+
+def _check(kind: str, names: tuple[str, ...], common: tuple[str, ...]) -> Callable[[object], object]:
+    """Exactly one of `names` among the keys; what else is wrong the member's model tells."""
+
+    what, its = ("a step", "verb") if kind == "verb" else ("a condition", "name")
+
+    def check(value: object) -> object:
+        if isinstance(value, Model):
+            return value
+        if not isinstance(value, dict):
+            hint = f"write `{value}:` with a colon" if isinstance(value, str) and value in names else f"{kind}s: {listed(names)}"
+            raise problem("verb", f"expected {what}: a mapping with one {its}", hint=hint)
+        found = [key for key in value if key in names]
+        others = [str(key) for key in value if key not in names and key not in common]
+        if len(found) > 1:
+            hint = f"write a list item for each {kind}"
+            raise problem("verb", f"{what} has exactly one {its}, not {any_of(found)} together".replace(" or ", " and "),
+                          at=(found[1],), key=True, hint=hint)  # fmt: skip
+        if not found and others:
+            hint = did_you_mean(others[0], (*names, *common), kind=f"{kind}s", most=3)
+            raise problem("name", f"unknown {kind} '{others[0]}', expected one of {listed(names, most=30)}",
+                          at=(others[0],), key=True, hint=hint)  # fmt: skip
+        if not found:
+            raise problem("verb", f"{what} without a {its}, expected one of {listed(names, most=30)}")
+        return value
+
+    return check
+
