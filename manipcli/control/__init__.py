@@ -1,0 +1,31 @@
+"""Knows joints and references, not physics: controllers, their manager, PID, limits, and the goals they take."""
+
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalResult
+from manipcli.control.controller import Controller, ControllerOutput, JointState
+from manipcli.control.gripper import GripperController, GripperGoal
+from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.limits import JointLimiter, limit_effort, limit_position, limit_velocity
+from manipcli.control.manager import ControllerManager
+from manipcli.control.pid import Pid
+from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
+
+__all__ = [
+    "Controller",
+    "ControllerManager",
+    "ControllerOutput",
+    "ErrorCode",
+    "Feedback",
+    "GoalHandle",
+    "GoalResult",
+    "GripperController",
+    "GripperGoal",
+    "JointLimiter",
+    "JointState",
+    "JointTrajectory",
+    "JointTrajectoryController",
+    "Pid",
+    "TrajectoryPoint",
+    "limit_effort",
+    "limit_position",
+    "limit_velocity",
+]

@@ -56,10 +56,10 @@ class GripperGoal:
 class GripperController:
     """One goal at a time; holds in between. The goal succeeds when every finger has stopped; see `GoalResult.fingers`.
 
-    A finger has *contact* when the sum of its joints' contact forces meets the goal's force, after a low pass of the time
-    constant `contact_time`, so that the knock of the first touch does not count as a grip; it is *stalled* when none
-    of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity` for
-    `stall_time`; it has *reached* when all its joints are within `goal_tolerance` and their references have arrived.
+    A finger has *contact* when the sum of its joints' contact forces meets the goal's force, after a low pass of the
+    time constant `contact_time`, so that the knock of the first touch does not count as a grip; it is *stalled* when
+    none of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity`
+    for `stall_time`; it has *reached* when all its joints are within `goal_tolerance` and their references are there.
 
     Args:
         name: of the controller.

@@ -180,11 +180,14 @@ class JointTrajectoryController:
             row = ahead = self._last_row
         elif ahead > self._last_row:
             ahead = self._last_row
+        elif row < 0:  # the clock was set back
+            row = ahead = 0
         self._compare(row, position, measured.velocity)
         if self._goal is not None and self._judge(row, time):
             self._hold(time, position)
-            row = ahead = 0
-            self._compare(row, position, measured.velocity)
+            self._compare(0, position, measured.velocity)
+        if ahead > self._last_row:  # the goal has just ended, and a table of one row holds
+            ahead = 0
 
         if self._pid is None:
             self._command[:] = self._table[ahead, POSITION]
@@ -222,6 +225,7 @@ class JointTrajectoryController:
         if tolerances.inside_goal(self._error, self._error_rate):
             goal.end("succeeded", ErrorCode.SUCCESSFUL, f"goal reached at t = {time:.3f} s", time)
             self._goal = None
+            self._hold(time, self._table[-1, POSITION])
             return False
         late = time - self._began - self._end_time
         if late > tolerances.goal_time:
@@ -274,7 +278,7 @@ class JointTrajectoryController:
         self._follow(table, time, period, whole.duration)
 
     def _reference(self, time: float) -> Array:
-        row = min(int((time - self._began) / self._dt + 0.5), self._last_row)
+        row = max(0, min(int((time - self._began) / self._dt + 0.5), self._last_row))
         return np.asarray(self._table[row])
 
     def _begin_stop(self, time: float, period: float) -> None:

@@ -263,7 +263,8 @@ def _validate(trajectory: JointTrajectory) -> None:
         if not np.isfinite(array).all():
             k, j = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
             raise InvalidArgument(
-                "TRAJ105", f"{SINGULAR[field]} of joint '{names[j]}' at point {k} is {array[k, j]}; expected a finite number"
+                "TRAJ105",
+                f"{SINGULAR[field]} of joint '{names[j]}' at point {k} is {array[k, j]}; expected a finite number",
             )
     if trajectory.accelerations is not None and trajectory.velocities is None:
         raise InvalidArgument(

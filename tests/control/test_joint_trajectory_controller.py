@@ -31,9 +31,7 @@ def make(interface="position", joints=JOINTS, *, path=None, goal=None, goal_time
         joints={j: JointConstraintSpec(trajectory=path, goal=goal) for j in joints},
     )
     more.setdefault("gains", {} if interface == "position" else {j: GainsSpec(p=1.0) for j in joints})
-    return JointTrajectoryController(
-        name="arm", joints=joints, interface=interface, constraints=constraints, **more
-    )
+    return JointTrajectoryController(name="arm", joints=joints, interface=interface, constraints=constraints, **more)
 
 
 def point(positions, time, velocities=None, accelerations=None):
@@ -254,7 +252,11 @@ def test_deactivation_aborts_and_the_next_update_holds_anew():
 def test_planned_points_are_the_references_bit_by_bit():
     times = np.arange(301) * PERIOD
     s = times / times[-1]
-    blend = (10 * s**3 - 15 * s**4 + 6 * s**5, (30 * s**2 - 60 * s**3 + 30 * s**4) / 0.3, (60 * s - 180 * s**2 + 120 * s**3) / 0.09)
+    blend = (
+        10 * s**3 - 15 * s**4 + 6 * s**5,
+        (30 * s**2 - 60 * s**3 + 30 * s**4) / 0.3,
+        (60 * s - 180 * s**2 + 120 * s**3) / 0.09,
+    )
     p, v, a = (np.outer(x, [1.0, -0.5, 0.25]) for x in blend)
     v[-1] = 0.0
     controller = make(path=1e-9, goal=1e-9)
@@ -268,6 +270,16 @@ def test_planned_points_are_the_references_bit_by_bit():
         assert np.array_equal(output.command, p[min(k + 1, 300)])  # one period ahead
     assert handle.status == "succeeded"
     assert np.array_equal(controller.update(5.0, PERIOD, state(p[-1])).position, p[-1])
+
+
+def test_it_holds_on_when_the_clock_is_set_back():
+    controller = make("position", goal=1e-3)
+    handle = controller.send_goal(trajectory(point(START, 0.05), point(START + 0.1, 0.1)))
+    for k in range(120):
+        output = controller.update(k * PERIOD, PERIOD, state(START + 0.1 if k > 80 else START))
+    assert handle.status == "succeeded"
+    output = controller.update(0.0, PERIOD, state(START))
+    assert output.command == pytest.approx(START + 0.1)
 
 
 def test_lead_in_begins_at_the_reference_not_at_the_sagging_joint():

@@ -149,7 +149,12 @@ def test_impossible_gains_are_refused_and_the_old_ones_stay(bad):
 def test_many_joints_are_as_many_single_ones(compat, antiwindup):
     rng = np.random.default_rng(1)
     gains = dict(zip("pid", rng.uniform(0.1, 3.0, (3, 5)), strict=True))
-    bounds = {"u_min": -rng.uniform(0.5, 2, 5), "u_max": rng.uniform(0.5, 2, 5), "i_min": -np.ones(5), "i_max": np.ones(5)}
+    bounds = {
+        "u_min": -rng.uniform(0.5, 2, 5),
+        "u_max": rng.uniform(0.5, 2, 5),
+        "i_min": -np.ones(5),
+        "i_max": np.ones(5),
+    }
     together = Pid(**gains, **bounds, antiwindup=antiwindup, compat=compat)
     single = [
         Pid(**{k: float(v[j]) for k, v in (gains | bounds).items()}, antiwindup=antiwindup, compat=compat)

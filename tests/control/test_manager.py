@@ -1,0 +1,235 @@
+"""Claims, index maps and the factory: who commands which joint, and what is said when nobody or two do."""
+
+import numpy as np
+import pytest
+
+from manipcli.control.controller import JointState
+from manipcli.control.factory import build_controllers, fingers_of
+from manipcli.control.gripper import GripperController, GripperGoal
+from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import InvalidArgument, InvalidInput, Place
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel
+from manipcli.spec.controllers import ControllersSpec, GainsSpec
+
+
+def joint(name, parent, child, kind="revolute", mimic=None, effort=10.0):
+    return Joint(
+        name=name,
+        type=kind,
+        parent=parent,
+        child=child,
+        X_PJ=Transform.identity(),
+        axis=frozen([0, 0, 1]),
+        limits=JointLimits(-1.0, 1.0, 2.0, effort),
+        mimic=mimic,
+    )
+
+
+def robot():
+    joints = (
+        joint("shoulder", "base", "upper"),
+        joint("elbow", "upper", "hand"),
+        joint("mount", "hand", "palm", "fixed"),
+        joint("left_1", "palm", "left_a", effort=0.5),
+        joint("left_2", "left_a", "left_b"),
+        joint("right_1", "palm", "right_a"),
+        joint("follower", "palm", "other", mimic=Mimic("left_1", -1.0)),
+    )
+    names = ("base", *(j.child for j in joints))
+    links = tuple(Link(name=name, inertial=None, visuals=(), collisions=()) for name in names)
+    return RobotModel(
+        name="toy",
+        root="base",
+        links=links,
+        joints=joints,
+        groups=(),
+        poses=(),
+        transmissions=(),
+        X_WB=Transform.identity(),
+        urdf="",
+    )
+
+
+HAND = ("left_1", "left_2", "right_1")
+
+
+def gains(names, **changes):
+    return {name: {"p": 2.0, "d": 0.1, **changes} for name in names}
+
+
+def spec(**controllers):
+    arm = {"type": "joint_trajectory", "joints": ["elbow", "shoulder"], "gains": gains(["shoulder", "elbow"])}
+    hand = {"type": "gripper", "joints": list(HAND), "gains": gains(HAND), "max_effort": 1.0}
+    default = {"arm": arm, "hand": hand}
+    for name, changes in controllers.items():
+        default[name] = default.get(name, {}) | changes
+    return ControllersSpec.model_validate({"controllers": default})
+
+
+class World:
+    def __init__(self, n=6):
+        self.position, self.velocity, self.effort = np.linspace(0.1, 0.6, n), np.zeros(n), np.zeros(n)
+
+
+def findings(controllers_spec, place=None):
+    with pytest.raises(InvalidInput) as caught:
+        build_controllers(controllers_spec, robot(), 0.001, *([place] if place else []))
+    return caught.value.findings
+
+
+def test_each_joint_gets_its_own_values_and_a_mimic_joint_none():
+    manager = build_controllers(spec(), robot(), 0.001)
+    assert manager.joints == ("shoulder", "elbow", "left_1", "left_2", "right_1", "follower")
+    assert manager.interfaces == ("effort",) * 5 + (None,)
+    assert manager.feed_forward == ("none", "none", "gravity", "gravity", "gravity", "none")
+    world = World()
+    feed_forward = np.array([1.0, 2.0, 0.1, 0.2, 0.3, 9.0])
+    assert manager.update(0.0, world, feed_forward).tolist() == [0.0, 0.0, 0.1, 0.2, 0.3, 0.0]
+    world.position = world.position - np.array([0.1, 0.2, 0, 0, 0.05, 0])
+    assert manager.update(0.001, world, feed_forward) == pytest.approx([0.2, 0.4, 0.1, 0.2, 0.4, 0.0])
+    arm, hand = manager.outputs
+    assert arm.position == pytest.approx([0.2, 0.1])  # in the order of the controller's joints
+    assert hand.position == pytest.approx([0.3, 0.4, 0.5])
+
+
+def test_state_and_feed_forward_are_not_touched():
+    manager = build_controllers(spec(), robot(), 0.001)
+    world, addition, contact = World(), np.ones(6), np.ones(6)
+    manager.update(0.0, world, addition, contact)
+    assert np.array_equal(world.position, World().position)
+    assert not world.velocity.any()
+    assert addition.tolist() == contact.tolist() == [1.0] * 6
+
+
+def test_contact_reaches_the_finger_that_it_belongs_to():
+    manager = build_controllers(spec(hand={"goal_tolerance": 0.01}), robot(), 0.001)
+    hand = manager["hand"]
+    assert isinstance(hand, GripperController)
+    handle = hand.send_goal(GripperGoal(target=np.full(3, 0.9), force=1.0))
+    world = World()
+    world.velocity = np.ones(6)
+    for k in range(150):
+        manager.update(k * 0.001, world, contact_force=np.array([9, 9, 0.7, 0.7, 0.0, 9.0]))
+    assert handle.active
+    for k in range(150, 300):
+        manager.update(k * 0.001, world, contact_force=np.array([9, 9, 0.0, 0.0, 1.4, 9.0]))
+    assert handle.result.fingers == ("contact", "contact")
+
+
+def test_effort_is_limited_by_the_gripper_and_by_the_joint():
+    manager = build_controllers(spec(), robot(), 0.001)
+    world = World()
+    commands = manager.update(0.0, world, np.full(6, 5.0))
+    assert commands.tolist() == [0.0, 0.0, 0.5, 1.0, 1.0, 0.0]
+    limiter = manager.limiter([j.limits for j in robot().moving_joints])
+    assert limiter.apply(np.full(6, 99.0), world.position, world.velocity, 0.001).tolist() == [10, 10, 0.5, 10, 10, 99]
+
+
+def test_serving_and_lookup():
+    manager = build_controllers(spec(), robot(), 0.001)
+    assert manager.serving(["elbow"]).name == "arm"
+    assert manager.index("hand") == slice(2, 5)
+    assert list(manager.index("arm")) == [1, 0]
+    with pytest.raises(InvalidArgument, match="elbow, left_1"):
+        manager.serving(["elbow", "left_1"])
+    with pytest.raises(KeyError, match="known: arm, hand"):
+        manager["leg"]
+
+
+def test_fingers_are_what_hangs_below_the_same_first_joint():
+    assert fingers_of(HAND, robot()) == ((0, 1), (2,))
+    assert fingers_of(("left_2", "right_1", "left_1"), robot()) == ((0, 2), (1,))
+
+
+def test_two_controllers_on_one_joint_are_refused_with_both_names():
+    def controller(name, interface):
+        return JointTrajectoryController(
+            name=name, joints=["a"], interface=interface, gains={"a": GainsSpec(p=1.0)} if interface == "effort" else {}
+        )
+
+    with pytest.raises(InvalidInput, match=r"'one' \(a/effort\) and 'two' \(a/position\)"):
+        ControllerManager([controller("one", "effort"), controller("two", "position")], joints=["a"], period=0.001)
+    with pytest.raises(InvalidInput) as caught:
+        ControllerManager([controller("one", "effort")], joints=["b", "c", "d"], period=0.001, following=["c"])
+    texts = [str(finding) for finding in caught.value.findings]
+    assert len(texts) == 2
+    assert "no such moving joint" in texts[0]
+    assert "'b', 'd'" in texts[1]
+
+
+def test_all_findings_of_a_file_come_at_once_each_with_its_place():
+    asked = []
+
+    def place(path):
+        asked.append(path)
+        return Place("c.yaml", len(asked), 1)
+
+    bad = spec(
+        arm={"joints": ["shoulder", "elbwo", "mount", "follower"], "gains": gains(["shoulder", "left_1"])},
+        hand={"joints": ["left_1", "left_1", "left_2"], "gains": gains(["left_1"])},
+    )
+    found = findings(bad, place)
+    assert all(finding.place is not None for finding in found)
+    texts = "\n".join(f"{finding} | {finding.hint}" for finding in found)
+    for part in (
+        "joint 'elbwo' is not in robot 'toy' | did you mean 'elbow'?",
+        "joint 'mount' is fixed",
+        "joint 'follower' mimics 'left_1'",
+        "'left_1' has gains, but is not one of its joints",
+        "the gains of joint 'elbwo' are all zero",
+        "joint 'left_1' stands twice in controller 'hand'",
+        "the gains of joint 'left_2' are all zero",
+        "no controller commands 'elbow', 'right_1' of robot 'toy'",
+    ):
+        assert part in texts
+    assert ("controllers", "arm", "joints", 1) in asked
+    assert ("controllers", "arm", "gains", "left_1") in asked
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"command_interface": "velocity", "gains": {}}, "on the velocity interface it would not move"),
+        ({"command_interface": "position", "gravity_compensation": True}, "gravity_compensation adds an effort"),
+        ({"constraints": {"joints": {"sholder": {"goal": 0.1}}}}, "'sholder' has tolerances"),
+        (
+            {"joints": ["shoulder", "elbow", "left_1"], "gains": gains(["shoulder", "elbow", "left_1"])},
+            "'arm' and 'hand'",
+        ),
+    ],
+)
+def test_what_a_file_cannot_mean(changes, text):
+    assert text in "\n".join(str(finding) for finding in findings(spec(arm=changes)))
+
+
+def test_gains_may_be_absent_on_a_position_interface():
+    manager = build_controllers(spec(arm={"command_interface": "position", "gains": {}}), robot(), 0.001)
+    commands = manager.update(0.0, World())
+    assert commands[:2] == pytest.approx([0.1, 0.2])
+
+
+def test_deactivation_reaches_every_controller():
+    manager = build_controllers(spec(), robot(), 0.001)
+    hand = manager["hand"]
+    handle = hand.send_goal(GripperGoal(target=np.zeros(3)))
+    manager.update(0.0, World())
+    manager.deactivate(0.001)
+    assert handle.status == "aborted"
+
+
+def test_a_controller_sees_its_own_copy_of_the_state():
+    seen = []
+
+    class Spy(JointTrajectoryController):
+        def update(self, time, period, measured, feed_forward=None, *, contact_force=None):
+            seen.append(measured)
+            measured.position[:] = -1.0
+            return super().update(time, period, measured, feed_forward, contact_force=contact_force)
+
+    spy = Spy(name="spy", joints=["a", "b"], interface="position")
+    world = World(2)
+    ControllerManager([spy], joints=["a", "b"], period=0.001).update(0.0, world)
+    assert isinstance(seen[0], JointState)
+    assert world.position.min() > 0.0
