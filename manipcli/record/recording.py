@@ -1,4 +1,4 @@
-"""A log read back: the only witness that judge, replay and report know. (CONTRACT; the record owner implements reading.)"""
+"""A log read back: the only witness that judge, replay and report know. `read_recording` makes it."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ class Recording:
     """Everything in one log. `states` has a leading time axis T (control ticks, from 0).
 
     `metadata`: name -> key -> value; `attachments`: name -> bytes; `lost`: why the end is missing, or None.
+    `period`: [s] of a tick. Velocities of bodies are central differences of their recorded poses.
     """
 
     joint_names: tuple[str, ...]
@@ -58,3 +59,4 @@ class Recording:
     metadata: dict[str, dict[str, str]]
     attachments: dict[str, bytes]
     lost: str | None
+    period: float = 0.0

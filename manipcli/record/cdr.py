@@ -1,0 +1,146 @@
+"""CDR little-endian (OMG DDS-XTypes 1.3, encoding version 1), as ROS 2 serialises: primitives, strings, sequences.
+
+Every value is aligned to its own size, counted from behind the four bytes of encapsulation `00 01 00 00`.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+ENCAPSULATION = b"\x00\x01\x00\x00"
+
+_I32, _U32, _F32, _F64 = (struct.Struct(code) for code in ("<i", "<I", "<f", "<d"))
+NS_PER_S = 1_000_000_000
+
+
+def text_bytes(text: str) -> bytes:
+    """UTF-8; what is no text (undecodable bytes of a file name) is written as an escape."""
+    return text.encode("utf-8", errors="backslashreplace")
+
+
+class CdrWriter:
+    """Appends values to one message. Each method returns the offset at which its value stands, so that a message
+    can be kept as a template and its numbers be filled in later."""
+
+    def __init__(self) -> None:
+        self._data = bytearray(ENCAPSULATION)
+
+    @property
+    def data(self) -> bytes:
+        return bytes(self._data)
+
+    def _put(self, packer: struct.Struct, value: float) -> int:
+        self._data += b"\x00" * (-(len(self._data) - 4) % packer.size)
+        offset = len(self._data)
+        self._data += packer.pack(value)
+        return offset
+
+    def u8(self, value: int) -> int:
+        self._data.append(value)
+        return len(self._data) - 1
+
+    def i32(self, value: int) -> int:
+        return self._put(_I32, value)
+
+    def u32(self, value: int) -> int:
+        return self._put(_U32, value)
+
+    def f32(self, value: float) -> int:
+        return self._put(_F32, value)
+
+    def f64(self, value: float) -> int:
+        return self._put(_F64, value)
+
+    def f64s(self, values: Sequence[float]) -> int:
+        """Bare doubles, one after the other; at least one."""
+        offsets = [self.f64(float(value)) for value in values]
+        return offsets[0]
+
+    def time(self, ns: int) -> int:
+        """builtin_interfaces/Time: whole seconds, nanoseconds."""
+        offset = self.i32(ns // NS_PER_S)
+        self.u32(ns % NS_PER_S)
+        return offset
+
+    def text(self, value: str) -> int:
+        """Length with the closing NUL, bytes, NUL."""
+        raw = text_bytes(value)
+        offset = self.u32(len(raw) + 1)
+        self._data += raw + b"\x00"
+        return offset
+
+    def texts(self, values: Sequence[str]) -> int:
+        offset = self.u32(len(values))
+        for value in values:
+            self.text(value)
+        return offset
+
+    def doubles(self, count: int) -> int:
+        """A float64[] of `count` zeros; the offset of its first element (of its end when empty)."""
+        self.u32(count)
+        return self.f64s([0.0] * count) if count else len(self._data)
+
+    def header(self, ns: int, frame: str) -> int:
+        """std_msgs/Header; the offset of its stamp."""
+        offset = self.time(ns)
+        self.text(frame)
+        return offset
+
+
+class CdrError(ValueError):
+    """A message that is shorter than what it declares."""
+
+
+class CdrReader:
+    """Walks over one message; every length is checked against what is there before anything is read."""
+
+    def __init__(self, data: bytes | memoryview) -> None:
+        self._data = memoryview(data)
+        if bytes(self._data[:4]) != ENCAPSULATION:
+            raise CdrError("is not little-endian CDR")
+        self.offset = 4
+
+    def _advance(self, size: int, align: int) -> int:
+        start = self.offset + (-(self.offset - 4) % align)
+        if size < 0 or start + size > len(self._data):
+            raise CdrError("ends too early")
+        self.offset = start + size
+        return start
+
+    def u32(self) -> int:
+        return int(_U32.unpack_from(self._data, self._advance(4, 4))[0])
+
+    def f64(self) -> float:
+        return float(_F64.unpack_from(self._data, self._advance(8, 8))[0])
+
+    def text(self) -> str:
+        size = self.u32()
+        if size == 0:
+            return ""
+        start = self._advance(size, 1)
+        return bytes(self._data[start : start + size - 1]).decode("utf-8", errors="replace")
+
+    def count(self, smallest: int) -> int:
+        """Length of a sequence whose elements take at least `smallest` bytes each."""
+        count = self.u32()
+        if count * smallest > len(self._data) - self.offset:
+            raise CdrError("ends too early")
+        return count
+
+    def texts(self) -> tuple[str, ...]:
+        return tuple(self.text() for _ in range(self.count(4)))
+
+    def doubles(self) -> tuple[int, int]:
+        """(offset of the first element, count) of a float64[]."""
+        count = self.count(8)
+        return (self._advance(8 * count, 8), count) if count else (self.offset, 0)
+
+    def skip_f64(self, count: int) -> int:
+        """The offset of `count` bare doubles."""
+        return self._advance(8 * count, 8)
+
+    def header(self) -> str:
+        """Skips the stamp; the frame."""
+        self._advance(8, 4)
+        return self.text()

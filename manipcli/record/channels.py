@@ -1,0 +1,79 @@
+"""The table of channels: topic, type, and how the topic would be offered to a late subscriber."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from manipcli.control.controller import Interface
+from manipcli.record import schemas
+
+ROBOT_DESCRIPTION = "/robot_description"
+TF_STATIC = "/tf_static"
+TF = "/tf"
+JOINT_STATES = "/joint_states"
+CONTACTS = "/contacts"
+EVENTS = "/task/events"
+ROSOUT = "/rosout"
+MARKERS = "/markers"
+
+# A quality of service profile as rosbag2 stores it: the last message is kept for whoever subscribes later.
+_INFINITE = "{sec: 9223372036, nsec: 854775807}"
+TRANSIENT_LOCAL = (
+    "- history: keep_last\n  depth: 1\n  reliability: reliable\n  durability: transient_local\n"
+    f"  deadline: {_INFINITE}\n  lifespan: {_INFINITE}\n"
+    f"  liveliness: automatic\n  liveliness_lease_duration: {_INFINITE}\n"
+    "  avoid_ros_namespace_conventions: false\n"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerChannel:
+    """A controller whose reference, feedback, error and output are recorded; `interface`: what its output is."""
+
+    name: str
+    joints: tuple[str, ...]
+    interface: Interface = "effort"
+
+    @property
+    def state_topic(self) -> str:
+        return f"/{self.name}/controller_state"
+
+    @property
+    def reference_topic(self) -> str:
+        return f"/{self.name}/reference"
+
+    @property
+    def error_topic(self) -> str:
+        return f"/{self.name}/error"
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One row of the table; `id` counts from 1."""
+
+    id: int
+    topic: str
+    type: str
+    latched: bool = False
+
+
+def channel_table(controllers: Sequence[ControllerChannel]) -> tuple[Channel, ...]:
+    """All channels of a recording, in the order of their ids."""
+    rows: list[tuple[str, str, bool]] = [
+        (ROBOT_DESCRIPTION, schemas.STRING, True),
+        (TF_STATIC, schemas.TF_MESSAGE, True),
+        (MARKERS, schemas.MARKER_ARRAY, True),
+        (JOINT_STATES, schemas.JOINT_STATE, False),
+        (TF, schemas.TF_MESSAGE, False),
+        (CONTACTS, schemas.CONTACTS, False),
+        (EVENTS, schemas.TASK_EVENT, False),
+        (ROSOUT, schemas.LOG, False),
+    ]
+    for controller in controllers:
+        rows += [
+            (controller.state_topic, schemas.CONTROLLER_STATE, False),
+            (controller.reference_topic, schemas.JOINT_STATE, False),
+            (controller.error_topic, schemas.JOINT_STATE, False),
+        ]
+    return tuple(Channel(k, topic, kind, latched) for k, (topic, kind, latched) in enumerate(rows, start=1))

@@ -1,0 +1,213 @@
+"""Messages to columns of numbers: where messages stand in a chunk, and the numbers of all of them at once.
+
+All messages of a channel in a chunk normally have one length and one layout; then each run of doubles is gathered with
+one numpy index over all messages. Messages of different lengths are taken one by one through the same code.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array
+from manipcli.record.cdr import CdrError, CdrReader
+
+Int = npt.NDArray[np.int64]
+_HEAD = struct.Struct("<BQHIQQ")
+_MESSAGE = 0x05
+PAYLOAD = _HEAD.size
+"""From the beginning of a message record to its CDR bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """The messages of one channel in a chunk, in the order of the file: log times [ns], payload offsets and lengths."""
+
+    times: Int
+    starts: Int
+    lengths: Int
+
+
+def indexed(data: bytes, indexes: Mapping[int, bytes]) -> dict[int, Places] | None:
+    """Messages by channel from a chunk's message indexes (channel -> pairs of log time and offset).
+
+    None unless the indexes account for every byte of the chunk, message by message.
+    """
+    size = len(data)
+    found: dict[int, Places] = {}
+    offsets, ends = [], []
+    for channel, raw in indexes.items():
+        entries = np.frombuffer(raw, dtype="<u8").reshape(-1, 2)
+        if len(entries) == 0:
+            continue
+        if entries[:, 1].max() > max(size - PAYLOAD, 0) or size < PAYLOAD:
+            return None
+        at = entries[:, 1].astype(np.int64)
+        lengths = _every(data, "<u8")[at + 1]
+        fits = (
+            (np.frombuffer(data, dtype=np.uint8)[at] == _MESSAGE)
+            & (lengths >= PAYLOAD - 9)
+            & (lengths <= size)
+            & (_every(data, "<u2")[at + 9] == channel)
+            & (_every(data, "<u8")[at + 15] == entries[:, 0])
+        )
+        if not fits.all():
+            return None
+        length = lengths.astype(np.int64)
+        found[channel] = Places(entries[:, 0].astype(np.int64), at + PAYLOAD, length - (PAYLOAD - 9))
+        offsets.append(at)
+        ends.append(at + 9 + length)
+    if not offsets:
+        return None
+    begins, stops = np.sort(np.concatenate(offsets)), np.sort(np.concatenate(ends))
+    return found if begins[0] == 0 and stops[-1] == size and np.array_equal(begins[1:], stops[:-1]) else None
+
+
+def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
+    """Messages by channel, found by walking over the records; and the records of other kinds (opcode, body).
+
+    Raises:
+        CdrError: a record does not fit into the chunk.
+    """
+    rows: dict[int, list[tuple[int, int, int]]] = {}
+    others: list[tuple[int, bytes]] = []
+    offset = 0
+    while offset < len(data):
+        if offset + 9 > len(data):
+            raise CdrError("ends too early")
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        end = offset + 9 + length
+        if end > len(data) or (opcode == _MESSAGE and length < PAYLOAD - 9):
+            raise CdrError("ends too early")
+        if opcode == _MESSAGE:
+            _, _, channel, _, time, _ = _HEAD.unpack_from(data, offset)
+            rows.setdefault(channel, []).append((min(time, 2**63 - 1), offset + PAYLOAD, length - (PAYLOAD - 9)))
+        else:
+            others.append((opcode, data[offset + 9 : end]))
+        offset = end
+    found = {}
+    for channel, entries in rows.items():
+        table = np.array(entries, dtype=np.int64)
+        found[channel] = Places(table[:, 0], table[:, 1], table[:, 2])
+    return found, others
+
+
+def _every(data: bytes, code: str) -> npt.NDArray[np.uint64]:
+    """The number that begins at each byte of `data`, as a view."""
+    kind = np.dtype(code)
+    return np.ndarray((max(len(data) - kind.itemsize + 1, 0),), dtype=kind, buffer=data, strides=(1,))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What a message holds: its names, and (offset, count) of its runs of doubles."""
+
+    names: tuple[str, ...]
+    runs: tuple[tuple[int, int], ...]
+
+
+class Columns:
+    """The numbers of one channel over a whole recording. `parse`: a message to its layout."""
+
+    def __init__(self, parse: Callable[[CdrReader], Layout]) -> None:
+        self._parse = parse
+        self._names: tuple[str, ...] | None = None
+        self._times: list[Int] = []
+        self._runs: list[list[Array]] = []
+
+    def add(self, data: bytes, places: Places) -> None:
+        """The channel's messages of one chunk.
+
+        Raises:
+            CdrError: a message is cut, or names other things than the ones before.
+        """
+        for part, layout in self._alike(data, places):
+            if self._names is None:
+                self._names = layout.names
+            if layout.names != self._names:
+                raise CdrError("names other joints or bodies than the messages before it")
+            self._times.append(part.times)
+            self._runs.append([_gather(data, part.starts + offset, count) for offset, count in layout.runs])
+
+    def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, Layout]]:
+        """The messages in groups of one layout each."""
+        first, last = (self._layout(data, places, k) for k in (0, -1))
+        if first == last and (places.lengths == places.lengths[0]).all():
+            yield places, first
+            return
+        for k in range(len(places.times)):
+            one = Places(places.times[k : k + 1], places.starts[k : k + 1], places.lengths[k : k + 1])
+            yield one, self._layout(data, places, k)
+
+    def _layout(self, data: bytes, places: Places, k: int) -> Layout:
+        start = int(places.starts[k])
+        return self._parse(CdrReader(memoryview(data)[start : start + int(places.lengths[k])]))
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """None before the first message."""
+        return self._names
+
+    @property
+    def times(self) -> Int:
+        """Log times [ns]."""
+        return np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
+
+    def run(self, k: int, width: int) -> Array:
+        """(T, width) the k-th run of doubles of every message."""
+        if not self._runs:
+            return np.zeros((0, width))
+        parts = [runs[k] if k < len(runs) else np.zeros((0, 0)) for runs in self._runs]
+        if any(part.shape[1] != width for part in parts):
+            raise CdrError(f"has not {width} numbers where it should")
+        return np.concatenate(parts)
+
+
+def _gather(data: bytes, starts: Int, count: int) -> Array:
+    """(T, count) doubles that begin at `starts`."""
+    if count == 0:
+        return np.zeros((len(starts), 0))
+    kind = np.dtype((np.void, 8 * count))
+    runs = np.ndarray((len(data) - kind.itemsize + 1,), dtype=kind, buffer=data, strides=(1,))
+    return runs[starts].view("<f8").reshape(len(starts), count)
+
+
+def joint_state_layout(reader: CdrReader) -> Layout:
+    """sensor_msgs/JointState: position, velocity, effort."""
+    reader.header()
+    names = reader.texts()
+    return Layout(names, tuple(reader.doubles() for _ in range(3)))
+
+
+def body_layout(bodies: frozenset[str], world: str) -> Callable[[CdrReader], Layout]:
+    """tf2_msgs/TFMessage: x y z and quaternion xyzw of every one of `bodies` in the world."""
+
+    def parse(reader: CdrReader) -> Layout:
+        names, runs = [], []
+        for _ in range(reader.count(64)):
+            parent, child = reader.header(), reader.text()
+            offset = reader.skip_f64(7)
+            if parent == world and child in bodies:
+                names.append(child)
+                runs.append((offset, 7))
+        return Layout(tuple(names), tuple(runs))
+
+    return parse
+
+
+def controller_state_layout(reader: CdrReader) -> Layout:
+    """JointTrajectoryControllerState: reference position and velocity, feedback position, output."""
+    reader.header()
+    names = reader.texts()
+    points = []
+    for _ in range(4):
+        points.append([reader.doubles() for _ in range(4)])
+        reader.u32()
+        reader.u32()
+    reference, feedback, _, output = points
+    command = next((run for run in output if run[1]), output[0])
+    return Layout(names, (reference[0], reference[1], feedback[0], command))

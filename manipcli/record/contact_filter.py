@@ -1,0 +1,49 @@
+"""Which contacts are worth a message: a set of pairs that changed at once, forces that changed at most 100 times a
+simulated second."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import attrgetter
+
+from manipcli.model.state import Contact
+
+FORCE_PERIOD = 0.01
+"""[s] Forces alone are written no more often than this."""
+
+FORCE_SHARE, FORCE_LEAST = 0.1, 0.05
+"""A force has changed when it differs by more than a tenth of what was recorded and by more than 0.05 N."""
+
+DEPTH_LEAST = 2e-4
+"""[m] A pair that is deeper by more than this than what was recorded is written at once."""
+
+_pair = attrgetter("a", "b")
+
+
+class ContactFilter:
+    """Remembers what was recorded last."""
+
+    def __init__(self) -> None:
+        self._pairs: list[tuple[str, str]] = []
+        self._last: list[Contact] = []
+        self._time = 0.0
+
+    def changed(self, time: float, contacts: Sequence[Contact]) -> list[Contact] | None:
+        """The contacts to record at `time` [s], sorted by their names; None when the last message still holds."""
+        if not contacts and not self._pairs:
+            return None
+        found = sorted(contacts, key=_pair)
+        pairs = [(contact.a, contact.b) for contact in found]
+        if pairs == self._pairs and not self._differs(time, found):
+            return None
+        self._pairs, self._last, self._time = pairs, found, time
+        return found
+
+    def _differs(self, time: float, found: list[Contact]) -> bool:
+        due = time - self._time >= FORCE_PERIOD - 1e-9
+        for old, new in zip(self._last, found, strict=True):
+            if new.distance < old.distance - DEPTH_LEAST:
+                return True
+            if due and abs(new.force - old.force) > FORCE_LEAST + FORCE_SHARE * old.force:
+                return True
+        return False

@@ -1,0 +1,59 @@
+"""What a recording says it holds: the metadata record by which a reader finds its way."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+RECORD = "recording"
+"""Name of the metadata record."""
+
+FORMAT = 1
+"""Version of the layout of a recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """`period` [s] of a tick; names in the order of the arrays: moving joints, movable bodies, controllers."""
+
+    period: float
+    joints: tuple[str, ...]
+    bodies: tuple[str, ...]
+    controllers: tuple[str, ...]
+
+    def metadata(self) -> dict[str, str]:
+        return {
+            "format": str(FORMAT),
+            "period": repr(self.period),
+            "joints": json.dumps(self.joints),
+            "bodies": json.dumps(self.bodies),
+            "controllers": json.dumps(self.controllers),
+        }
+
+
+def contents(values: Mapping[str, str]) -> Contents:
+    """The inverse of `Contents.metadata`.
+
+    Raises:
+        ValueError: a later format, or not what a recorder writes; the message says which.
+    """
+    version = values.get("format", "")
+    if version != str(FORMAT):
+        if version.isdecimal() and int(version) > FORMAT:
+            raise ValueError(f"has format {version}; this manipcli reads up to {FORMAT}")
+        raise ValueError(f"has the unknown format '{version}'")
+    try:
+        period = float(values["period"])
+        names = [json.loads(values[key]) for key in ("joints", "bodies", "controllers")]
+    except (KeyError, ValueError, RecursionError) as error:
+        raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
+    if not (math.isfinite(period) and period > 0) or not all(_is_names(value) for value in names):
+        raise ValueError(f"has a damaged metadata record '{RECORD}'")
+    joints, bodies, controllers = (tuple(value) for value in names)
+    return Contents(period=period, joints=joints, bodies=bodies, controllers=controllers)
+
+
+def _is_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value) and len(set(value)) == len(value)

@@ -1,0 +1,40 @@
+"""What can go wrong with a recording: it cannot be begun, cannot be written further, or cannot be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
+
+
+class RecordingRefused(InvalidInput):
+    """No recording can be begun at this path; nothing has been written."""
+
+    code = "LOG100"
+
+    def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
+        super().__init__((Finding(code=self.code, message=f"cannot record to {path}: {cause}", hint=hint),))
+
+
+class RecordingFailed(ManipcliError):
+    """The disk refused more. What was written until `time` [s] stays readable in the partial file."""
+
+    exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
+    code: ClassVar[str] = "LOG200"
+
+    def __init__(self, partial: Path, cause: str, *, time: float) -> None:
+        self.partial = partial
+        self.time = time
+        super().__init__(
+            f"the recording stopped after t = {time:.3f} s: {cause}; what was recorded until then is in {partial.name}"
+        )
+
+
+class BadRecording(InvalidInput):
+    """A file that is no recording of manipcli, or one that was changed or damaged after it was written."""
+
+    code = "LOG300"
+
+    def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
+        super().__init__((Finding(code=self.code, message=f"{path.name}: {cause}", hint=hint),))

@@ -1,0 +1,171 @@
+"""Single messages: what is written once at the start, and what is written when something happens."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import PurePosixPath
+
+from manipcli.core.geometry import Transform
+from manipcli.model.robot import Box, Cylinder, Geometry, Mesh, RobotModel, Sphere
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact
+from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.record.recording import TaskEvent
+
+WORLD = "world"
+GREY = (0.7, 0.7, 0.7, 1.0)
+CUBE, SPHERE, CYLINDER, MESH_RESOURCE = 1, 2, 3, 10
+INFO, WARN, ERROR = 20, 30, 40
+_LEVELS = {"failed": ERROR, "aborted": ERROR, "error": ERROR, "timeout": WARN, "interrupted": WARN, "canceled": WARN}
+
+
+def string_message(text: str) -> bytes:
+    """std_msgs/String."""
+    writer = CdrWriter()
+    writer.text(text)
+    return writer.data
+
+
+def static_transforms(robot: RobotModel, scene: Scene) -> tuple[tuple[str, str, Transform], ...]:
+    """(parent, child, X_PC) of all that never moves: the robot's base, fixed joints, fixed bodies, named frames."""
+    found = [] if robot.root == WORLD else [(WORLD, robot.root, robot.X_WB)]
+    found += [(joint.parent, joint.child, joint.X_PJ) for joint in robot.joints if not joint.moves]
+    found += [(WORLD, body.name, body.X_WO) for body in scene.bodies if body.fixed]
+    found += [(frame.parent, frame.name, frame.X_PF) for frame in scene.frames]
+    return tuple(found)
+
+
+def tf_message(transforms: Sequence[tuple[str, str, Transform]], ns: int) -> bytes:
+    """tf2_msgs/TFMessage of (parent, child, X_PC)."""
+    writer = CdrWriter()
+    writer.u32(len(transforms))
+    for parent, child, X_PC in transforms:
+        writer.header(ns, parent)
+        writer.text(child)
+        writer.f64s((*X_PC.p, *X_PC.quat_xyzw))
+    return writer.data
+
+
+def marker_message(scene: Scene, ns: int) -> bytes:
+    """visualization_msgs/MarkerArray: every shape of every body, in the body's own frame."""
+    writer = CdrWriter()
+    writer.u32(sum(len(body.geometries) for body in scene.bodies))
+    for body in scene.bodies:
+        for k, geometry in enumerate(body.geometries):
+            _marker(writer, body.name, k, geometry, ns)
+    return writer.data
+
+
+def _marker(writer: CdrWriter, frame: str, k: int, geometry: Geometry, ns: int) -> None:
+    kind, scale, resource = _shape(geometry)
+    writer.header(ns, frame)
+    writer.text(frame)
+    for value in (k, kind, 0):
+        writer.i32(value)
+    writer.f64s((*geometry.X_LS.p, *geometry.X_LS.quat_xyzw))
+    writer.f64s(scale)
+    for channel in geometry.rgba or GREY:
+        writer.f32(channel)
+    writer.time(0)
+    writer.u8(1)
+    writer.u32(0)
+    writer.u32(0)
+    writer.text("")
+    writer.header(0, "")
+    writer.text("")
+    writer.u32(0)
+    writer.u32(0)
+    writer.text("")
+    writer.text(resource)
+    writer.text("")
+    writer.u32(0)
+    writer.u8(1 if resource and geometry.rgba is None else 0)
+
+
+def _shape(geometry: Geometry) -> tuple[int, tuple[float, float, float], str]:
+    """Marker type, scale (full lengths, or a mesh's factors), mesh resource."""
+    match geometry.shape:
+        case Box(size=size):
+            return CUBE, size, ""
+        case Sphere(radius=radius):
+            return SPHERE, (2 * radius, 2 * radius, 2 * radius), ""
+        case Cylinder(radius=radius, length=length):
+            return CYLINDER, (2 * radius, 2 * radius, length), ""
+        case Mesh(uri=uri, scale=scale):
+            # An absolute path would tie the file to one machine; its last part still says which mesh it was.
+            portable = PurePosixPath(uri).name if uri.startswith(("/", "file:")) else uri
+            return MESH_RESOURCE, scale, portable
+
+
+def event_message(ns: int, event: TaskEvent) -> bytes:
+    """manipcli_msgs/TaskEvent."""
+    writer = CdrWriter()
+    writer.header(ns, WORLD)
+    for value in (event.kind, event.step, event.verb, event.outcome, event.text, event.place):
+        writer.text(value)
+    return writer.data
+
+
+def log_message(ns: int, event: TaskEvent) -> bytes:
+    """rcl_interfaces/Log: the same event as a readable line; its level follows the outcome."""
+    file, line = event.place, 0
+    parts = event.place.split(":")
+    if len(parts) >= 2 and parts[1].isdecimal():
+        file, line = parts[0], min(int(parts[1]), 2**32 - 1)
+    step = f"'{event.step}'" if event.step else ""
+    verb = f"({event.verb})" if event.verb else ""
+    message = " ".join(word for word in (event.kind.replace("_", " "), step, verb, event.outcome) if word)
+    writer = CdrWriter()
+    writer.time(ns)
+    writer.u8(_LEVELS.get(event.outcome, INFO))
+    writer.text("manipcli")
+    writer.text(f"{message}: {event.text}" if event.text else message)
+    writer.text(file)
+    writer.text(event.kind)
+    writer.u32(line)
+    return writer.data
+
+
+class ContactEncoder:
+    """manipcli_msgs/Contacts. While fingers close, sets of pairs alternate at the control rate, so the constant bytes
+    of each set are built once."""
+
+    MAX_SETS = 512
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[tuple[str, str], ...], tuple[struct.Struct, tuple[bytes, ...]]] = {}
+
+    def encode(self, ns: int, contacts: Sequence[Contact]) -> bytes:
+        pairs = tuple((contact.a, contact.b) for contact in contacts)
+        known = self._known.get(pairs)
+        if known is None:
+            if len(self._known) >= self.MAX_SETS:
+                self._known.clear()
+            known = self._known[pairs] = self._template(pairs)
+        packer, pieces = known
+        values: list[bytes | float] = []
+        for piece, contact in zip(pieces[2:], contacts, strict=True):
+            values += (piece, contact.force, contact.distance)
+        return packer.pack(pieces[0], *divmod(ns, NS_PER_S), pieces[1], *values)
+
+    @staticmethod
+    def _template(pairs: tuple[tuple[str, str], ...]) -> tuple[struct.Struct, tuple[bytes, ...]]:
+        writer = CdrWriter()
+        stamp = writer.header(0, WORLD)
+        writer.u32(len(pairs))
+        cuts = [stamp + 8, len(writer.data)]
+        layout, ends = "", []
+        for a, b in pairs:
+            writer.text(a)
+            writer.text(b)
+            offset = writer.f64s((0.0, 0.0))
+            ends.append(offset)
+        data = writer.data
+        pieces = [data[:stamp], data[cuts[0] : cuts[1]]]
+        start = cuts[1]
+        for end in ends:
+            pieces.append(data[start:end])
+            layout += f"{end - start}sdd"
+            start = end + 16
+        return struct.Struct(f"<{stamp}siI{cuts[1] - cuts[0]}s{layout}"), tuple(pieces)

@@ -1,0 +1,174 @@
+"""The records of an MCAP file one after the other, trusting nothing: lengths, checksums and the end are verified.
+
+A file whose writer died has no end; it is read up to its last whole record. A file that has its end is read strictly:
+whatever does not fit together there was changed after it was written.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from manipcli.record.container import MAGIC
+from manipcli.record.faults import BadRecording
+
+MAX_RECORD = 1 << 28
+MAX_CHUNK = 1 << 26
+MAX_RATIO = 1000
+_SMALL_CHUNK = 1 << 20
+"""Below this size a chunk may compress as well as it likes."""
+
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA, DATA_END = (
+    0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09, 0x0C, 0x0F,
+)  # fmt: skip
+_FIRST_OPCODE, _LAST_OPCODE = 0x01, 0x7F
+_HEAD = struct.Struct("<BQ")
+_CHUNK_HEAD = struct.Struct("<QQQI")
+_FOOTER = struct.Struct("<BQQQI")
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record of the data section and where it begins in the file."""
+
+    opcode: int
+    offset: int
+    body: bytes
+
+
+class Scan:
+    """Iterate once over the records of the data section; afterwards `lost` says what is missing at the end.
+
+    `being_written`: a file that stops behind a whole record is complete as far as it goes.
+    """
+
+    def __init__(self, path: Path, *, being_written: bool = False) -> None:
+        self.path = path
+        self.lost: str | None = None
+        self._being_written = being_written
+
+    def __iter__(self) -> Iterator[Record]:
+        try:
+            with self.path.open("rb") as file:
+                status = os.fstat(file.fileno())
+                if not stat.S_ISREG(status.st_mode):
+                    raise BadRecording(self.path, "is not a regular file")
+                yield from self._records(file, status.st_size)
+        except OSError as error:
+            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+
+    def _records(self, file: BinaryIO, size: int) -> Iterator[Record]:
+        finished = _is_finished(file, size)
+        file.seek(0)
+        start = file.read(len(MAGIC))
+        if start != MAGIC:
+            cause = "is empty" if not start else "is no MCAP file (its first bytes are others)"
+            raise BadRecording(self.path, cause, hint="a recording is an .mcap file that manipcli run has written")
+        crc = zlib.crc32(start)
+        offset = len(MAGIC)
+        while offset < size:
+            head = file.read(_HEAD.size)
+            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
+            end = offset + _HEAD.size + length
+            if len(head) == _HEAD.size and length > MAX_RECORD:
+                raise BadRecording(self.path, f"the record at byte {offset} is said to be {length} bytes long")
+            if not _FIRST_OPCODE <= opcode <= _LAST_OPCODE or end > size:
+                self._cut(offset, finished=finished)
+                return
+            body = file.read(length)
+            if opcode == DATA_END:
+                if body != crc.to_bytes(4, "little"):
+                    raise BadRecording(self.path, "its checksum does not match: it was changed after it was written")
+                self._check_end(file, end, size, finished=finished)
+                return
+            crc = zlib.crc32(body, zlib.crc32(head, crc))
+            yield Record(opcode, offset, body)
+            offset = end
+        if finished:
+            raise BadRecording(self.path, "has an end, but no end of its data")
+        if not self._being_written:
+            self.lost = "it was not finished"
+
+    def _cut(self, offset: int, *, finished: bool) -> None:
+        if finished:
+            raise BadRecording(self.path, f"the record at byte {offset} is damaged")
+        self.lost = f"it was not finished, and is cut within the record at byte {offset}"
+
+    def _check_end(self, file: BinaryIO, start: int, size: int, *, finished: bool) -> None:
+        """The summary is not needed to read the data, but it tells whether somebody was at the file."""
+        if not finished:
+            self.lost = "only its index: all messages are there"
+            return
+        if size - start > MAX_RECORD:
+            raise BadRecording(self.path, "its summary is too large")
+        rest = file.read(size - start)
+        footer = len(rest) - len(MAGIC) - _FOOTER.size
+        summary_start, crc = _FOOTER.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
+        if summary_start != start or crc != zlib.crc32(rest[: footer + _FOOTER.size - 4]):
+            raise BadRecording(self.path, "the checksum of its summary does not match: it was changed")
+
+
+def _is_finished(file: BinaryIO, size: int) -> bool:
+    """Whether the file ends with a footer and the magic bytes."""
+    tail = _FOOTER.size + len(MAGIC)
+    if size < tail:
+        return False
+    file.seek(size - tail)
+    end = file.read(tail)
+    return end.endswith(MAGIC) and end.startswith(_HEAD.pack(FOOTER, 20))
+
+
+def open_chunk(path: Path, record: Record) -> bytes:
+    """The decompressed message records of a chunk, bounded in size and verified by its checksum."""
+    try:
+        start_ns, end_ns, size, crc = _CHUNK_HEAD.unpack_from(record.body)
+        (name_length,) = struct.unpack_from("<I", record.body, _CHUNK_HEAD.size)
+        name_end = _CHUNK_HEAD.size + 4 + name_length
+        compression = record.body[_CHUNK_HEAD.size + 4 : name_end].decode("ascii", errors="replace")
+        (length,) = struct.unpack_from("<Q", record.body, name_end)
+    except struct.error as error:
+        raise BadRecording(path, f"the chunk at byte {record.offset} is damaged") from error
+    where = f"the chunk at byte {record.offset} (t = {start_ns / 1e9:.3f} to {end_ns / 1e9:.3f} s)"
+    packed = memoryview(record.body)[name_end + 8 :]
+    if len(packed) != length:
+        raise BadRecording(path, f"{where} is damaged")
+    if size > MAX_CHUNK or (size > _SMALL_CHUNK and size > MAX_RATIO * length):
+        raise BadRecording(
+            path,
+            f"{where} declares {size} bytes, packed into {length}",
+            hint=f"at most {MAX_CHUNK} bytes, and {MAX_RATIO} times the packed size, are taken",
+        )
+    data = _decompress(compression, packed, size)
+    if data is None or len(data) != size or zlib.crc32(data) != crc:
+        raise BadRecording(path, f"{where} is damaged: its checksum does not match")
+    return data
+
+
+def _decompress(compression: str, packed: memoryview, size: int) -> bytes | None:
+    """At most `size` bytes; None when the data is not what the compression makes."""
+    if compression == "":
+        return bytes(packed)
+    if compression == "zstd":
+        import zstandard
+
+        try:
+            # A frame may declare its own size, which the decompressor would then believe.
+            if zstandard.frame_content_size(packed) not in (size, -1):
+                return None
+            return zstandard.ZstdDecompressor(max_window_size=1 << 27).decompress(packed, max_output_size=size)
+        except zstandard.ZstdError:
+            return None
+    if compression == "lz4":
+        import lz4.frame  # type: ignore[import-untyped]
+
+        try:
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size))
+        except RuntimeError:
+            return None
+    return None

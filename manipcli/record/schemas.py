@@ -1,0 +1,111 @@
+"""The message types of a recording, as ROS 2 writes them: a table of definitions, and the `ros2msg` text of a type.
+
+The text of a schema is the definition of its type, followed by the definitions of every type it uses, each after a
+line of 80 `=` and a line `MSG: package/Name` (the format of the `ros2msg` schema encoding of MCAP).
+"""
+
+from __future__ import annotations
+
+STRING = "std_msgs/msg/String"
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
+JOINT_STATE = "sensor_msgs/msg/JointState"
+CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
+LOG = "rcl_interfaces/msg/Log"
+MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
+CONTACTS = "manipcli_msgs/msg/Contacts"
+TASK_EVENT = "manipcli_msgs/msg/TaskEvent"
+
+DEFINITIONS: dict[str, str] = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec\n",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "std_msgs/String": "string data\n",
+    "std_msgs/ColorRGBA": "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Quaternion": "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+    "geometry_msgs/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
+    "geometry_msgs/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
+    ),
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    "sensor_msgs/JointState": (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
+    ),
+    "sensor_msgs/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data\n",
+    "trajectory_msgs/JointTrajectoryPoint": (
+        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n"
+        "builtin_interfaces/Duration time_from_start\n"
+    ),
+    "trajectory_msgs/MultiDOFJointTrajectoryPoint": (
+        "geometry_msgs/Transform[] transforms\ngeometry_msgs/Twist[] velocities\ngeometry_msgs/Twist[] accelerations\n"
+        "builtin_interfaces/Duration time_from_start\n"
+    ),
+    "control_msgs/JointTrajectoryControllerState": (
+        "std_msgs/Header header\nstring[] joint_names\n"
+        "trajectory_msgs/JointTrajectoryPoint reference\n"
+        "trajectory_msgs/JointTrajectoryPoint feedback\n"
+        "trajectory_msgs/JointTrajectoryPoint error\n"
+        "trajectory_msgs/JointTrajectoryPoint output\n"
+        "string[] multi_dof_joint_names\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_reference\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_feedback\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_output\n"
+        "float64 speed_scaling_factor\n"
+    ),
+    "rcl_interfaces/Log": (
+        "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
+        "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\n"
+        "string file\nstring function\nuint32 line\n"
+    ),
+    "visualization_msgs/UVCoordinate": "float32 u\nfloat32 v\n",
+    "visualization_msgs/MeshFile": "string filename\nuint8[] data\n",
+    "visualization_msgs/Marker": (
+        "int32 ARROW=0\nint32 CUBE=1\nint32 SPHERE=2\nint32 CYLINDER=3\nint32 LINE_STRIP=4\nint32 LINE_LIST=5\n"
+        "int32 CUBE_LIST=6\nint32 SPHERE_LIST=7\nint32 POINTS=8\nint32 TEXT_VIEW_FACING=9\nint32 MESH_RESOURCE=10\n"
+        "int32 TRIANGLE_LIST=11\nint32 ARROW_STRIP=12\nint32 ADD=0\nint32 MODIFY=0\nint32 DELETE=2\nint32 DELETEALL=3\n"
+        "std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\ngeometry_msgs/Pose pose\n"
+        "geometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration lifetime\n"
+        "bool frame_locked\ngeometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\nstring texture_resource\n"
+        "sensor_msgs/CompressedImage texture\nvisualization_msgs/UVCoordinate[] uv_coordinates\nstring text\n"
+        "string mesh_resource\nvisualization_msgs/MeshFile mesh_file\nbool mesh_use_embedded_materials\n"
+    ),
+    "visualization_msgs/MarkerArray": "visualization_msgs/Marker[] markers\n",
+    "manipcli_msgs/Contact": (
+        "# Two touching parts: names of scene bodies, or robot/<link>; a <= b.\n"
+        "string a\nstring b\n"
+        "# Sum of the normal forces between the two [N].\n"
+        "float64 force\n"
+        "# Distance at the deepest point [m], negative when they penetrate.\n"
+        "float64 distance\n"
+    ),
+    "manipcli_msgs/Contacts": (
+        "# Everything that touches from this time on, until the next message.\n"
+        "std_msgs/Header header\nmanipcli_msgs/Contact[] contacts\n"
+    ),
+    "manipcli_msgs/TaskEvent": (
+        "# Something happened in the task; `place` is where the step stands in its file (file:line:column).\n"
+        "std_msgs/Header header\nstring kind\nstring step\nstring verb\nstring outcome\nstring text\nstring place\n"
+    ),
+}
+
+
+def schema_text(type_name: str) -> str:
+    """The whole `ros2msg` text of `package/msg/Name`: its own definition and those it depends on, each once."""
+    root = type_name.replace("/msg/", "/")
+    parts = [DEFINITIONS[root]]
+    parts += [f"{'=' * 80}\nMSG: {name}\n{DEFINITIONS[name]}" for name in _dependencies(root, [])]
+    return "".join(parts)
+
+
+def _dependencies(name: str, found: list[str]) -> list[str]:
+    """Types that `name` uses, in the order of their first use, depth first."""
+    for line in DEFINITIONS[name].splitlines():
+        used = line.split()[0].removesuffix("[]")
+        if "/" in used and used not in found:
+            found.append(used)
+            _dependencies(used, found)
+    return found
