@@ -1,18 +1,23 @@
-"""Bodies that come from files: a mesh, taken as its convex hull."""
+"""Bodies that come from files: a mesh, taken as its convex hull, or a URDF of one link."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Transform, frozen
-from manipcli.model.body_shapes import BodyShape, Rgba
+from manipcli.core.errors import InvalidInput
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.body_shapes import COLORS, BodyShape, Rgba
 from manipcli.model.coal_shape import coal_shape
+from manipcli.model.description import read_description
+from manipcli.model.packages import Packages
 from manipcli.model.robot import Geometry, Inertial, Mesh
-from manipcli.spec.task import MeshSpec
+from manipcli.model.urdf import read_parts
+from manipcli.spec.task import MeshSpec, UrdfSpec
 
 MESH_SUFFIXES = (".stl", ".obj", ".dae")
 
@@ -46,6 +51,54 @@ def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
         centre=frozen((high + low) / 2.0),
         inertial=principal(volume, hull.computeCOM(), hull.computeMomentofInertiaRelatedToCOM()),
     )
+
+
+def urdf(spec: UrdfSpec, path: Path, rgba: Rgba | None) -> BodyShape:
+    """The one link of a URDF, in the link's frame: its collision shapes and its inertia.
+
+    Args:
+        spec: names the file.
+        path: where it was found.
+        rgba: instead of the file's colours.
+
+    Raises:
+        InvalidInput: the file has errors, each with its place.
+        ValueError: it holds more than one link, no collision shape, or (for a link with mass) no moments of inertia.
+    """
+    parts = read_parts(read_description(path, packages=Packages(path)))
+    if parts.errors:
+        raise InvalidInput(parts.errors)
+    if len(parts.links) != 1:
+        raise ValueError(f"'{spec.file}' has {len(parts.links)} links; an object of the scene has one")
+    (link,) = parts.links
+    if not link.collisions:
+        raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")
+    seen = next((shape.rgba for shape in link.visuals if shape.rgba is not None), COLORS["urdf"])
+    shapes = tuple(replace(shape, rgba=rgba or shape.rgba or seen) for shape in link.collisions)
+    low, high = _bounds(shapes)
+    inertial = None
+    if link.inertial is not None and link.inertial.mass > 0.0:
+        X, inertia = link.inertial.X_LI, link.inertial.inertia
+        inertial = principal(link.inertial.mass, X.p, X.R @ inertia @ X.R.T)
+    return BodyShape(
+        geometries=shapes,
+        interior=None,
+        size=frozen(high - low),
+        centre=frozen((high + low) / 2.0),
+        inertial=inertial,
+    )
+
+
+def _bounds(shapes: tuple[Geometry, ...]) -> tuple[Array, Array]:
+    """Lowest and highest corner of a box about the shapes, in O; that of each shape's own box, so not the tightest."""
+    corners = []
+    for shape in shapes:
+        made = coal_shape(shape.shape)
+        made.computeLocalAABB()
+        low, high = np.array(made.aabb_local.min_), np.array(made.aabb_local.max_)
+        centre, half = shape.X_LS.apply((low + high) / 2.0), np.abs(shape.X_LS.R) @ ((high - low) / 2.0)
+        corners += [centre - half, centre + half]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def principal(mass: float, centre: npt.ArrayLike, inertia: npt.ArrayLike) -> Inertial:

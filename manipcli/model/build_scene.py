@@ -13,6 +13,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
+from manipcli.model.packages import NotFound
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.model.start_overlap import overlaps
@@ -103,17 +104,27 @@ class _Builder:
         (kind,) = words
         rgba = spec.color or COLORS["desk" if kind == "box" and spec.fixed else kind]
         try:
-            shape = self._made(kind, spec, rgba)
+            shape = self._made(spec, rgba)
+        except NotFound as error:
+            self._error("TASK222", f"body '{name}': {error.message}", (*loc, kind, "file"), error.hint)
+            return
+        except InvalidInput as error:
+            self.findings.extend(error.findings)
+            return
         except ValueError as error:
             self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
             return
         self._add_shape(name, kind, shape)
-        if spec.mass is None and not spec.fixed and kind != "urdf":
-            self._error(
-                "TASK223", f"body '{name}' can move and has no mass", loc, "say `mass: 150 g`, or `fixed: true`"
-            )
+        if spec.fixed:
+            return
+        if kind == "urdf" and shape.inertial is None:
+            hint = "give the link an <inertial> with mass and moments, or say `fixed: true`"
+            self._error("TASK223", f"body '{name}' can move and its URDF states no inertia", (*loc, kind), hint)
+        elif kind != "urdf" and spec.mass is None:
+            hint = "say `mass: 150 g`, or `fixed: true`"
+            self._error("TASK223", f"body '{name}' can move and has no mass", loc, hint)
 
-    def _made(self, kind: str, spec: BodySpec, rgba: body_shapes.Rgba) -> BodyShape:
+    def _made(self, spec: BodySpec, rgba: body_shapes.Rgba) -> BodyShape:
         """Raises ValueError when the numbers contradict each other or a file cannot be used."""
         if spec.box is not None:
             return body_shapes.box(spec.box, rgba)
@@ -132,7 +143,8 @@ class _Builder:
             return body_shapes.tray(spec.tray, rgba)
         if spec.mesh is not None:
             return body_files.mesh(spec.mesh, self.resolve(spec.mesh.file), rgba)
-        raise ValueError(f"'{kind}' cannot be used here")
+        assert spec.urdf is not None  # the words of SHAPES are the fields of BodySpec
+        return body_files.urdf(spec.urdf, self.resolve(spec.urdf.file), spec.color)
 
     def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
         self.shapes[name] = shape
@@ -140,18 +152,14 @@ class _Builder:
 
     def _body(self, name: str, spec: BodySpec, X_WO: Transform) -> Body:
         shape = self.shapes[name]
-        # A fixed body's inertia is never asked for; its inertial frame still says where its middle is.
-        mass = spec.mass or (shape.inertial.mass if shape.inertial is not None else 1.0)
-        inertial = shape.inertial or union(shape.geometries, mass)
-        scale = mass / inertial.mass
-        inertial = Inertial(mass=mass, X_LI=inertial.X_LI, inertia=frozen(inertial.inertia * scale))
+        inertial = _inertial(spec, shape)
         return Body(
             name=name,
             kind=self.kinds[name],
             geometries=shape.geometries,
-            mass=0.0 if spec.fixed else mass,
+            mass=inertial.mass,
             X_OI=inertial.X_LI,
-            inertia=frozen(np.zeros((3, 3))) if spec.fixed else inertial.inertia,
+            inertia=inertial.inertia,
             friction=spec.friction,
             rolling_friction=spec.rolling_friction,
             spinning_friction=spec.spinning_friction,
@@ -284,6 +292,17 @@ class _Builder:
 def pose_transform(spec: PoseSpec) -> Transform:
     """X_AB of a pose as users write it."""
     return Transform.of(xyz=spec.xyz, rpy=spec.rpy, quat_xyzw=spec.quat_xyzw)
+
+
+def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
+    """Mass properties in O: those of a file scaled to the mass that is written, else of the union of the shapes."""
+    if spec.fixed:
+        return Inertial(mass=0.0, X_LI=Transform.identity(), inertia=frozen(np.zeros((3, 3))))
+    if shape.inertial is None:
+        return union(shape.geometries, spec.mass or 1.0)  # without a mass there is a finding, and no scene
+    mass = spec.mass or shape.inertial.mass
+    scale = mass / shape.inertial.mass
+    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=frozen(shape.inertial.inertia * scale))
 
 
 def _floor_shape() -> BodyShape:

@@ -274,3 +274,37 @@ def test_a_mesh_that_is_absent_flat_or_no_mesh_is_refused(tmp_path: Path) -> Non
         (found,) = caught.value.findings
         assert found.code == "TASK222"
         assert words in found.message
+
+
+URDF = """<robot name="part">{links}</robot>"""
+LINK = """
+<link name="{name}">
+  <inertial><origin xyz="0.1 0 0"/><mass value="2"/>
+    <inertia ixx="0.02" ixy="0.005" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial>
+  <collision><origin xyz="0.1 0 0.2" rpy="0 1.5707963267948966 0"/>
+    <geometry><box size="0.1 0.2 0.4"/></geometry></collision>
+</link>"""
+
+
+def test_a_urdf_of_one_link_is_a_body(tmp_path: Path) -> None:
+    (tmp_path / "part.urdf").write_text(URDF.format(links=LINK.format(name="part")))
+    part = {"urdf": {"file": "part.urdf"}, "rests_on": "floor", "at": [0, 0]}
+    made = build_scene(task({"part": part}), resolve=lambda name: tmp_path / name).body("part")
+    assert made.mass == 2.0
+    np.testing.assert_allclose(made.size, [0.4, 0.2, 0.1], atol=1e-12)
+    np.testing.assert_allclose(made.centre, [0.1, 0.0, 0.2], atol=1e-12)
+    np.testing.assert_allclose(made.X_WO.p, [0, 0, -0.15], atol=1e-12)
+    tensor = np.array([[0.02, 0.005, 0], [0.005, 0.03, 0], [0, 0, 0.04]])
+    np.testing.assert_allclose(made.X_OI.R @ made.inertia @ made.X_OI.R.T, tensor, atol=1e-15)
+    heavy = build_scene(task({"part": part | {"mass": 4.0}}), resolve=lambda name: tmp_path / name).body("part")
+    np.testing.assert_allclose(heavy.inertia, 2 * made.inertia, rtol=1e-12)
+
+
+def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
+    (tmp_path / "two.urdf").write_text(URDF.format(links=LINK.format(name="a") + LINK.format(name="b") + joint))
+    (tmp_path / "bad.urdf").write_text(URDF.format(links="<link/>"))
+    for name, code in (("two.urdf", "TASK222"), ("bad.urdf", "URDF")):
+        with pytest.raises(InvalidInput) as caught:
+            build_scene(task({"x": {"urdf": {"file": name}, "pose": {}}}), resolve=lambda n: tmp_path / n)
+        assert caught.value.findings[0].code.startswith(code)
