@@ -48,9 +48,7 @@ class Dimension:
         )
 
     def __pow__(self, exponent: int) -> Dimension:
-        return Dimension(
-            self.length * exponent, self.mass * exponent, self.time * exponent, self.angle * exponent
-        )
+        return Dimension(self.length * exponent, self.mass * exponent, self.time * exponent, self.angle * exponent)
 
     def __truediv__(self, other: Dimension) -> Dimension:
         return self * other**-1
@@ -128,7 +126,8 @@ _UNITS: dict[str, Unit] = {
     "m": _unit(LENGTH), "km": _unit(LENGTH, 1e3), "dm": _unit(LENGTH, 1, 10), "cm": _unit(LENGTH, 1, 1e2),
     "mm": _unit(LENGTH, 1, 1e3), "um": _unit(LENGTH, 1, 1e6), "nm": _unit(LENGTH, 1, 1e9),
     "in": _unit(LENGTH, 254, 1e4), "ft": _unit(LENGTH, 3048, 1e4),
-    "rad": _unit(ANGLE), "mrad": _unit(ANGLE, 1, 1e3), "deg": _unit(ANGLE, math.pi, 180), "°": _unit(ANGLE, math.pi, 180),
+    "rad": _unit(ANGLE), "mrad": _unit(ANGLE, 1, 1e3),
+    "deg": _unit(ANGLE, math.pi, 180), "°": _unit(ANGLE, math.pi, 180),
     "rev": _unit(ANGLE, math.tau), "turn": _unit(ANGLE, math.tau),
     "kg": _unit(MASS), "g": _unit(MASS, 1, 1e3), "mg": _unit(MASS, 1, 1e6), "t": _unit(MASS, 1e3),
     "s": _unit(TIME), "ms": _unit(TIME, 1, 1e3), "us": _unit(TIME, 1, 1e6), "ns": _unit(TIME, 1, 1e9),
@@ -152,7 +151,7 @@ NUMBER_PATTERN = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
 _ATOM = r"(?:[A-Za-zµμ]+|[°%])(?:\^-?\d{1,2}|\d{1,2}|[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3})?"
 UNIT_PATTERN = rf"{_ATOM}(?:\s*[*·/]\s*{_ATOM}|[ ]+{_ATOM})*"
 _QUANTITY = re.compile(rf"\s*([-+]?\s*{NUMBER_PATTERN})\s*({UNIT_PATTERN})?\s*")
-_PART = re.compile(rf"(\s*[*·/]\s*|\s+)?([A-Za-zµμ]+|[°%])(\^-?\d{{1,2}}|\d{{1,2}}|[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,3}})?")
+_PART = re.compile(r"(\s*[*·/]\s*|\s+)?([A-Za-zµμ]+|[°%])(\^-?\d{1,2}|\d{1,2}|[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3})?")
 
 
 def parse_unit(text: str) -> Unit:
@@ -178,7 +177,8 @@ def parse_unit(text: str) -> Unit:
         if sign == "/":
             divided, power = True, -power
         for _ in range(abs(power)):
-            over, under = (over * unit.over, under * unit.under) if power > 0 else (over * unit.under, under * unit.over)
+            up, down = (unit.over, unit.under) if power > 0 else (unit.under, unit.over)
+            over, under = over * up, under * down
         dimension = dimension * unit.dimension**power
         position = part.end()
     return Unit(over=over, under=under, dimension=dimension)

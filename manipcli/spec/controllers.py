@@ -71,11 +71,11 @@ class GripperSpec(Model):
     stall_velocity: Annotated[
         JointVelocity, Field(gt=0, description="Slower counts as stalled, above 0. Default 0.02 rad/s.")
     ] = 0.02
-    stall_time: Annotated[Time, Field(gt=0, description="Stalled for so long is stopped, above 0. Default 0.2 s.")] = 0.2
+    stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
     goal_tolerance: Annotated[
         JointValue, Field(gt=0, description="Distance that counts as arrived, above 0. Default 0.05 rad.")
     ] = 0.05
-    default_force: Annotated[Force, Field(gt=0, description="Of a finger where the step states none. Default 5 N.")] = 5.0
+    default_force: Annotated[Force, Field(gt=0, description="Of a finger where no step says one. Default 5 N.")] = 5.0
 
 
 ControllerSpec = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]

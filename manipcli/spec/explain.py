@@ -32,7 +32,18 @@ from pydantic_core import ErrorDetails
 from manipcli.core.errors import Finding
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.spec import shape
-from manipcli.spec.tree import MappingNode, Node, Path, ScalarNode, SequenceNode, child, dotted, key_place_at, node_at, shown
+from manipcli.spec.tree import (
+    MappingNode,
+    Node,
+    Path,
+    ScalarNode,
+    SequenceNode,
+    child,
+    dotted,
+    key_place_at,
+    node_at,
+    shown,
+)
 
 _MISTAKES = {
     "name": 203, "range": 204, "type": 205, "count": 206, "unit": 207, "conflict": 208, "verb": 209, "duplicate": 210,
@@ -44,8 +55,8 @@ _MISTAKES = {
 _EXPECTED = {
     "float_type": "a number", "int_type": "a whole number", "bool_type": "true or false", "string_type": "a text",
     "tuple_type": "a list", "list_type": "a list", "dict_type": "a mapping", "model_type": "a mapping",
-    "model_attributes_type": "a mapping", "mapping_type": "a mapping", "set_type": "a list", "frozen_set_type": "a list",
-    "none_required": "nothing", "int_from_float": "a whole number",
+    "model_attributes_type": "a mapping", "mapping_type": "a mapping", "set_type": "a list",
+    "frozen_set_type": "a list", "none_required": "nothing", "int_from_float": "a whole number",
 }  # fmt: skip
 _WORDS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
 
@@ -255,7 +266,8 @@ def _unknown_type(context: dict[str, object], node: Node) -> tuple[str, str | No
 
 
 def _wrong_count(context: dict[str, object], node: Node) -> str:
-    given = len(node.items) if isinstance(node, SequenceNode) else len(node.entries) if isinstance(node, MappingNode) else 0
+    items = node.items if isinstance(node, SequenceNode) else node.entries if isinstance(node, MappingNode) else ()
+    given = len(items)
     if "min_length" in context:
         exactly = "" if context.get("exact") else "at least "
         return f"expected {exactly}{_items(context['min_length'])}, got {given}"

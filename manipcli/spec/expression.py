@@ -19,7 +19,15 @@ from dataclasses import dataclass
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import did_you_mean, shorten
-from manipcli.core.units import NUMBER, NUMBER_PATTERN, UNIT_PATTERN, Quantity, UnitError, format_quantity, parse_quantity
+from manipcli.core.units import (
+    NUMBER,
+    NUMBER_PATTERN,
+    UNIT_PATTERN,
+    Quantity,
+    UnitError,
+    format_quantity,
+    parse_quantity,
+)
 from manipcli.spec.tree import Entry, MappingNode, Node, Path, Scalar, ScalarNode, SequenceNode, dotted
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
@@ -47,7 +55,7 @@ def is_expression(text: str) -> bool:
 
 
 def evaluate(text: str, params: Params) -> Scalar:
-    """The value of an expression: a parameter as it is, or a computed quantity as a text in SI (a plain number if it has no unit).
+    """A parameter as it is, or the quantity that an expression computes: a text in SI, a number if it has no unit.
 
     Raises:
         ExpressionError: an unknown parameter, no expression, dimensions that cannot be added, division by zero.

@@ -1,4 +1,4 @@
-"""The three files, loaded: text to tree to validated spec. Every finding of a file is raised at once, with its place."""
+"""The three files, loaded: text to tree to validated spec. All findings of a file are raised at once, with places."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from manipcli.spec.yaml import MAX_BYTES, parse
 M = TypeVar("M", bound=Model)
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
+E = TypeVar("E", bound=SpecMember)
 
 FileKind = Literal["task", "robot", "controllers"]
 
@@ -48,12 +49,12 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except (OSError, ValueError) as error:
         if isinstance(error, OSError) and error.errno in (errno.ENOENT, errno.ENOTDIR):
-            raise InvalidInput([Finding("USE101", "there is no such file", place, hint=_sibling(path))]) from None
+            raise InvalidInput([Finding("USE101", "there is no such file", place, hint=sibling(path))]) from None
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         raise InvalidInput([Finding("USE103", f"the file cannot be read: {reason}", place)]) from None
 
 
-def _sibling(path: Path) -> str | None:
+def sibling(path: Path) -> str | None:
     """The file beside it that was meant."""
     try:
         names = sorted(entry.name for entry in os.scandir(path.parent))
@@ -87,6 +88,7 @@ def load_task(
     *,
     steps: Seam[S],
     conditions: Seam[C],
+    expectations: Seam[E],
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec]:
@@ -95,7 +97,8 @@ def load_task(
     Args:
         path: the file.
         steps: members whose names are the verbs.
-        conditions: members whose names are the conditions of `until` and `expect`.
+        conditions: members whose names are the words of `until`.
+        expectations: members whose names are the words of `expect`.
         overrides: of `--set`, for all three files; those of the other two are only read.
         seed: replaces `simulation.seed`.
 
@@ -103,7 +106,13 @@ def load_task(
         InvalidInput: every finding of the file and of the overrides.
     """
     return load_task_text(
-        read_bytes(path), str(path), steps=steps, conditions=conditions, overrides=overrides, seed=seed
+        read_bytes(path),
+        str(path),
+        steps=steps,
+        conditions=conditions,
+        expectations=expectations,
+        overrides=overrides,
+        seed=seed,
     )
 
 
@@ -113,12 +122,13 @@ def load_task_text(
     *,
     steps: Seam[S],
     conditions: Seam[C],
+    expectations: Seam[E],
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec]:
     """As `load_task`, from text; places call it `name`."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
-    model = task_model(steps, conditions)
+    model = task_model(steps, conditions, expectations)
     source, findings = _changed(_source(text, name, "TASK"), wanted, model)
     root, more = substitute(source.root, "TASK")
     return validate(Source(name, root, "TASK"), model, findings=[*findings, *more])

@@ -47,7 +47,7 @@ class Source:
         severity: Severity = "error",
         key: bool = False,
     ) -> Finding:
-        """Something to tell about the value (or, with `key`, the key) at `path`, under the code of this kind of file."""
+        """Something to tell about the value (or, with `key`, the key) at `path`, under this kind of file's code."""
         place = self.key_place(*path) if key else self.place(*path)
         where = f"{dotted(path)}: " if path else ""
         return Finding(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)

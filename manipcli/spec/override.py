@@ -129,7 +129,10 @@ def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, 
         return
     known = dict.fromkeys((*node.entries, *(() if shape.takes_any_key(kinds) else fields)))
     where = f"in '{dotted(done)}'" if done else "at the top of the file"
-    raise _nowhere(override, f"there is no '{escape(part)}' {where}", did_you_mean(part, known, kind="there are"))
+    hint = did_you_mean(part, known, kind="there are")
+    if hint is None:
+        hint = f"nothing stands there yet: give the whole of it, {'.'.join(map(str, (*done, part)))}={{...}}"
+    raise _nowhere(override, f"there is no '{escape(part)}' {where}", hint)
 
 
 def _index(node: SequenceNode, override: Override, done: Path, part: str) -> int:
@@ -139,8 +142,10 @@ def _index(node: SequenceNode, override: Override, done: Path, part: str) -> int
     if part.isascii() and part.isdecimal() and len(part) < 7 and int(part) < len(node.items):
         return int(part)
     many = f"'{dotted(done)}' has {len(node.items)} items, counted from 0"
-    hint = did_you_mean(part, ids, kind="steps") if ids and not part.isdecimal() else None
-    raise _nowhere(override, f"there is no item '{escape(part)}': {many}", hint or (f"steps: {listed(ids)}" if ids else None))
+    hint = f"steps: {listed(ids)}" if ids else None
+    if ids and not part.isdecimal():
+        hint = did_you_mean(part, ids, kind="steps")
+    raise _nowhere(override, f"there is no item '{escape(part)}': {many}", hint)
 
 
 def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput:

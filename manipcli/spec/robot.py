@@ -44,7 +44,8 @@ class PoseSpec(Model):
         if self.quat_xyzw is None:
             return self
         if self.rpy is not None:
-            raise problem("conflict", "the rotation is said twice: by rpy and by quat_xyzw", at=("quat_xyzw",), key=True)
+            message = "the rotation is said twice: by rpy and by quat_xyzw"
+            raise problem("conflict", message, at=("quat_xyzw",), key=True)
         norm = math.sqrt(sum(q * q for q in self.quat_xyzw))
         if abs(norm - 1.0) > _UNIT_TOLERANCE:
             hint = "the order is x, y, z, w: no rotation is [0, 0, 0, 1]"
@@ -126,4 +127,7 @@ class RobotSpec(Model):
         10.0, description="Limit of joints without their own [rad/s^2 or m/s^2], above 0. Default 10."
     )
     collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
-    compat: Literal["ros1", "ros2"] = Field("ros2", description="Whose rules hold where ROS 1 and 2 differ. Default ros2.")
+    friction: Annotated[float, Field(ge=0)] = Field(
+        1.0, description="Coefficient of the robot's surfaces; the engine multiplies it by the other body's. Default 1."
+    )
+    compat: Literal["ros1", "ros2"] = Field("ros2", description="Whose rules hold where the two differ. Default ros2.")

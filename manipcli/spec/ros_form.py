@@ -10,7 +10,7 @@ the validation refuses it.
 
 from __future__ import annotations
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Finding, Place, Severity
 from manipcli.core.text import any_of, did_you_mean
 from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
 
@@ -24,15 +24,43 @@ _TYPES = {
 }
 _BROADCASTERS = ("joint_state_broadcaster/JointStateBroadcaster", "joint_state_controller/JointStateController")
 _UNSERVED = frozenset(
-    "state_publish_rate action_monitor_rate allow_partial_joints_goal stop_trajectory_duration open_loop_control "
-    "allow_integration_in_goal_trajectories allow_nonzero_velocity_at_trajectory_end interpolation_method cmd_timeout "
-    "allow_trajectory_replacement interpolate_from_desired_state command_joints speed_scaling positions_upsampling "
-    "set_last_command_interface_value_as_state_on_activation state_interfaces hold_trajectory_duration "
-    "use_sim_time update_rate allow_stalling".split()
+    {
+        "state_publish_rate",
+        "action_monitor_rate",
+        "allow_partial_joints_goal",
+        "stop_trajectory_duration",
+        "open_loop_control",
+        "allow_integration_in_goal_trajectories",
+        "allow_nonzero_velocity_at_trajectory_end",
+        "interpolation_method",
+        "cmd_timeout",
+        "allow_trajectory_replacement",
+        "interpolate_from_desired_state",
+        "command_joints",
+        "speed_scaling",
+        "positions_upsampling",
+        "set_last_command_interface_value_as_state_on_activation",
+        "state_interfaces",
+        "hold_trajectory_duration",
+        "use_sim_time",
+        "update_rate",
+        "allow_stalling",
+    }
 )
 _UNSERVED_GAINS = frozenset(
-    "antiwindup antiwindup_strategy tracking_time_constant error_deadband u_clamp_max u_clamp_min i_clamp_min "
-    "i_clamp_max normalize_error angle_wraparound publish_state".split()
+    {
+        "antiwindup",
+        "antiwindup_strategy",
+        "tracking_time_constant",
+        "error_deadband",
+        "u_clamp_max",
+        "u_clamp_min",
+        "i_clamp_min",
+        "i_clamp_max",
+        "normalize_error",
+        "angle_wraparound",
+        "publish_state",
+    }
 )
 _UNSERVED_CONSTRAINTS = frozenset({"decelerate_on_cancel", "max_deceleration_on_cancel"})
 
@@ -69,6 +97,10 @@ def _mapping(node: Node | None) -> MappingNode | None:
 
 def _text(node: Node | None) -> str:
     return node.value if isinstance(node, ScalarNode) and isinstance(node.value, str) else ""
+
+
+def _opposite(a: ScalarNode, b: ScalarNode) -> bool:
+    return isinstance(a.value, int | float) and isinstance(b.value, int | float) and a.value == -b.value
 
 
 class _Rewriting:
@@ -176,9 +208,7 @@ class _Rewriting:
             return node
         most, least = block.get("i_clamp_max"), block.get("i_clamp_min")
         if "i_clamp" not in block.entries and isinstance(most, ScalarNode):
-            symmetric = not isinstance(least, ScalarNode) or (
-                isinstance(least.value, int | float) and isinstance(most.value, int | float) and least.value == -most.value
-            )
+            symmetric = not isinstance(least, ScalarNode) or _opposite(least, most)
             clamp = block.entries["i_clamp_max"]
             block = block.without("i_clamp_max", *(("i_clamp_min",) if symmetric else ())).with_entry("i_clamp", clamp)
         return self.served(name, block, _UNSERVED_GAINS)
@@ -222,9 +252,7 @@ class _Rewriting:
                 self.findings.append(Finding("CTRL201", f"{where}: unknown key '{key}'", entry.key_place))
             return False
         # What is only about publishing or reading states changes nothing here, and needs no warning's attention.
-        severity = "note" if key in ("state_interfaces", "use_sim_time", "state_publish_rate") else "warning"
+        severity: Severity = "note" if key in ("state_interfaces", "use_sim_time", "state_publish_rate") else "warning"
         message = f"{where}: ROS knows '{key}', manipcli does not serve it: left out"
-        self.findings.append(
-            Finding("CTRL214", message, entry.key_place, severity="note" if severity == "note" else "warning")
-        )
+        self.findings.append(Finding("CTRL214", message, entry.key_place, severity=severity))
         return True

@@ -15,15 +15,16 @@ from manipcli.spec.unions import SpecMember, task_model
 
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
+E = TypeVar("E", bound=SpecMember)
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _REFERENCE = r"\$[A-Za-z_]"
 
 
-def task_schema(steps: Seam[S], conditions: Seam[C]) -> str:
+def task_schema(steps: Seam[S], conditions: Seam[C], expectations: Seam[E]) -> str:
     """Of a task file: the verbs and the conditions are `oneOf`; any number may be an expression with `$name`."""
-    schema = _schema(task_model(steps, conditions), "manipcli task")
+    schema = _schema(task_model(steps, conditions, expectations), "manipcli task")
     _allow_expressions(schema)
     return _dump(schema)
 

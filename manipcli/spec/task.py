@@ -16,8 +16,8 @@ from manipcli.spec.quantity import Acceleration, Angle, Length, Mass, Time
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 
 __all__ = [
-    "BodySpec", "BoxSpec", "ConditionSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "Positive",
-    "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
+    "BodySpec", "BoxSpec", "ConditionSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "KeyedSpec", "MeshSpec",
+    "Positive", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
 ]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -30,7 +30,7 @@ class SimulationSpec(Model):
     engine: str = Field("pybullet", description="Which engine: `pybullet` (physics), `kinematic` (commands come true).")
     step: Annotated[Time, Field(gt=0, le=0.02, description="Physics step, above 0 to 20 ms. Default 1 ms.")] = 0.001
     control_period: Annotated[
-        Time, Field(gt=0, le=0.1, description="Time between control ticks, a multiple of `step`, to 100 ms. Default 1 ms.")
+        Time, Field(gt=0, le=0.1, description="Control tick, a whole multiple of `step`, to 100 ms. Default 1 ms.")
     ] = 0.001
     seed: Annotated[int, Field(ge=0, description="Of the planner and of noise, 0 or more. Default 0.")] = 0
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
@@ -118,7 +118,7 @@ class BodySpec(Model):
     yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies.")
     fixed: bool = Field(False, description="Never moves. Default false.")
-    mass: Annotated[Mass, Field(gt=0)] | None = Field(None, description="[kg], above 0; needed unless `fixed` or `urdf`.")
+    mass: Annotated[Mass, Field(gt=0)] | None = Field(None, description="[kg], above 0; needed unless `fixed`, `urdf`.")
     friction: Annotated[float, Field(ge=0, description="Coefficient of sliding, 0 or more. Default 0.8.")] = 0.8
     rolling_friction: Annotated[float, Field(ge=0, description="Coefficient of rolling, 0 or more. Default 0.")] = 0.0
     spinning_friction: Annotated[float, Field(ge=0, description="Coefficient of turning on the spot. Default 0.")] = 0.0
@@ -135,7 +135,7 @@ class FrameSpec(Model):
     pose: PoseSpec = Field(PoseSpec(), description="Of the frame in its parent. Default: the parent's own.")
 
 
-class _KeyedSpec(Model):
+class KeyedSpec(Model):
     """A block that is known by its one key `word`."""
 
     word: ClassVar[str] = ""
@@ -148,7 +148,7 @@ class _KeyedSpec(Model):
         return body
 
 
-class ConditionSpec(_KeyedSpec):
+class ConditionSpec(KeyedSpec):
     """A condition: its name, and under it what it asks."""
 
     @property
@@ -160,7 +160,7 @@ class ConditionSpec(_KeyedSpec):
 _ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 
-class StepSpec(_KeyedSpec):
+class StepSpec(KeyedSpec):
     """What every step has beside its one verb key. `body` is the validated block under the verb."""
 
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")

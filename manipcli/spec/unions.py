@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Protocol, TypeVar, cast
+from typing import Annotated, Optional, Protocol, TypeVar, cast
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
 
 from manipcli.core.registry import Seam
-from manipcli.core.text import any_of, did_you_mean, listed
+from manipcli.core.text import did_you_mean, escape, listed
 from manipcli.spec.base import Model, problem
-from manipcli.spec.task import ConditionSpec, StepSpec, TaskSpec
+from manipcli.spec.task import ConditionSpec, KeyedSpec, StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):
@@ -31,32 +31,35 @@ class SpecMember(Protocol):
 
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
+E = TypeVar("E", bound=SpecMember)
 
 _COMMON = tuple(name for name in StepSpec.model_fields if name != "verb")
 
 
-def task_model(steps: Seam[S], conditions: Seam[C]) -> type[TaskSpec]:
-    """`TaskSpec` whose steps and conditions are those of the seams; the same class for the same members."""
-    return _task_model(
-        tuple((member.name, member.spec) for member in steps),
-        tuple((member.name, member.spec) for member in conditions),
-    )
+def task_model(steps: Seam[S], conditions: Seam[C], expectations: Seam[E]) -> type[TaskSpec]:
+    """`TaskSpec` whose steps, `until` and `expect` are those of the seams; the same class for the same members."""
+    return _task_model(_members(steps), _members(conditions), _members(expectations))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
 
 
+def _members(seam: Seam[S]) -> Members:
+    return tuple((member.name, member.spec) for member in seam)
+
+
 @lru_cache(maxsize=8)
-def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
+def _task_model(steps: Members, conditions: Members, expectations: Members) -> type[TaskSpec]:
     condition = _union("condition", ConditionSpec, conditions, common=())
-    until = (condition | None, StepSpec.model_fields["until"])
+    expectation = _union("expectation", ConditionSpec, expectations, common=())
+    until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`|` is no operator of `object`)
     step = _union("verb", StepSpec, steps, common=_COMMON, until=until)
     model = create_model(
         "TaskSpec",
         __base__=TaskSpec,
         __doc__=TaskSpec.__doc__,
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
-        expect=(tuple[condition, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
+        expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
     )
     return cast(type[TaskSpec], model)
 
@@ -86,8 +89,9 @@ def _wrapped(base: type[Model], name: str, spec: type[Model], fields: dict[str, 
         **fields,
         **{name: (Annotated[spec, BeforeValidator(_nothing_is_default)], Field(description=description))},
     )
-    made.word = name
-    return cast(type[Model], made)
+    keyed = cast(type[KeyedSpec], made)
+    keyed.word = name
+    return keyed
 
 
 def _nothing_is_default(body: object) -> object:
@@ -107,27 +111,26 @@ def _key_of(names: tuple[str, ...]) -> Callable[[object], str | None]:
 def _check(kind: str, names: tuple[str, ...], common: tuple[str, ...]) -> Callable[[object], object]:
     """Exactly one of `names` among the keys; what else is wrong the member's model tells."""
 
-    what, its = ("a step", "verb") if kind == "verb" else ("a condition", "name")
+    what, its = ("a step", "verb") if kind == "verb" else (f"an {kind}" if kind[0] in "aeiou" else f"a {kind}", "name")
 
     def check(value: object) -> object:
         if isinstance(value, Model):
             return value
         if not isinstance(value, dict):
-            hint = f"write `{value}:` with a colon" if isinstance(value, str) and value in names else f"{kind}s: {listed(names)}"
+            forgot = isinstance(value, str) and value in names
+            hint = f"write `{value}:` with a colon" if forgot else f"{kind}s: {listed(names)}"
             raise problem("verb", f"expected {what}: a mapping with one {its}", hint=hint)
         found = [key for key in value if key in names]
         others = [str(key) for key in value if key not in names and key not in common]
         if len(found) > 1:
-            hint = f"write a list item for each {kind}"
-            raise problem("verb", f"{what} has exactly one {its}, not {any_of(found)} together".replace(" or ", " and "),
-                          at=(found[1],), key=True, hint=hint)  # fmt: skip
+            message = f"{what} has exactly one {its}, not both '{found[0]}' and '{found[1]}'"
+            raise problem("verb", message, at=(found[1],), key=True, hint=f"write a list item for each {kind}")
         if not found and others:
-            hint = did_you_mean(others[0], (*names, *common), kind=f"{kind}s", most=3)
-            raise problem("name", f"unknown {kind} '{others[0]}', expected one of {listed(names, most=30)}",
-                          at=(others[0],), key=True, hint=hint)  # fmt: skip
+            near = did_you_mean(others[0], (*names, *common), kind=f"{kind}s", most=3)
+            message = f"unknown {kind} '{escape(others[0])}', expected one of {listed(names, most=30)}"
+            raise problem("name", message, at=(others[0],), key=True, hint=near)
         if not found:
             raise problem("verb", f"{what} without a {its}, expected one of {listed(names, most=30)}")
         return value
 
     return check
-

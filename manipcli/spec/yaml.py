@@ -28,7 +28,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NoReturn
+from typing import NoReturn, Protocol
 
 import yaml
 
@@ -62,7 +62,8 @@ def parse(data: bytes | str, name: str) -> Node | None:
         InvalidInput: with every finding up to the first syntax error.
     """
     if len(data) > MAX_BYTES:
-        raise InvalidInput([Finding("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", Place(name, 1, 1))])
+        message = f"the file is larger than {MAX_BYTES // 1_000_000} MB"
+        raise InvalidInput([Finding("YAML103", message, Place(name, 1, 1))])
     text = _decode(data, name) if isinstance(data, bytes) else data
     text = text.removeprefix("\ufeff")
     control = _CONTROL.search(text)
@@ -126,9 +127,11 @@ def _place_at(text: str, index: int, name: str) -> Place:
 
 def _events(text: str) -> Iterator[yaml.Event]:
     """PyYAML's parser alone: libyaml's where the wheel has it, else the Python one."""
-    parser = _CParser(text) if _CParser is not None else _PurePythonParser(text)
+    parser = _parser(text)
     while parser.check_event():
-        yield parser.get_event()
+        event = parser.get_event()
+        if event is not None:
+            yield event
 
 
 class _PurePythonParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
@@ -140,10 +143,18 @@ class _PurePythonParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Pa
         yaml.parser.Parser.__init__(self)
 
 
-try:
-    from yaml.cyaml import CParser as _CParser
-except ImportError:
-    _CParser = None
+class _Parser(Protocol):
+    def check_event(self) -> bool: ...
+
+    def get_event(self) -> yaml.Event | None: ...
+
+
+def _parser(text: str) -> _Parser:
+    if not yaml.__with_libyaml__:
+        return _PurePythonParser(text)
+    from yaml._yaml import CParser  # the compiled part, which not every build of PyYAML has
+
+    return CParser(text)
 
 
 _CLEARER: tuple[tuple[str, str, str | None], ...] = (
@@ -169,8 +180,8 @@ def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Finding:
         if character == "\t":
             problem = "tab"
         else:
-            problem, hint = f"'{shorten(character)}' cannot begin a value", "quote the text that begins with it"
-            return _syntax(problem, hint, excerpt, Place(name, line + 1, column + 1))
+            message = f"'{shorten(character)}' cannot begin a value"
+            return _syntax(message, "quote the text that begins with it", excerpt, Place(name, line + 1, column + 1))
     opened = getattr(error, "context_mark", None)
     for words, message, hint in _CLEARER:
         if words not in problem:
@@ -230,7 +241,7 @@ class _Composer:
                 root = composed.node
         return None if isinstance(root, ScalarNode) and root.value is None else root
 
-    def node(self, event: yaml.NodeEvent, events: Iterator[yaml.Event], *, depth: int) -> _Composed:
+    def node(self, event: yaml.Event, events: Iterator[yaml.Event], *, depth: int) -> _Composed:
         if depth > MAX_DEPTH:
             self.stop("YAML108", f"nested deeper than {MAX_DEPTH}", event)
         if isinstance(event, yaml.AliasEvent):
@@ -244,7 +255,7 @@ class _Composer:
                 event,
                 "plain values need no tag; quotes make a text",
             )
-        anchor = event.anchor
+        anchor = getattr(event, "anchor", None)
         if anchor is not None:
             self.anchors[anchor] = None
         if isinstance(event, yaml.MappingStartEvent):
@@ -252,17 +263,19 @@ class _Composer:
         elif isinstance(event, yaml.SequenceStartEvent):
             composed = self.sequence(event, events, depth)
         else:
+            assert isinstance(event, yaml.ScalarEvent)
             composed = _Composed(ScalarNode(self.scalar(event), self.place(event)), 1, 1)
         if anchor is not None:
             self.anchors[anchor] = composed
         return composed
 
     def alias(self, event: yaml.AliasEvent, depth: int) -> _Composed:
-        if event.anchor not in self.anchors:
-            self.stop("YAML109", f"the alias '*{shorten(event.anchor)}' has no anchor before it", event)
-        target = self.anchors[event.anchor]
+        anchor = str(event.anchor)
+        if anchor not in self.anchors:
+            self.stop("YAML109", f"the alias '*{shorten(anchor)}' has no anchor before it", event)
+        target = self.anchors[anchor]
         if target is None:
-            self.stop("YAML109", f"the alias '*{shorten(event.anchor)}' stands inside its own anchor", event)
+            self.stop("YAML109", f"the alias '*{shorten(anchor)}' stands inside its own anchor", event)
         if depth + target.height - 1 > MAX_DEPTH:
             self.stop("YAML108", f"nested deeper than {MAX_DEPTH} once the alias is expanded", event)
         self.count(target.count, event)
@@ -355,7 +368,9 @@ class _Composer:
             self.stop("YAML107", f"more than {MAX_NODES:,} values, aliases expanded", event)
 
     def place(self, event: yaml.Event) -> Place:
-        return Place(self.name, event.start_mark.line + 1, event.start_mark.column + 1)
+        mark = event.start_mark
+        assert mark is not None
+        return Place(self.name, mark.line + 1, mark.column + 1)
 
     def duplicate(self, key: str, second: Place, first: Place) -> None:
         message = f"the key '{shorten(key)}' stands twice in this mapping: lines {first.line} and {second.line}"
