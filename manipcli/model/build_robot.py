@@ -9,10 +9,10 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.model.description import read_description
-from manipcli.model.named_poses import build_groups, build_poses
+from manipcli.model.description import Description, read_description
+from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
-from manipcli.model.packages import NotFound, Packages
+from manipcli.model.packages import NotFound, Packages, Unread
 from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
 from manipcli.model.urdf import Parts, read_parts
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
@@ -80,6 +80,34 @@ def build_robot(
         assert parts is not None
         body.weld(reporter, each, parts, k)
     reporter.stop()
+    return _assembled(reporter, spec, main.root, body), tuple(reporter.findings)
+
+
+def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
+    """The robot of a log, from the whole description in it; meshes are neither looked for nor read.
+
+    Args:
+        spec: the robot file as it was resolved; what it attached is part of `urdf` already.
+        urdf: `RobotModel.urdf` of the robot.
+
+    Raises:
+        InvalidInput: the description or the robot file is damaged.
+    """
+    from manipcli.model.located_xml import element_of, parse_document
+
+    document = parse_document(urdf, "robot.urdf")
+    assert document.documentElement is not None  # a document without a root element is not well-formed
+    description = Description(Path("robot.urdf"), element_of(document.documentElement), Unread(), ())
+    parts = read_parts(description)
+    reporter = Reporter(None)
+    reporter.findings += parts.findings
+    reporter.stop()
+    body = _Body(parts.root, list(parts.links), list(parts.joints), list(parts.transmissions))
+    return _assembled(reporter, spec, parts.root, body)
+
+
+def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> RobotModel:
+    """The robot of welded parts and of what the robot file says about them."""
     joints = _with_limits(reporter, spec, body.ordered())
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
@@ -90,9 +118,9 @@ def build_robot(
         for name in pair:
             _known_link(reporter, name, links, ("collision_ignore", k))
     reporter.stop()
-    robot = RobotModel(
+    return RobotModel(
         name=spec.robot,
-        root=main.root,
+        root=root,
         links=links,
         joints=joints,
         groups=groups,
@@ -102,8 +130,8 @@ def build_robot(
         urdf=portable_urdf(spec.robot, links, joints, body.transmissions),
         tool=tool,
         collision_ignore=spec.collision_ignore,
+        friction=spec.friction,
     )
-    return robot, tuple(reporter.findings)
 
 
 def transform(pose: PoseSpec) -> Transform:
@@ -246,18 +274,16 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
     for key, bound in (("lower", own.lower), ("upper", own.upper)):
         if bound is None:
             continue
-        wider = (base.lower is not None and bound < base.lower) or (base.upper is not None and bound > base.upper)
-        if wider:
-            message = f"joint '{joint.name}': {key} {bound:g} widens the description's {base.lower:g} to {base.upper:g}"
+        outside = (base.lower is not None and bound < base.lower) or (base.upper is not None and bound > base.upper)
+        if outside:
+            within = interval(base.lower, base.upper)
+            message = f"joint '{joint.name}': {key} {bound:g} is outside of the description's {within}"
             hint = "the robot file may only narrow it"
             reporter.error("ROBOT305", message, ("limits", joint.name, key), hint=hint)
         elif key == "lower":
             lower = bound
         else:
             upper = bound
-    if lower is not None and upper is not None and lower > upper:
-        message = f"joint '{joint.name}': lower {lower:g} is above upper {upper:g}"
-        reporter.error("ROBOT305", message, ("limits", joint.name))
     return JointLimits(
         lower=lower,
         upper=upper,

@@ -16,6 +16,11 @@ LIMIT_TOLERANCE = 1e-6
 """How far a named pose may lie beyond a limit [rad or m]: angles in degrees are written with few digits."""
 
 
+def interval(lower: float | None, upper: float | None) -> str:
+    """`-1 to 2`, where None is unlimited."""
+    return f"{'-inf' if lower is None else f'{lower:g}'} to {'inf' if upper is None else f'{upper:g}'}"
+
+
 def build_groups(
     reporter: Reporter, spec: RobotSpec, links: Sequence[Link], joints: Sequence[Joint]
 ) -> tuple[Group, ...]:
@@ -161,6 +166,7 @@ class _Poses:
             low = limits.lower is not None and value < limits.lower - LIMIT_TOLERANCE
             high = limits.upper is not None and value > limits.upper + LIMIT_TOLERANCE
             if low or high:
-                message = f"pose '{name}': joint '{joint}' at {value:g} is outside {limits.lower:g} to {limits.upper:g}"
+                within = interval(limits.lower, limits.upper)
+                message = f"pose '{name}': joint '{joint}' at {value:g} is outside of {within}"
                 self._reporter.error("ROBOT323", message, locs[joint])
         return values

@@ -152,6 +152,19 @@ class Packages:
         return _uri(path.parent, path)
 
 
+class Unread(Packages):
+    """For a description whose files nobody will read, as that in a log: every name stands for itself."""
+
+    def __init__(self) -> None:
+        super().__init__(None)
+
+    def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
+        return Path(uri)
+
+    def portable(self, path: Path) -> str:
+        return str(path)
+
+
 def _uri(root: Path, path: Path) -> str:
     return f"package://{root.name}/{path.relative_to(root).as_posix()}"
 

@@ -33,7 +33,7 @@ def resolve_mimics(
             target = joints[mimic.joint]
             if target.name in visited:
                 circle = " -> ".join([*visited, target.name])
-                what = "itself" if target.name == name else f"joints in a circle ({circle})"
+                what = "itself" if len(visited) == 1 else f"joints in a circle ({circle})"
                 reader.report("URDF014", f"joint '{name}' mimics {what}", places.get(("joint", name)))
                 mimic = None
                 break

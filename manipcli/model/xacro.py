@@ -22,7 +22,7 @@ from manipcli.model.located_xml import invalid, place_of, read_document
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.xacro_yaml import load_yaml
 
-MAX_EXPANSIONS = 100_000
+MAX_EXPANSIONS = 50_000
 MAX_MACRO_DEPTH = 64
 MAX_INCLUDE_DEPTH = 32
 _loading = threading.Lock()

@@ -1,0 +1,277 @@
+"""A robot file and its descriptions become one robot; whatever does not fit is told with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import InvalidInput, Place
+from manipcli.model.build_robot import build_robot
+from manipcli.model.normalise import engine_urdf, massless_joints
+from manipcli.model.robot import RobotModel
+from manipcli.spec.robot import RobotSpec
+
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def link(name: str, content: str = INERTIAL) -> str:
+    return f'<link name="{name}">{content}</link>\n'
+
+
+def joint(name: str, kind: str, parent: str, child: str, extra: str = "") -> str:
+    limit = '<limit lower="-1" upper="1" velocity="2" effort="10"/><axis xyz="0 0 1"/>' if kind != "fixed" else ""
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{name}" type="{kind}">{ends}{limit}{extra}</joint>\n'
+
+
+ARM = (
+    '<robot name="arm">\n'
+    + "".join(link(name) for name in ("base", "upper", "lower", "wrist"))
+    + link("flange", "")
+    + joint("j1", "revolute", "base", "upper", '<origin xyz="0 0 0.1" rpy="0.1 0.2 0.3"/>')
+    + joint("j2", "revolute", "upper", "lower", '<dynamics damping="0.1" friction="0.2"/>')
+    + joint("slide", "prismatic", "lower", "wrist")
+    + joint("end", "fixed", "wrist", "flange")
+    + '<transmission name="t"><type>transmission_interface/SimpleTransmission</type>'
+    + '<joint name="j1"/><actuator name="m"><mechanicalReduction>50</mechanicalReduction></actuator></transmission>'
+    + "</robot>"
+)
+HAND = (
+    '<robot name="hand">\n'
+    + link("palm")
+    + link("left")
+    + link("right")
+    + joint("open", "prismatic", "palm", "left")
+    + joint("follow", "prismatic", "palm", "right", '<mimic joint="open" multiplier="-1"/>')
+    + "</robot>"
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    (tmp_path / "hand.urdf").write_text(HAND)
+    return tmp_path / "robot.yaml"
+
+
+def spec(**content: object) -> RobotSpec:
+    return RobotSpec.model_validate({"robot": "r", "description": "arm.urdf", **content})
+
+
+def build(file: Path, **content: object) -> RobotModel:
+    return build_robot(spec(**content), file=file)[0]
+
+
+def messages(file: Path, **content: object) -> str:
+    with pytest.raises(InvalidInput) as caught:
+        build(file, **content)
+    return "\n".join(f"{finding} | {finding.hint}" for finding in caught.value.findings)
+
+
+HANDED = {"attach": [{"description": "hand.urdf", "parent": "flange", "pose": {"xyz": [0, 0, 0.2]}, "prefix": "h_"}]}
+
+
+def test_an_attached_description_is_welded_on_with_its_prefix(file: Path) -> None:
+    robot = build(file, **HANDED)
+    assert robot.joint_names == ("j1", "j2", "slide", "h_open", "h_follow")
+    weld = robot.joint("h_palm_attach")
+    assert (weld.type, weld.parent, weld.child) == ("fixed", "flange", "h_palm")
+    np.testing.assert_array_equal(weld.X_PJ.p, [0.0, 0.0, 0.2])
+    mimic = robot.joint("h_follow").mimic
+    assert mimic is not None
+    assert mimic.joint == "h_open"
+    position = {robot.root: 0} | {joint.child: k for k, joint in enumerate(robot.joints, start=1)}
+    assert all(position[joint.parent] < position[joint.child] for joint in robot.joints)
+    assert [link.name for link in robot.links] == list(position)
+
+
+def test_two_hands_need_prefixes(file: Path) -> None:
+    twice = [{"description": "hand.urdf", "parent": "flange"}, {"description": "hand.urdf", "parent": "wrist"}]
+    assert "link 'palm' is already there" in messages(file, attach=twice)
+    assert "did you mean 'flange'" in messages(file, attach=[{"description": "hand.urdf", "parent": "flang"}])
+
+
+def test_a_chain_is_the_independent_joints_on_the_way(file: Path) -> None:
+    groups = {
+        "arm": {"chain": {"base": "upper", "tip": "flange"}},
+        "hand": {"joints": ["h_open"], "tip": "h_palm"},
+        "all": {"chain": {"base": "base", "tip": "h_left"}},
+    }
+    robot = build(file, **HANDED, groups=groups)
+    assert robot.group("arm").joints == ("j2", "slide")
+    assert (robot.group("arm").tip, robot.group("hand").tip) == ("flange", "h_palm")
+    assert robot.group("all").joints == ("j1", "j2", "slide", "h_open")
+
+
+@pytest.mark.parametrize(
+    ("group", "expected"),
+    [
+        ({"chain": {"base": "base", "tip": "flang"}}, "did you mean 'flange'"),
+        ({"chain": {"base": "wrist", "tip": "upper"}}, "does not stand below"),
+        ({"chain": {"base": "wrist", "tip": "flange"}}, "no joint moves"),
+        ({"joints": ["j1", "j9"]}, "joint 'j9' is not in the robot"),
+        ({"joints": ["j1", "end"]}, "joint 'end' is fixed"),
+        ({"joints": ["j1", "j1"]}, "listed twice"),
+        ({"joints": ["h_follow"]}, "follows 'h_open'"),
+        ({"joints": ["j1"], "tip": "nowhere"}, "tip link 'nowhere' is not"),
+    ],
+)
+def test_a_group_that_cannot_be_is_told(file: Path, group: dict[str, object], expected: str) -> None:
+    assert expected in messages(file, **HANDED, groups={"g": group})
+
+
+GROUPS = {"arm": {"joints": ["j1", "j2"]}, "rail": {"joints": ["slide"]}}
+
+
+def test_named_poses_are_lists_names_of_joints_or_other_poses(file: Path) -> None:
+    poses = {
+        "home": {"arm": "up", "rail": [0.5]},
+        "up": {"arm": {"j2": 0.3, "j1": -0.2}},
+        "start": {"arm": "home"},
+    }
+    robot = build(file, groups=GROUPS, poses=poses)
+    home = robot.pose("home")
+    assert dict(zip(home.joints, home.positions, strict=True)) == {"j1": -0.2, "j2": 0.3, "slide": 0.5}
+    start = robot.pose("start")
+    assert dict(zip(start.joints, start.positions, strict=True)) == {"j1": -0.2, "j2": 0.3}
+
+
+def test_no_pose_is_made_up(file: Path) -> None:
+    assert build(file).poses == ()
+
+
+@pytest.mark.parametrize(
+    ("poses", "expected"),
+    [
+        ({"p": {"arm": [0.0]}}, "1 values for the 2 joints"),
+        ({"p": {"arm": [0.0, 1.5]}}, "joint 'j2' at 1.5 is outside of -1 to 1"),
+        ({"p": {"arm": {"j3": 0.0}}}, "joint 'j3' is not in group 'arm'"),
+        ({"p": {"leg": [0.0]}}, "no group 'leg'"),
+        ({"p": {"arm": "hom"}, "home": {"arm": [0, 0]}}, "did you mean 'home'"),
+        ({"p": {"arm": "q"}, "q": {"arm": "p"}}, "refers to itself"),
+        ({"p": {"arm": "p"}}, "refers to itself"),
+        ({"p": {"rail": "q"}, "q": {"arm": [0, 0]}}, "no pose 'q' of group 'rail'"),
+    ],
+)
+def test_a_pose_that_cannot_be_is_told(file: Path, poses: dict[str, object], expected: str) -> None:
+    assert expected in messages(file, groups=GROUPS, poses=poses)
+
+
+def test_limits_narrow_and_complete_the_description(file: Path) -> None:
+    limits = {"j1": {"lower": -0.5, "velocity": 5.0, "acceleration": 3.0, "jerk": 40.0}}
+    robot, findings = build_robot(spec(limits=limits, default_acceleration=7.0), file=file)
+    j1, j2 = robot.joint("j1").limits, robot.joint("j2").limits
+    assert (j1.lower, j1.upper, j1.velocity, j1.effort, j1.acceleration, j1.jerk) == (-0.5, 1.0, 5.0, 10.0, 3.0, 40.0)
+    assert (j2.acceleration, j2.jerk) == (7.0, None)
+    (note,) = findings
+    assert note.severity == "note"
+    assert "j2, slide" in note.message
+    assert "7 rad/s2" in note.message
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ({"j1": {"lower": -2.0}}, "lower -2 is outside of the description's -1 to 1"),
+        ({"j1": {"upper": 1.1}}, "upper 1.1 is outside"),
+        ({"j1": {"upper": -2.0}}, "upper -2 is outside"),
+        ({"j11": {"upper": 0.1}}, "did you mean 'j1'"),
+        ({"end": {"velocity": 0.1}}, "not a moving joint"),
+    ],
+)
+def test_limits_that_widen_or_name_nothing_are_told(file: Path, limits: dict[str, object], expected: str) -> None:
+    assert expected in messages(file, limits=limits)
+
+
+def test_tool_and_mount_are_frames(file: Path) -> None:
+    robot = build(file, tool={"link": "flange", "pose": {"xyz": [0, 0, 0.1]}}, mount={"xyz": [1, 0, 0]})
+    assert robot.tool is not None
+    np.testing.assert_array_equal(robot.tool.X_LT.p, [0.0, 0.0, 0.1])
+    np.testing.assert_array_equal(robot.X_WB.p, [1.0, 0.0, 0.0])
+    assert "link 'flanges' is not in the robot" in messages(file, tool={"link": "flanges"})
+
+
+def test_findings_carry_the_place_of_the_value(file: Path) -> None:
+    asked: list[tuple[str | int, ...]] = []
+
+    def place(loc: tuple[str | int, ...]) -> Place:
+        asked.append(loc)
+        return Place("robot.yaml", len(asked), 1)
+
+    content = spec(groups=GROUPS, poses={"p": {"arm": [0.0, 1.5]}}, tool={"link": "x"})
+    with pytest.raises(InvalidInput) as caught:
+        build_robot(content, file=file, place=place)
+    assert ("poses", "p", "arm", 1) in asked
+    assert ("tool", "link") in asked
+    assert all(finding.place is not None for finding in caught.value.findings)
+
+
+def test_errors_of_all_descriptions_are_told_at_once(file: Path) -> None:
+    (file.parent / "arm.urdf").write_text(ARM.replace('mass value="1"', 'mass value="-1"'))
+    (file.parent / "hand.urdf").write_text(HAND.replace('type="prismatic"', 'type="prism"'))
+    told = messages(file, **HANDED)
+    assert "arm.urdf:2:" in told
+    assert "hand.urdf:5:" in told
+
+
+def assert_same(one: RobotModel, other: RobotModel) -> None:
+    assert [link.name for link in one.links] == [link.name for link in other.links]
+    for a, b in zip(one.links, other.links, strict=True):
+        assert (a.inertial is None) == (b.inertial is None)
+        if a.inertial is not None and b.inertial is not None:
+            assert a.inertial.mass == b.inertial.mass
+            np.testing.assert_array_equal(a.inertial.inertia, b.inertial.inertia)
+            np.testing.assert_allclose(a.inertial.X_LI.matrix, b.inertial.X_LI.matrix, atol=1e-15)
+        for mine, its in ((a.visuals, b.visuals), (a.collisions, b.collisions)):
+            assert [(g.shape, g.rgba) for g in mine] == [(g.shape, g.rgba) for g in its]
+            for g, h in zip(mine, its, strict=True):
+                np.testing.assert_allclose(g.X_LS.matrix, h.X_LS.matrix, atol=1e-15)
+    for j, k in zip(one.joints, other.joints, strict=True):
+        assert (j.name, j.type, j.parent, j.child, j.mimic) == (k.name, k.type, k.parent, k.child, k.mimic)
+        assert (j.limits, j.damping, j.friction) == (k.limits, k.damping, k.friction)
+        np.testing.assert_allclose(j.axis, k.axis, atol=1e-15)
+        # Angles go through arcus functions and back: a few bits.
+        np.testing.assert_allclose(j.X_PJ.matrix, k.X_PJ.matrix, atol=1e-15)
+    assert one.transmissions == other.transmissions
+
+
+ROBOTS = sorted((Path(__file__).parents[2] / "robots").glob("*/robot.yaml"), key=str)
+DESCRIPTIONS = {
+    "arm7_hand3": "urdf/arm7_hand3.urdf.xacro",
+    "panda": "package://pybullet_data/franka_panda/panda.urdf",
+    "iiwa7": "package://pybullet_data/kuka_iiwa/model.urdf",
+}
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.parent.name)
+def test_what_we_write_reads_as_the_same_robot(path: Path, tmp_path: Path) -> None:
+    content = RobotSpec(robot=path.parent.name, description=DESCRIPTIONS[path.parent.name])
+    robot, _ = build_robot(content, file=path)
+    for text in (robot.urdf, engine_urdf(robot, visuals=True)):
+        assert max(len(line.encode()) for line in text.splitlines()) < 4096
+    assert str(Path.cwd()) not in robot.urdf
+    assert "file://" not in robot.urdf
+    (tmp_path / "again.urdf").write_text(robot.urdf)
+    again, _ = build_robot(
+        RobotSpec(robot=robot.name, description="again.urdf"),
+        file=tmp_path / "robot.yaml",
+        package_path=[path.parent.parent],
+    )
+    assert_same(robot, again)
+
+
+def test_a_hand_of_its_own_file_reads_again_too(file: Path, tmp_path: Path) -> None:
+    robot = build(file, **HANDED)
+    (tmp_path / "again.urdf").write_text(robot.urdf)
+    assert_same(robot, build(file, description="again.urdf"))
+
+
+def test_a_joint_that_moves_no_mass_is_no_matter_for_physics(file: Path) -> None:
+    (file.parent / "arm.urdf").write_text(ARM.replace(link("wrist"), link("wrist", "")))
+    robot = build(file)
+    assert massless_joints(robot) == ("slide",)
+    with pytest.raises(InvalidInput, match="'slide' moves nothing that has mass"):
+        engine_urdf(robot)
+    assert massless_joints(build(file, **HANDED)) == ()  # the hand is fixed to it

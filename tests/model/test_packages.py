@@ -1,0 +1,117 @@
+"""What a description names is found in the documented places, and nowhere else."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from manipcli.model.packages import NotFound, Packages
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """stack/{arm,hand}/{urdf,meshes}, and a file outside of both."""
+    for name in ("arm", "hand"):
+        for folder in ("urdf", "meshes"):
+            (tmp_path / "stack" / name / folder).mkdir(parents=True)
+        (tmp_path / "stack" / name / "meshes" / "a.stl").write_bytes(b"solid")
+        (tmp_path / "stack" / name / "urdf" / f"{name}.urdf").write_text("<robot/>")
+    (tmp_path / "secret.txt").write_text("secret")
+    return tmp_path / "stack"
+
+
+def test_a_package_is_the_folder_of_its_name_above_or_beside_the_file(tree: Path) -> None:
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    assert packages.root("arm") == tree / "arm"
+    assert packages.root("hand") == tree / "hand"
+    assert packages.resolve("package://hand/meshes/a.stl") == tree / "hand" / "meshes" / "a.stl"
+    assert packages.resolve("model://arm/meshes/a.stl") == tree / "arm" / "meshes" / "a.stl"
+
+
+def test_relative_and_file_uris_reach_the_description_s_own_tree(tree: Path) -> None:
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    mesh = tree / "arm" / "meshes" / "a.stl"
+    assert packages.resolve("../meshes/a.stl") == mesh
+    assert packages.resolve(f"file://{mesh}") == mesh
+    assert packages.resolve(str(mesh)) == mesh
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "../../../secret.txt",
+        "package://arm/../../secret.txt",
+        "package://arm/%2e%2e/%2e%2e/secret.txt",
+        "package://../secret.txt",
+        "package://./../../secret.txt",
+        "file:///etc/passwd",
+        "/etc/passwd",
+        "package://etc/passwd",
+        "http://example.com/a.stl",
+        "data://text",
+        "../meshes",
+        "../meshes/none.stl",
+        "a\0b",
+    ],
+)
+def test_what_lies_outside_or_is_no_regular_file_is_refused(tree: Path, uri: str) -> None:
+    with pytest.raises(NotFound):
+        Packages(tree / "arm" / "urdf" / "arm.urdf").resolve(uri)
+
+
+def test_a_link_that_leaves_the_tree_is_refused_unless_allowed(tree: Path) -> None:
+    link = tree / "arm" / "meshes" / "link.stl"
+    link.symlink_to(tree.parent / "secret.txt")
+    description = tree / "arm" / "urdf" / "arm.urdf"
+    with pytest.raises(NotFound, match="outside"):
+        Packages(description).resolve("package://arm/meshes/link.stl")
+    assert Packages(description, allow_outside=True).resolve("package://arm/meshes/link.stl").name == "secret.txt"
+
+
+def test_a_pipe_is_refused_at_once(tree: Path) -> None:
+    os.mkfifo(tree / "arm" / "meshes" / "pipe.stl")
+    with pytest.raises(NotFound, match="regular file"):
+        Packages(tree / "arm" / "urdf" / "arm.urdf").resolve("../meshes/pipe.stl")
+
+
+def test_the_package_path_comes_first(tree: Path, tmp_path: Path) -> None:
+    other = tmp_path / "elsewhere"
+    (other / "hand").mkdir(parents=True)
+    description = tree / "arm" / "urdf" / "arm.urdf"
+    assert Packages(description, package_path=[other]).root("hand") == other / "hand"
+    assert Packages(description, package_path=[other / "hand"]).root("hand") == other / "hand"
+
+
+def test_ros_variables_are_searched(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "ws" / "robot_one").mkdir(parents=True)
+    (tmp_path / "install" / "share" / "robot_two").mkdir(parents=True)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere{os.pathsep}{tmp_path / 'ws'}")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    assert packages.root("robot_one") == tmp_path / "ws" / "robot_one"
+    assert packages.root("robot_two") == tmp_path / "install" / "share" / "robot_two"
+
+
+def test_an_installed_python_package_is_found_without_importing_it(tmp_path: Path) -> None:
+    before = "pybullet_data" in sys.modules
+    path = Packages(tmp_path / "robot.yaml").resolve("package://pybullet_data/franka_panda/panda.urdf")
+    assert path.is_file()
+    assert ("pybullet_data" in sys.modules) == before
+    assert Packages(path).portable(path) == "package://pybullet_data/franka_panda/panda.urdf"
+
+
+def test_an_unknown_package_tells_where_it_was_looked_for(tree: Path) -> None:
+    with pytest.raises(NotFound) as caught:
+        Packages(tree / "arm" / "urdf" / "arm.urdf").root("gripper")
+    assert str(tree / "gripper") in caught.value.message
+    assert "--package-path" in (caught.value.hint or "")
+
+
+def test_a_portable_uri_resolves_to_the_same_file(tree: Path) -> None:
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    mesh = packages.resolve("../meshes/a.stl")
+    assert packages.portable(mesh) == "package://arm/meshes/a.stl"
+    assert packages.resolve(packages.portable(mesh)) == mesh

@@ -1,0 +1,257 @@
+"""Everything wrong with a description is told at once, with its place; what is right is read as written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.model.description import read_description
+from manipcli.model.packages import Packages
+from manipcli.model.robot import Box, Mesh, Mimic
+from manipcli.model.urdf import Parts, read_parts
+
+INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
+LINK_A = f'<link name="a">{INERTIAL}</link>'
+LINK_B = f'<link name="b">{INERTIAL}</link>'
+ENDS = '<parent link="a"/><child link="b"/>'
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
+JOINT = f'<joint name="j" type="revolute">{ENDS}<axis xyz="0 0 1"/>{LIMIT}</joint>'
+GOOD = f'<robot name="r">\n{LINK_A}\n{LINK_B}\n{JOINT}\n</robot>'
+
+
+def read(folder: Path, text: str) -> Parts:
+    path = folder / "r.urdf"
+    path.write_text(text, encoding="utf-8")
+    return read_parts(read_description(path, packages=Packages(path)))
+
+
+def errors(folder: Path, text: str) -> tuple[Finding, ...]:
+    return read(folder, text).errors
+
+
+def test_a_sound_description_gives_no_finding(tmp_path: Path) -> None:
+    parts = read(tmp_path, GOOD)
+    assert parts.findings == ()
+    assert (parts.name, parts.root, [link.name for link in parts.links]) == ("r", "a", ["a", "b"])
+    limits = parts.joints[0].limits
+    assert (limits.lower, limits.upper, limits.velocity, limits.effort) == (-1.0, 2.0, 3.0, 4.0)
+
+
+def link_b(content: str) -> str:
+    return GOOD.replace(LINK_B, f'<link name="b">{content}</link>')
+
+
+def joint(content: str, kind: str = "revolute") -> str:
+    return GOOD.replace(JOINT, f'<joint name="j" type="{kind}">{content}</joint>')
+
+
+def inertia(**moments: str) -> str:
+    values = {"ixx": "0.02", "iyy": "0.03", "izz": "0.04", "ixy": "0", "ixz": "0", "iyz": "0"} | moments
+    attributes = " ".join(f'{key}="{value}"' for key, value in values.items())
+    return link_b(f'<inertial><mass value="2"/><inertia {attributes}/></inertial>')
+
+
+BAD = {
+    "link without name": (GOOD.replace('<link name="b">', "<link>"), "no attribute 'name'"),
+    "link twice": (GOOD.replace(LINK_B, LINK_B + LINK_B), "link 'b' is written twice"),
+    "joint twice": (GOOD.replace(JOINT, JOINT + JOINT), "joint 'j' is written twice"),
+    "no link": ('<robot name="r"/>', "has no link"),
+    "joint without type": (GOOD.replace(' type="revolute"', ""), "no attribute 'type'"),
+    "unknown type": (joint(ENDS + LIMIT, "revolut"), "unknown type 'revolut'"),
+    "floating": (joint(ENDS, "floating"), "not supported"),
+    "joint without child": (joint('<parent link="a"/>' + LIMIT), "has no <child"),
+    "child without link": (joint('<parent link="a"/><child/>' + LIMIT), "no attribute 'link'"),
+    "undefined parent": (GOOD.replace('parent link="a"', 'parent link="aa"'), "parent link 'aa' is not"),
+    "undefined child": (GOOD.replace('child link="b"', 'child link="c"'), "child link 'c' is not"),
+    "itself": (GOOD.replace('child link="b"', 'child link="a"'), "to itself"),
+    "two roots": (GOOD.replace(JOINT, ""), "2 root links: 'a', 'b'"),
+    "two parents": (
+        GOOD.replace(JOINT, JOINT + JOINT.replace('"j"', '"k"')),
+        "child of two joints, 'j' and 'k'",
+    ),
+    "loop": (
+        GOOD.replace(JOINT, JOINT + '<joint name="k" type="fixed"><parent link="b"/><child link="a"/></joint>'),
+        "form a loop",
+    ),
+    "loop beside a root": (
+        GOOD.replace(
+            JOINT,
+            '<link name="c"/><joint name="j" type="fixed"><parent link="b"/><child link="c"/></joint>'
+            '<joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint>',
+        ),
+        "form a loop",
+    ),
+    "zero axis": (joint(ENDS + '<axis xyz="0 0 0"/>' + LIMIT), "axis 0 0 0"),
+    "axis with two numbers": (joint(ENDS + '<axis xyz="0 1"/>' + LIMIT), "expected 3 numbers"),
+    "nan axis": (joint(ENDS + '<axis xyz="0 nan 1"/>' + LIMIT), "expected 3 numbers"),
+    "no limit": (joint(ENDS), "has no <limit>"),
+    "prismatic without limit": (joint(ENDS, "prismatic"), "has no <limit>"),
+    "lower above upper": (joint(ENDS + '<limit lower="2" upper="1" velocity="1" effort="1"/>'), "is above upper"),
+    "negative effort": (joint(ENDS + '<limit lower="0" upper="1" velocity="1" effort="-1"/>'), "effort is -1"),
+    "infinite limit": (joint(ENDS + '<limit lower="0" upper="inf" velocity="1" effort="1"/>'), "expected a number"),
+    "negative damping": (joint(ENDS + LIMIT + '<dynamics damping="-1"/>'), "damping is -1"),
+    "origin with text": (joint(ENDS + LIMIT + '<origin xyz="0 0 high"/>'), "expected 3 numbers"),
+    "origin with comma": (joint(ENDS + LIMIT + '<origin rpy="0 0,1 0"/>'), "expected 3 numbers"),
+    "too large": (joint(ENDS + LIMIT + '<origin xyz="0 0 1e400"/>'), "expected 3 numbers"),
+    "mimic unknown": (joint(ENDS + LIMIT + '<mimic joint="k"/>'), "mimics 'k', which is not"),
+    "mimic itself": (joint(ENDS + LIMIT + '<mimic joint="j"/>'), "mimics itself"),
+    "no mass": (link_b('<inertial><inertia ixx="1" iyy="1" izz="1"/></inertial>'), "no <mass>"),
+    "mass text": (GOOD.replace('mass value="2"', 'mass value="heavy"'), "expected a number"),
+    "negative mass": (GOOD.replace('mass value="2"', 'mass value="-2"'), "mass -2"),
+    "no moments": (link_b('<inertial><mass value="2"/></inertial>'), "no <inertia>"),
+    "negative moment": (inertia(ixx="-0.02"), "not positive definite"),
+    "not definite": (inertia(ixy="0.5"), "not positive definite"),
+    "triangle": (inertia(izz="0.06"), "no body has the principal moments"),
+    "moved point mass": (inertia(ixx="0", iyy="0", izz="0"), "no moments of inertia"),
+    "unknown shape": (link_b("<collision><geometry><boxx/></geometry></collision>"), "unknown shape <boxx>"),
+    "two shapes": (link_b("<collision><geometry><box/><box/></geometry></collision>"), "one shape"),
+    "negative size": (
+        link_b('<collision><geometry><box size="1 -1 1"/></geometry></collision>'),
+        "expected positive lengths",
+    ),
+    "no radius": (link_b('<visual><geometry><sphere/></geometry></visual>'), "no attribute 'radius'"),
+    "collision mesh": (
+        link_b('<collision><geometry><mesh filename="x.stl"/></geometry></collision>'),
+        "collision mesh: 'x.stl' is not found",
+    ),
+    "transmission joint": (
+        GOOD.replace(JOINT, JOINT + '<transmission name="t"><type>x/S</type><joint name="jj"/></transmission>'),
+        "names joint 'jj'",
+    ),
+    "transmission reduction": (
+        GOOD.replace(
+            JOINT,
+            JOINT + '<transmission name="t"><type>S</type><joint name="j"/><actuator name="m">'
+            "<mechanicalReduction>0</mechanicalReduction></actuator></transmission>",
+        ),
+        "reduction of 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("defect", BAD)
+def test_a_defect_is_told_once_with_its_place(tmp_path: Path, defect: str) -> None:
+    text, expected = BAD[defect]
+    found = errors(tmp_path, text)
+    assert any(expected in finding.message for finding in found), [str(finding) for finding in found]
+    assert all(finding.place is not None for finding in found)
+
+
+def test_all_defects_of_a_file_are_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace('mass value="2"', 'mass value="-2"').replace('"0 0 1"', '"0 0 0"').replace("<robot", "<robot")
+    text = text.replace("</robot>", '<link name="c"><collision><geometry><box/></geometry></collision></link></robot>')
+    messages = " ".join(finding.message for finding in errors(tmp_path, text))
+    for expected in ("link 'a' has mass", "link 'b' has mass", "axis 0 0 0", "no attribute 'size'"):
+        assert expected in messages
+
+
+def test_an_unknown_name_is_answered_with_the_nearest(tmp_path: Path) -> None:
+    text = GOOD.replace('name="b"', 'name="forearm"').replace('child link="b"', 'child link="forarm"')
+    assert any("forearm" in (finding.hint or "") for finding in errors(tmp_path, text))
+
+
+def test_what_can_be_lived_with_is_a_warning(tmp_path: Path) -> None:
+    visual = '<visual><geometry><mesh filename="x.stl"/></geometry></visual>'
+    text = GOOD.replace(LINK_B, f'<link name="b">{INERTIAL}{visual}</link>').replace('"0 0 1"', '"0 0 2"')
+    parts = read(tmp_path, text.replace('velocity="3"', 'velocity="0"'))
+    assert parts.errors == ()
+    assert {finding.code for finding in parts.findings} == {"URDF033", "URDF034", "URDF036"}
+    assert parts.joints[0].limits.velocity is None
+    np.testing.assert_array_equal(parts.joints[0].axis, [0.0, 0.0, 1.0])
+    assert parts.links[1].visuals == ()
+
+
+def test_joints_come_depth_first_whatever_the_order_of_the_file(tmp_path: Path) -> None:
+    def fixed(name: str, parent: str, child: str) -> str:
+        return f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+
+    links = "".join(f'<link name="{name}"/>' for name in "edcba")
+    joints = fixed("4", "c", "d") + fixed("3", "a", "c") + fixed("2", "b", "e") + fixed("1", "a", "b")
+    parts = read(tmp_path, f'<robot name="r">{links}{joints}</robot>')
+    assert [joint.name for joint in parts.joints] == ["3", "4", "1", "2"]
+    assert [link.name for link in parts.links] == ["a", "c", "d", "b", "e"]
+
+
+def test_a_chain_of_mimics_follows_the_first_joint(tmp_path: Path) -> None:
+    def sliding(name: str, parent: str, child: str, mimic: str) -> str:
+        ends = f'<parent link="{parent}"/><child link="{child}"/>'
+        return f'<joint name="{name}" type="prismatic">{ends}{LIMIT}{mimic}</joint>'
+
+    joints = sliding("1", "a", "b", '<mimic joint="2" multiplier="2" offset="0.5"/>')
+    joints += sliding("2", "a", "c", '<mimic joint="3" multiplier="-3" offset="1"/>') + sliding("3", "a", "d", "")
+    links = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in "abcd")
+    parts = read(tmp_path, f'<robot name="r">{links}{joints}</robot>')
+    q3 = 0.1
+    mimic = parts.joints[0].mimic
+    assert mimic is not None
+    assert mimic.joint == "3"
+    assert mimic.multiplier * q3 + mimic.offset == pytest.approx(2 * (-3 * q3 + 1) + 0.5, abs=1e-15)
+    circle = joints.replace("<mimic joint=\"3\"", "<mimic joint=\"1\"")
+    assert any("circle" in finding.message for finding in errors(tmp_path, f'<robot name="r">{links}{circle}</robot>'))
+    assert parts.joints[1].mimic == Mimic("3", -3.0, 1.0)
+
+
+def test_colours_come_from_materials_by_name_and_in_place(tmp_path: Path) -> None:
+    shape = '<geometry><box size="1 2 3"/></geometry>'
+    visuals = f'<visual>{shape}<material name="red"/></visual>'
+    visuals += f'<visual>{shape}<material name="own"><color rgba="0 1 0 0.5"/></material></visual>'
+    visuals += f"<visual>{shape}</visual>"
+    text = GOOD.replace(LINK_B, f'<link name="b">{INERTIAL}{visuals}</link>')
+    parts = read(tmp_path, text.replace("</robot>", '<material name="red"><color rgba="1 0 0 1"/></material></robot>'))
+    assert [visual.rgba for visual in parts.links[1].visuals] == [(1, 0, 0, 1), (0, 1, 0, 0.5), None]
+    assert parts.links[1].visuals[0].shape == Box((1.0, 2.0, 3.0))
+
+
+def test_a_mesh_is_named_without_the_machine_it_lies_on(tmp_path: Path) -> None:
+    folder = tmp_path / "arm" / "urdf"
+    folder.mkdir(parents=True)
+    mesh = tmp_path / "arm" / "meshes" / "x.stl"
+    mesh.parent.mkdir()
+    mesh.write_bytes(b"")
+    for uri in ("../meshes/x.stl", "package://arm/meshes/x.stl", f"file://{mesh}"):
+        shape = f'<collision><geometry><mesh filename="{uri}" scale="1 -1 0.001"/></geometry></collision>'
+        parts = read(folder, link_b(INERTIAL + shape))
+        assert parts.errors == ()
+        expected = Mesh(uri="package://arm/meshes/x.stl", path=mesh, scale=(1.0, -1.0, 0.001))
+        assert parts.links[1].collisions[0].shape == expected
+
+
+ROS1 = (
+    '<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j">'
+    "<hardwareInterface>EffortJointInterface</hardwareInterface><offset>0.5</offset></joint>"
+    '<actuator name="m"><mechanicalReduction>-50</mechanicalReduction></actuator></transmission>'
+)
+ROS2 = (
+    '<ros2_control name="h" type="system"><joint name="j"/><transmission name="t">'
+    "<plugin>transmission_interface/SimpleTransmission</plugin>"
+    '<joint name="j" role="joint1"><mechanical_reduction>-50</mechanical_reduction><offset>0.5</offset></joint>'
+    '<actuator name="m" role="actuator1"/></transmission></ros2_control>'
+)
+
+
+@pytest.mark.parametrize("text", [ROS1, ROS2], ids=["ros1", "ros2"])
+def test_transmissions_of_both_generations_say_the_same(tmp_path: Path, text: str) -> None:
+    (tag,) = read(tmp_path, GOOD.replace(JOINT, JOINT + text)).transmissions
+    assert (tag.name, tag.type, tag.joints, tag.actuators) == ("t", "SimpleTransmission", ("j",), ("m",))
+    assert tag.joint_reductions[0] * tag.actuator_reductions[0] == -50.0
+    assert tag.joint_offsets == (0.5,)
+
+
+PUT = ["", "0", "nan", '"', "<", "a", "-"]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(at=st.integers(0, len(GOOD)), length=st.integers(0, 12), put=st.sampled_from(PUT))
+def test_any_change_of_the_text_gives_parts_or_findings(tmp_path: Path, at: int, length: int, put: str) -> None:
+    try:
+        parts = read(tmp_path, GOOD[:at] + put + GOOD[at + length :])
+    except InvalidInput:
+        return
+    if not parts.errors:
+        assert parts.root
+        assert len(parts.joints) == len(parts.links) - 1

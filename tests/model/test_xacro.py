@@ -1,0 +1,206 @@
+"""Xacro expands as in ROS, keeps the places, and runs nothing."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from pathlib import Path
+from xml.dom import minidom
+
+import pytest
+import yaml
+
+from manipcli.core.errors import InvalidInput
+from manipcli.model import xacro
+from manipcli.model.description import Description, read_description
+from manipcli.model.packages import Packages
+
+HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+
+
+def expand(folder: Path, body: str, **arguments: str | int | float | bool) -> Description:
+    path = folder / "r.urdf.xacro"
+    path.write_text(HEAD + body + "\n</robot>\n", encoding="utf-8")
+    return read_description(path, packages=Packages(path), arguments=arguments)
+
+
+def refused(folder: Path, body: str) -> InvalidInput:
+    with pytest.raises(InvalidInput) as caught:
+        expand(folder, body)
+    assert caught.value.findings[0].place is not None
+    return caught.value
+
+
+def names(description: Description) -> list[str]:
+    return [link.attributes["name"] for link in description.root.all("link")]
+
+
+def test_macros_properties_conditions_and_blocks_expand(tmp_path: Path) -> None:
+    description = expand(
+        tmp_path,
+        """<xacro:arg name="side" default="left"/>
+<xacro:property name="n" value="${2 * 3}"/>
+<xacro:macro name="part" params="name mass:=1.5 *shape">
+  <link name="$(arg side)_${name}_${n}"><mass value="${mass}"/><xacro:insert_block name="shape"/></link>
+</xacro:macro>
+<xacro:part name="a"><box/></xacro:part>
+<xacro:if value="${n > 5}"><xacro:part name="b" mass="2"><sphere/></xacro:part></xacro:if>
+<xacro:unless value="true"><link name="never"/></xacro:unless>""",
+        side="right",
+    )
+    assert names(description) == ["right_a_6", "right_b_6"]
+    a, b = description.root.all("link")
+    assert (a.children[0].attributes["value"], a.children[1].tag) == ("1.5", "box")
+    assert (b.children[0].attributes["value"], b.children[1].tag) == ("2", "sphere")
+
+
+def test_an_element_from_a_macro_in_an_included_file_knows_where_it_was_written(tmp_path: Path) -> None:
+    (tmp_path / "part.xacro").write_text(
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+        '<xacro:macro name="part" params="name">\n    <link name="${name}"/></xacro:macro>\n</robot>'
+    )
+    description = expand(
+        tmp_path, '<xacro:include filename="part.xacro"/>\n<xacro:part name="a"/><xacro:part name="b"/><link name="c"/>'
+    )
+    places = {link.attributes["name"]: link.place for link in description.root.all("link")}
+    for name in ("a", "b"):
+        place = places[name]
+        assert place is not None
+        assert (Path(place.file).name, place.line, place.column) == ("part.xacro", 3, 5)
+    own = places["c"]
+    assert own is not None
+    assert (Path(own.file).name, own.line, own.column) == ("r.urdf.xacro", 3, 45)
+
+
+def test_an_error_in_a_macro_names_its_place_and_the_call(tmp_path: Path) -> None:
+    macro = '<xacro:macro name="part" params="x">\n<link name="${x + missing}"/>\n</xacro:macro>\n'
+    error = refused(tmp_path, macro + '<xacro:part x="1"/>')
+    finding = error.findings[0]
+    assert finding.place is not None
+    assert finding.place.line == 3
+    assert "missing" in finding.message
+    assert "xacro:part" in (finding.hint or "")
+    assert ":5:1" in (finding.hint or "")
+
+
+def test_packages_are_found_through_our_search(tmp_path: Path) -> None:
+    (tmp_path / "stack" / "hand").mkdir(parents=True)
+    (tmp_path / "stack" / "arm").mkdir()
+    (tmp_path / "stack" / "hand" / "h.xacro").write_text('<robot><link name="h"/></robot>')
+    assert names(expand(tmp_path / "stack" / "arm", '<xacro:include filename="$(find hand)/h.xacro"/>')) == ["h"]
+
+
+def test_yaml_data_is_read_with_units_and_attributes(tmp_path: Path) -> None:
+    (tmp_path / "d.yaml").write_text("joint: {upper: !degrees 2 * 45, names: [a, b]}")
+    description = expand(
+        tmp_path,
+        """<xacro:property name="d" value="${xacro.load_yaml('d.yaml')}"/>
+<link name="${d.joint.names[1]}" upper="${d['joint']['upper']}"/>""",
+    )
+    link = description.root.all("link")[0]
+    assert link.attributes["name"] == "b"
+    assert float(link.attributes["upper"]) == pytest.approx(1.5707963267948966, abs=1e-15)
+    with pytest.raises(yaml.YAMLError):  # the constructors stayed with our own loader
+        yaml.safe_load("q: !degrees 1")
+
+
+ATTACKS = {
+    "lambda": "<link name=\"${(lambda: load_yaml.__globals__['os'].system('touch CANARY'))()}\"/>",
+    "builtins": "<link name=\"${load_yaml.__globals__['__builtins__']['open']('CANARY', 'w')}\"/>",
+    "subclasses": "<link name=\"${python.vars(python.type)['__subclasses__'](python.type)}\"/>",
+    "eval": "<xacro:property name=\"p\" value=\"open('CANARY', 'w')\"/><link name=\"$(eval ${p})\"/>",
+    "eval import": "<link name=\"$(eval __import__('os').system('touch CANARY')\"/>",
+    "format": "<link name=\"${'{0.__globals__[os].environ[HOME]}'.format(xacro.load_yaml)}\"/>",
+    "env": '<link name="$(env HOME)"/>',
+    "optenv": '<link name="$(optenv HOME x)"/>',
+    "command": '<link name="$(command \'touch CANARY\')"/>',
+    "yaml outside": "<link name=\"${xacro.load_yaml('/etc/os-release')}\"/>",
+    "yaml above": "<link name=\"${xacro.load_yaml('../../../../../../etc/os-release')}\"/>",
+    "include outside": '<xacro:include filename="/etc/fonts/fonts.conf"/>',
+    "power": '<link name="${9**9**9}"/>',
+    "text": "<link name=\"${'a' * 4000000000}\"/>",
+    "itself": '<xacro:include filename="r.urdf.xacro"/>',
+    "recursion": '<xacro:macro name="m" params=""><xacro:m/></xacro:macro><xacro:m/>',
+    "doubling": "".join(
+        f'<xacro:macro name="m{k}" params=""><xacro:m{k + 1}/><xacro:m{k + 1}/></xacro:macro>' for k in range(30)
+    )
+    + '<xacro:macro name="m30" params=""><link name="x"/></xacro:macro><xacro:m0/>',
+    "growing text": "".join(
+        f'<xacro:property name="p{k}" value="${{p{k + 1}}}${{p{k + 1}}}"/>' for k in range(30)
+    )
+    + '<xacro:property name="p30" value="abc"/><link name="${p0}"/>',
+    "circle": '<xacro:property name="a" value="${b}"/><xacro:property name="b" value="${a}"/><link name="${a}"/>',
+}
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_a_hostile_description_is_refused_with_its_place(
+    tmp_path: Path, attack: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "one" / "two"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(xacro, "MAX_EXPANSIONS", 2000)
+    error = refused(folder, ATTACKS[attack])
+    assert os.environ["HOME"] not in error.findings[0].message
+    assert not list(tmp_path.rglob("CANARY"))
+
+
+def test_yaml_with_code_in_it_is_refused(tmp_path: Path) -> None:
+    for text in ("!degrees \"(lambda: load_yaml.__globals__['os'].system('id'))()\"", "!!python/name:os.system"):
+        (tmp_path / "d.yaml").write_text(f"q: {text}")
+        refused(tmp_path, "<link name=\"${xacro.load_yaml('d.yaml')}\"/>")
+
+
+def test_a_pipe_cannot_be_included(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.xacro")
+    refused(tmp_path, '<xacro:include filename="pipe.xacro"/>')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<!DOCTYPE r [<!ENTITY a "b">]><robot name="r">&a;</robot>',
+        '<!DOCTYPE r SYSTEM "file:///etc/passwd"><robot name="r"/>',
+        "<robot name='r'>",
+        "",
+        "\0",
+        "<robot><link name='a' name='b'/></robot>",
+        '<robot><xacro:x/></robot>',
+        "<robot>" + "<a>" * 200 + "</a>" * 200 + "</robot>",
+        f'<robot name="{"a" * 70_000}"/>',
+        "<sdf/>",
+    ],
+)
+def test_what_is_no_plain_xml_description_is_refused(tmp_path: Path, text: str) -> None:
+    for name in ("r.urdf", "r.xacro"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InvalidInput) as caught:
+            read_description(path, packages=Packages(path))
+        assert caught.value.findings[0].place is not None
+
+
+def test_an_argument_that_the_description_does_not_have_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match=r"'sied'.*it has: side"):
+        expand(tmp_path, '<xacro:arg name="side" default="left"/><link name="$(arg side)"/>', sied="right")
+    path = tmp_path / "r.urdf"
+    path.write_text('<robot name="r"/>')
+    with pytest.raises(InvalidInput, match="no arguments"):
+        read_description(path, packages=Packages(path), arguments={"side": "left"})
+
+
+def test_the_library_that_others_import_is_left_as_it_was(tmp_path: Path) -> None:
+    library = importlib.import_module("xacro")
+    before = {name: value for name, value in vars(library).items() if callable(value)}
+    write = minidom.Element.writexml
+    expand(tmp_path, '<link name="${1 + 1}"/>')
+    refused(tmp_path, '<link name="${1 +}"/>')
+    assert {name: value for name, value in vars(library).items() if callable(value)} == before
+    assert minidom.Element.writexml is write
+    assert yaml.SafeLoader.yaml_constructors.get("!degrees") is None
+
+
+def test_the_same_file_expands_the_same_twice(tmp_path: Path) -> None:
+    body = '<xacro:property name="n" value="3"/><link name="l${n}"/>'
+    assert names(expand(tmp_path, body)) == names(expand(tmp_path, body)) == ["l3"]
