@@ -14,7 +14,7 @@ from manipcli.core.errors import Finding, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.load import Task, load_task
-from manipcli.flow.log import RUNS, judge_log, open_log, verdict_metadata
+from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task
 from manipcli.report.run_report import RunReport, Timing
 
@@ -72,20 +72,19 @@ def run_task(
     planned = time.perf_counter()
 
     manager = controllers(task)
-    where = log if log is not None else RUNS / f"{task.name}.mcap"
+    where = log if log is not None else default_log(task)
     recorder = open_log(task, plan, manager, where, overwrite=force or log is None)
     try:
         simulate(task, plan, manager, recorder, progress)
-        status = "complete"
+        status, cause = "complete", ""
     except SimulationFailed as failure:
-        recorder.say(failure)
-        status = "failed"
+        status, cause = "failed", str(failure)
     except KeyboardInterrupt:
-        status = "interrupted"
-    recorder.metadata("run", {"status": status})
+        status, cause = "interrupted", "interrupted by the user"
+    recorder.metadata("run", {"status": status, "cause": cause})
     simulated = time.perf_counter()
 
-    verdict = judge_log(recorder.partial_path)
+    verdict = judge_log(recorder.partial_path, being_written=True)
     recorder.finish(verdict_metadata(verdict))
     judged = time.perf_counter()
     return RunReport(

@@ -163,7 +163,11 @@ class _Run:
         place = self._task.log_place("steps", index)
         started = self._session.time
         self._event("step_started", planned, "", "", place)
-        end = self._motions(step, planned, started, place)
+        try:
+            end = self._motions(step, planned, started, place)
+        except SimulationFailed as failure:
+            self._event("step_ended", planned, "failed", str(failure), place)
+            raise
         words: dict[str, StepWord] = {"done": "done", "failed": "failed", "timeout": "timeout"}
         self._event("step_ended", planned, words[end.outcome], end.text, place)
         return StepOutcome(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,13 +84,15 @@ def load_task(
         InvalidInput: every error of the first stage that has any: the task file; the robot and controllers files; the
             scene, the names in steps and expectations, and the controllers' claims.
     """
-    files = load.load_task_files(
+    task = load.load_task(
         path, steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS, overrides=overrides, seed=seed
     )
-    task, robot_file, controllers_file = files.task, files.robot, files.controllers
+    robot_path, controllers_path = _named_file(task, path, "robot"), _named_file(task, path, "controllers")
+    robot_file = load.load_robot(robot_path, overrides=overrides)
+    controllers_file = load.load_controllers(controllers_path, overrides=overrides)
     robot, notes = build_robot(
         robot_file.spec,
-        file=files.robot_path,
+        file=robot_path,
         package_path=package_path,
         allow_outside=allow_outside,
         place=lambda loc: robot_file.place(*loc),
@@ -107,6 +110,20 @@ def load_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes),
     )
+
+
+def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:
+    """The file that the task names under `key`, relative to the task.
+
+    Raises:
+        InvalidInput: it is not there; told at the place where it is named.
+    """
+    named: str = getattr(task.spec, key)
+    found = Path(os.path.normpath(path.parent / named))
+    if not found.is_file():
+        hint = load.sibling(found)
+        raise InvalidInput([task.source.finding(231, (key,), f"there is no file '{found}'", hint=hint)])
+    return found
 
 
 def _unknown_names(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> list[Finding]:
@@ -128,7 +145,8 @@ def _unknown_names(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> 
     known = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in known:
         hint = f"poses: {', '.join(known)}"
-        findings.append(task.source.finding(230, ("start",), f"robot '{robot.name}' has no pose '{spec.start}'", hint=hint))
+        message = f"robot '{robot.name}' has no pose '{spec.start}'"
+        findings.append(task.source.finding(230, ("start",), message, hint=hint))
     if spec.simulation.engine not in ENGINES.names:
         message = f"there is no engine '{spec.simulation.engine}'"
         loc = ("simulation", "engine")

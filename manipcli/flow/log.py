@@ -7,23 +7,40 @@ from pathlib import Path
 
 from manipcli import __version__
 from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
-from manipcli.model.build_scene import build_scene
+from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.plan.steps import STEPS
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.reader import read_recording
+from manipcli.record.reading import read_recording
+from manipcli.record.recording import Recording
 from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.load import load_task_text, resolved
+from manipcli.spec.load import load_robot_text, load_task_text
+from manipcli.spec.resolved import resolved
 
 RUNS = Path("runs")
-TASK, ROBOT, CONTROLLERS, URDF, PLAN = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf", "plan.json"
+"""Where logs go that nobody asked elsewhere, below the working directory."""
+TASK, ROBOT, CONTROLLERS, URDF = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf"
+SCENE, PLAN = "scene.json", "plan.json"
 YAML, XML, JSON = "application/yaml", "application/xml", "application/json"
+
+
+def default_log(task: Task) -> Path:
+    """`runs/<task>.mcap`; the folder is made."""
+    try:
+        RUNS.mkdir(exist_ok=True)
+    except OSError as error:
+        message = f"cannot make the folder '{RUNS}' for the log: {error.strerror}"
+        raise InvalidInput([Finding("LOG101", message, hint="say where it goes with --log PATH")]) from error
+    return RUNS / f"{task.name}.mcap"
 
 
 def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool) -> Recorder:
@@ -40,6 +57,7 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
             (ROBOT, YAML, resolved(task.robot_file.spec).encode()),
             (CONTROLLERS, YAML, resolved(task.controllers).encode()),
             (URDF, XML, task.robot.urdf.encode()),
+            (SCENE, JSON, scene_to_json(task.scene)),
             (PLAN, JSON, plan.to_json()),
         ],
         metadata={
@@ -56,20 +74,33 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
     )
 
 
-def judge_log(path: Path) -> Verdict:
+def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
     """The verdict on a log, from the log alone; a verdict stored in it is not looked at.
+
+    Args:
+        path: the log, or what a killed run left.
+        being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
 
     Raises:
         InvalidInput: the file is no log of ours, or is damaged.
     """
-    recording = read_recording(path)
+    recording = read_recording(path, being_written=being_written)
     task = load_task_text(
-        recording.attachments[TASK].decode(), f"{path.name}/{TASK}",
-        steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS,
-    ).spec  # fmt: skip
-    robot = recorded_robot(recording)
+        recording.attachments[TASK],
+        f"{path.name}/{TASK}",
+        steps=STEPS,
+        conditions=CONDITIONS,
+        expectations=EXPECTATIONS,
+    ).spec
     expect = [(expected.name, expected.body) for expected in task.expect]
-    return judge(recording, expect=expect, robot=robot, scene=build_scene(task))
+    scene = scene_from_json(recording.attachments[SCENE])
+    return judge(recording, expect=expect, robot=_recorded_robot(recording), scene=scene)
+
+
+def _recorded_robot(recording: Recording) -> RobotModel:
+    """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
+    spec = load_robot_text(recording.attachments[ROBOT], ROBOT).spec
+    return rebuild_robot(spec, recording.attachments[URDF])
 
 
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:

@@ -31,6 +31,8 @@ Pairs = frozenset[Pair]
 """Pairs of parts that may touch; a part is a body, or `robot/<link>`."""
 
 NOTHING: Pairs = frozenset()
+CLEARANCE = 0.004
+"""How far [m] the robot keeps from everything it is not to touch: more than its controllers deviate."""
 TOUCHING = 0.003
 """Bodies nearer than this [m] count as touching: what a held object may leave or come to."""
 
@@ -284,12 +286,14 @@ class Draft:
         self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
 
     def _refuse_collision(self, label: str, before: Situation, trajectory: JointTrajectory, allowed: Pairs) -> None:
-        there = self._planner.checker.at(before.bodies, carried=before.carried, ignore=allowed)
+        there = self._planner.checker.at(
+            before.bodies, carried=before.carried, ignore=allowed, margin=CLEARANCE
+        )
         columns = self._planner.robot.indices(trajectory.names)
         hit = there.check_trajectory(columns, before.position, trajectory.times, trajectory.positions)
         if hit is not None:
             raise NotPlannable(
-                f"'{hit.a}' would hit '{hit.b}' (overlap {-1000 * hit.distance:.1f} mm) "
+                f"'{hit.a}' would come within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({_gap(hit.distance)}) "
                 f"at t = {hit.time:.2f} s of '{label}'"
             )
 
@@ -326,6 +330,10 @@ class Draft:
         """How long the references take to the target [s]."""
         here = self._now.position[self._planner.robot.indices(grip.joints)]
         return float(np.max(np.abs(grip.target - here))) / self._planner.gripper_speed
+
+
+def _gap(distance: float) -> str:
+    return f"{1000 * distance:.1f} mm apart" if distance >= 0.0 else f"{-1000 * distance:.1f} mm into it"
 
 
 def _joints_above(robot: RobotModel, link: str) -> list[str]:

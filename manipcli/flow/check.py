@@ -1,0 +1,68 @@
+"""Files checked, and the words that files may use: what `check`, `list` and `schema` ask."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.flow.load import load_task
+from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.model.build_robot import build_robot
+from manipcli.model.build_scene import SHAPES
+from manipcli.model.conditions import CONDITIONS
+from manipcli.plan.steps import STEPS
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec import load
+from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
+
+
+def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:
+    """Every finding of every file; a task is checked with the robot and controllers files that it names."""
+    return tuple(finding for path in paths for finding in _findings(path))
+
+
+def _findings(path: Path) -> tuple[Finding, ...]:
+    try:
+        kind = load.kind_of(path)
+        if kind == "task":
+            return load_task(path).findings
+        if kind == "controllers":
+            return load.load_controllers(path).findings
+        file = load.load_robot(path)
+        _, notes = build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))
+        return (*file.findings, *notes)
+    except InvalidInput as invalid:
+        return invalid.findings
+
+
+def kind_of(path: Path) -> load.FileKind | None:
+    """Which of the three files this is; None if it is none, or cannot be read."""
+    try:
+        return load.kind_of(path)
+    except InvalidInput:
+        return None
+
+
+def words(kind: str) -> tuple[str, ...]:
+    """The words that files may use: `steps`, `expectations`, `conditions`, `shapes` or `engines`."""
+    known = {
+        "steps": STEPS.names,
+        "expectations": EXPECTATIONS.names,
+        "conditions": CONDITIONS.names,
+        "shapes": SHAPES,
+        "engines": ENGINES.names,
+    }
+    return known[kind]
+
+
+def schema(kind: load.FileKind) -> Mapping[str, object]:
+    """The JSON Schema of a kind of file."""
+    texts = {
+        "task": lambda: task_schema(STEPS, CONDITIONS, EXPECTATIONS),
+        "robot": robot_schema,
+        "controllers": controllers_schema,
+    }
+    parsed: Mapping[str, object] = json.loads(texts[kind]())
+    return parsed
