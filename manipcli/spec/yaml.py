@@ -319,7 +319,7 @@ class _Composer:
         """The key as written: `010:` and `on:` are texts; None, and a finding, for what is no text."""
         composed = self.node(event, events, depth=depth + 1)
         if isinstance(composed.node, ScalarNode) and isinstance(event, yaml.ScalarEvent):
-            if composed.node.value is not None:
+            if event.value or not event.implicit[0]:
                 return str(event.value)
             self.tell("YAML110", "a key is missing before ':'", event)
         else:

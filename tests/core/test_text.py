@@ -1,0 +1,50 @@
+"""Text for people: near names are found, far ones are not, and nothing reaches a terminal as a control."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manipcli.core.text import any_of, did_you_mean, escape, listed, nearest, shorten
+
+JOINTS = [f"joint_{k}" for k in range(1, 8)]
+
+
+def test_the_nearest_names_come_first() -> None:
+    assert nearest("jiont_3", JOINTS)[0] == "joint_3"
+    assert len(nearest("joint_9", JOINTS, most=3)) == 3
+    assert nearest("Home", ["ready", "home"]) == ("home",)
+    assert nearest("table", ["home", "ready"]) == ()
+    assert nearest("vel", ["position", "velocity"]) == ("velocity",)
+
+
+def test_a_hint_names_the_nearest_or_else_what_there_is() -> None:
+    assert did_you_mean("hoem", ["ready", "home"]) == "did you mean 'home'?"
+    assert did_you_mean("xyz", ["ready", "home"], kind="poses") == "poses: ready, home"
+    assert did_you_mean("xyz", []) is None
+
+
+def test_lists_of_names() -> None:
+    assert any_of(["a", "b", "c"]) == "'a', 'b' or 'c'"
+    assert listed(map(str, range(5)), most=3) == "0, 1, 2, and 2 more"
+
+
+def test_an_escape_sequence_stays_visible() -> None:
+    assert escape("\x1b[2Jred\n\u202e") == "\\x1b[2Jred\\n\\u202e"
+
+
+@given(st.text())
+def test_escaped_text_has_no_control_characters(text: str) -> None:
+    assert not any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in escape(text))
+
+
+@given(st.text(), st.integers(4, 80))
+def test_shortened_text_fits(text: str, width: int) -> None:
+    assert len(shorten(text, width=width)) <= width
+
+
+@given(st.text(), st.lists(st.text(), max_size=5))
+def test_near_names_are_known_names(name: str, known: list[str]) -> None:
+    assert set(nearest(name, known, most=2)) <= set(known)

@@ -1,0 +1,212 @@
+"""YAML 1.2 to a tree of places: the core schema, the limits, and the place of every mistake."""
+
+from __future__ import annotations
+
+import string
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.spec import yaml as ours
+from manipcli.spec.tree import MappingNode, key_place_at, node_at, plain
+from manipcli.spec.yaml import parse
+
+
+def read(text: str | bytes) -> object:
+    root = parse(text, "f")
+    return None if root is None else plain(root)
+
+
+def refused(text: str | bytes) -> tuple[Finding, ...]:
+    with pytest.raises(InvalidInput) as caught:
+        parse(text, "f")
+    return caught.value.findings
+
+
+def spot(finding: Finding) -> tuple[str, int, int]:
+    assert finding.place is not None
+    return finding.code, finding.place.line, finding.place.column
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-3", 1e-3), ("1e5", 1e5), ("+.5", 0.5), ("5.", 5.0), ("010", 10), ("0o17", 15), ("0x1F", 31), ("-0", 0),
+        ("on", "on"), ("yes", "yes"), ("off", "off"), ("y", "y"), ("12:30", "12:30"), ("2026-11-01", "2026-11-01"),
+        ("1_000", "1_000"), ("true", True), ("FALSE", False), ("~", None), ("null", None), ("Null", None), ("", None),
+        ("'1e-3'", "1e-3"), ('"true"', "true"), ("0b1", "0b1"), ("=", "="),
+    ],
+)  # fmt: skip
+def test_scalars_follow_the_core_schema_of_yaml_1_2(text: str, value: object) -> None:
+    result = read(f"k: {text}\n")
+    assert isinstance(result, dict)
+    assert result["k"] == value
+    assert type(result["k"]) is type(value)
+
+
+def test_keys_are_texts_as_written() -> None:
+    assert read("on: 1\n010: 2\nnull: 3\n1.0: 4") == {"on": 1, "010": 2, "null": 3, "1.0": 4}
+
+
+def test_every_key_and_value_knows_its_place() -> None:
+    root = parse("a:\n  - {b: 1, c: x}\n  - é: 'q'\n", "f")
+    assert root is not None
+    assert node_at(root, ("a", 0, "c")).place == Place("f", 2, 15)
+    assert key_place_at(root, ("a", 0, "c")) == Place("f", 2, 12)
+    assert node_at(root, ("a", 1, "é")).place == Place("f", 3, 8)
+    assert node_at(root, ("a", 1, "nothing", 3)).place == Place("f", 3, 5)
+
+
+@pytest.mark.parametrize("text", ["", "# only words\n", "---\n", "null\n", "\ufeff"])
+def test_a_file_without_content_is_nothing(text: str) -> None:
+    assert parse(text, "f") is None
+
+
+def test_bom_and_crlf_are_accepted() -> None:
+    assert read(b"\xef\xbb\xbfa: 1\r\nb:\r\n  - 2\r\n") == {"a": 1, "b": [2]}
+    assert spot(refused("\ufeffa: 1\r\na: 2\r\n")[0]) == ("YAML106", 2, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "column", "words"),
+    [
+        ("a: 1\n\tb: 2", "YAML100", 2, 1, "tab"),
+        ("a: 1\nb: 'x\n", "YAML100", 2, 4, "a quote is not closed"),
+        ("a: [1, 2\nb: 3", "YAML100", 2, 2, "a '[' is not closed, or a ',' is missing (it opens at line 1, column 4)"),
+        ("a: {b: 1\n", "YAML100", 1, 4, "a '{' is not closed"),
+        ("a: b: c", "YAML100", 1, 5, "a ':' where none may stand"),
+        ("a:\n  - 1\n b: 2", "YAML100", 3, 2, "does not fit the indentation"),
+        ("a: @x", "YAML100", 1, 4, "'@' cannot begin a value"),
+        (b"\xff\xfea\0:\0 \x001\0", "YAML101", 1, 1, "UTF-16"),
+        ("a: 1\nb: 2".encode("utf-16-be"), "YAML101", 1, 1, "UTF-16"),
+        (b"a: 1\ncaf\xe9: 2", "YAML101", 2, 4, "0xe9"),
+        ("a: 1\nb: \0", "YAML102", 2, 4, "U+0000"),
+        ("a: 1\nb: \x1b[31m", "YAML102", 2, 4, "U+001B"),
+        ("a: !!python/object/apply:os.system ['id']", "YAML104", 1, 4, "!!python/object/apply:os.system"),
+        ("a: !degrees 90", "YAML104", 1, 4, "!degrees"),
+        ("a: !!str 1", "YAML104", 1, 4, "!!str"),
+        ("a: 1\n---\nb: 2", "YAML105", 2, 1, "second document"),
+        ("a: 1\nb: 2\na: 3", "YAML106", 3, 1, "lines 1 and 3"),
+        ("x:\n  - {a: 1, a: 2}", "YAML106", 2, 12, "lines 2 and 2"),
+        ("a: *nobody", "YAML109", 1, 4, "no anchor"),
+        ("a: &a [*a]", "YAML109", 1, 8, "inside its own anchor"),
+        ("a: &a {b: {c: *a}}", "YAML109", 1, 15, "inside its own anchor"),
+        ("? [1]\n: 2", "YAML110", 1, 3, "a key must be a text"),
+        ("a: 1\n?\n: 2", "YAML110", 2, 2, "a key is missing"),
+        ("a: .nan", "YAML111", 1, 4, "not a finite number"),
+        ("a: [1, -.INF]", "YAML111", 1, 8, "not a finite number"),
+        ("a: 1e400", "YAML111", 1, 4, "too large"),
+        ("a: " + "9" * 5000, "YAML111", 1, 4, "too large"),
+        ("<<: 3", "YAML112", 1, 5, "merges"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_refused_at_its_place(text: str | bytes, code: str, line: int, column: int, words: str) -> None:
+    finding = refused(text)[0]
+    assert spot(finding) == (code, line, column)
+    assert words in finding.message
+
+
+def test_all_mistakes_before_a_syntax_error_are_told() -> None:
+    codes = [finding.code for finding in refused("a: .nan\nb: 1\nb: 2\nc: !x 1\nd: [")]
+    assert codes == ["YAML111", "YAML106", "YAML104", "YAML100"]
+
+
+def test_aliases_share_and_merge_keys_yield_to_what_is_written() -> None:
+    text = "base: &b {p: 1, d: 2}\nmore: &m {d: 3, i: 4}\nx: {<<: [*b, *m], p: 9}\ny: *b"
+    assert read(text) == {
+        "base": {"p": 1, "d": 2},
+        "more": {"d": 3, "i": 4},
+        "x": {"p": 9, "d": 2, "i": 4},
+        "y": {"p": 1, "d": 2},
+    }
+
+
+def test_an_alias_bomb_is_counted_not_expanded() -> None:
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 12)]
+    assert refused("\n".join(lines))[0].code == "YAML107"
+    merged = ["a0: &a0 {k: 1}"] + [f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 9)}]}}" for k in range(1, 12)]
+    assert refused("\n".join(merged))[0].code == "YAML107"
+
+
+def test_depth_is_bounded_also_through_aliases() -> None:
+    assert read("[" * 64 + "]" * 64) is not None
+    assert spot(refused("[" * 65 + "]" * 65)[0]) == ("YAML108", 1, 65)
+    assert refused("[" * 100_000)[0].code == "YAML108"
+    half = "a: &a " + "[" * 40 + "]" * 40 + "\nb: " + "[" * 40 + "*a" + "]" * 40
+    assert refused(half)[0].code == "YAML108"
+
+
+def test_a_huge_file_is_refused_before_it_is_parsed() -> None:
+    assert refused(b"#" * (ours.MAX_BYTES + 1))[0].code == "YAML103"
+
+
+def test_constructors_that_others_registered_are_never_asked() -> None:
+    ran: list[str] = []
+
+    class Other(yaml.SafeLoader):
+        pass
+
+    Other.add_constructor("!run", lambda loader, node: ran.append("run"))
+    yaml.SafeLoader.add_constructor("!run", lambda loader, node: ran.append("run"))
+    try:
+        assert refused("a: !run x")[0].code == "YAML104"
+    finally:
+        del yaml.SafeLoader.yaml_constructors["!run"]
+    assert ran == []
+
+
+SCALARS = st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False, allow_infinity=False)
+TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=8)
+DATA = st.recursive(
+    SCALARS | TEXTS,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS, inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@given(st.text(st.sampled_from(string.ascii_letters + "0123456789 \n\t:-[]{}&*!|>'\"#%@,?.~<$"), max_size=60))
+def test_any_text_is_a_tree_or_refused_with_places(text: str) -> None:
+    try:
+        parse(text, "f")
+    except InvalidInput as error:
+        for finding in error.findings:
+            assert finding.place is not None
+            assert finding.place.line >= 1
+            assert finding.place.column >= 1
+            assert "\n" not in finding.message
+
+
+@given(st.binary(max_size=60))
+def test_any_bytes_are_a_tree_or_refused(data: bytes) -> None:
+    try:
+        parse(data, "f")
+    except InvalidInput as error:
+        assert error.findings
+
+
+@given(st.text(st.sampled_from("ab:-[]{}&*!|>'\"#\n ,?.0"), max_size=40))
+def test_the_parser_in_python_agrees_with_libyaml(text: str) -> None:
+    def outcome() -> object:
+        try:
+            return read(text)
+        except InvalidInput:
+            return InvalidInput
+
+    first = outcome()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ours.yaml, "__with_libyaml__", False)
+        second = outcome()
+    # The two PyYAML parsers differ on corner cases; what both accept they must read alike.
+    if InvalidInput not in (first, second):
+        assert first == second
+
+
+def test_a_tree_can_be_copied_with_a_change() -> None:
+    root = parse("a: 1\nb: 2", "f")
+    assert isinstance(root, MappingNode)
+    assert plain(root.without("a").with_entry("c", root.entries["a"])) == {"b": 2, "c": 1}
+    assert plain(root) == {"a": 1, "b": 2}
