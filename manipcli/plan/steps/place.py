@@ -33,7 +33,7 @@ class PlaceSpec(Model):
     )
     on: str | None = Field(None, description="The body whose top takes the object at [x, y].")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
-    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.08, 0.14)
+    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.2)
     posture: str = Field("open", description="The pose to which the hand opens.")
     speed: Speed = Field(0.5, description="Of carrying; lowering takes half of it.")
 
