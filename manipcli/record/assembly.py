@@ -38,7 +38,7 @@ def assemble(
     try:
         states = _states(contents, columns)
         controllers = tuple(
-            _controller(name, columns[ControllerChannel(name, ()).state_topic]) for name in contents.controllers
+            _controller(ControllerChannel(name, joints), columns) for name, joints in contents.controllers.items()
         )
     except CdrError as error:
         raise BadRecording(path, str(error)) from error
@@ -72,14 +72,14 @@ def _states(contents: Contents, columns: Mapping[str, Columns]) -> WorldState:
     time = _seconds(ns)
     poses = np.empty((len(ns), m, 7))
     for k in range(m):
-        poses[:, k] = bodies.run(k, 7)
+        poses[:, k] = bodies.take(k, 7)
     position, quat = _settled(poses[..., :3]), _settled(poses[..., 3:])
     linear, angular = body_velocities(time, position, quat)
     return WorldState(
         time=time,
-        position=_settled(joints.run(0, n)),
-        velocity=_settled(joints.run(1, n)),
-        effort=_settled(joints.run(2, n)),
+        position=_settled(joints.take(0, n)),
+        velocity=_settled(joints.take(1, n)),
+        effort=_settled(joints.take(2, n)),
         body_position=position,
         body_quat_xyzw=quat,
         body_linear=_settled(linear),
@@ -87,14 +87,16 @@ def _states(contents: Contents, columns: Mapping[str, Columns]) -> WorldState:
     )
 
 
-def _controller(name: str, columns: Columns) -> ControllerTrace:
-    joints = columns.names or ()
-    _check_order(ControllerChannel(name, ()).state_topic, columns.times)
-    reference, speed, feedback, output = (_settled(columns.run(k, len(joints))) for k in range(4))
+def _controller(channel: ControllerChannel, columns: Mapping[str, Columns]) -> ControllerTrace:
+    found = columns[channel.state_topic]
+    if found.names not in (None, channel.joints):
+        raise CdrError(f"{channel.state_topic} names other joints than the metadata")
+    _check_order(channel.state_topic, found.times)
+    reference, speed, feedback, output = (_settled(found.take(k, len(channel.joints))) for k in range(4))
     return ControllerTrace(
-        name=name,
-        joints=joints,
-        times=_seconds(columns.times),
+        name=channel.name,
+        joints=channel.joints,
+        times=_seconds(found.times),
         reference_position=reference,
         reference_velocity=speed,
         position=feedback,

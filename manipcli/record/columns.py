@@ -117,7 +117,7 @@ class Columns:
         self._parse = parse
         self._names: tuple[str, ...] | None = None
         self._times: list[Int] = []
-        self._runs: list[list[Array]] = []
+        self._runs: dict[int, _Growing] = {}
 
     def add(self, data: bytes, places: Places) -> None:
         """The channel's messages of one chunk.
@@ -131,7 +131,9 @@ class Columns:
             if layout.names != self._names:
                 raise CdrError("names other joints or bodies than the messages before it")
             self._times.append(part.times)
-            self._runs.append([_gather(data, part.starts + offset, count) for offset, count in layout.runs])
+            for k, (offset, count) in enumerate(layout.runs):
+                column = self._runs.setdefault(k, _Growing(count))
+                column.append(_gather(data, part.starts + offset, count))
 
     def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, Layout]]:
         """The messages in groups of one layout each."""
@@ -157,14 +159,46 @@ class Columns:
         """Log times [ns]."""
         return np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
 
-    def run(self, k: int, width: int) -> Array:
-        """(T, width) the k-th run of doubles of every message."""
-        if not self._runs:
-            return np.zeros((0, width))
-        parts = [runs[k] if k < len(runs) else np.zeros((0, 0)) for runs in self._runs]
-        if any(part.shape[1] != width for part in parts):
-            raise CdrError(f"has not {width} numbers where it should")
-        return np.concatenate(parts)
+    def take(self, k: int, width: int) -> Array:
+        """(T, width) the k-th run of doubles of every message, once: the columns let go of it.
+
+        Raises:
+            CdrError: there is a message whose run has another width.
+        """
+        column = self._runs.pop(k, None)
+        found = np.zeros((0, width)) if column is None else column.take()
+        if found.shape != (sum(len(times) for times in self._times), width):
+            raise CdrError(f"there are not {width} numbers where they should be")
+        return found
+
+
+class _Growing:
+    """A table that grows by rows, by a quarter and in place: a long recording is held once, where a list of parts and
+    their concatenation would hold it twice."""
+
+    def __init__(self, width: int) -> None:
+        self._table = np.zeros((0, width))
+        self._rows = 0
+
+    def append(self, rows: Array) -> None:
+        """
+        Raises:
+            CdrError: the rows have another width than those before.
+        """
+        if rows.shape[1] != self._table.shape[1]:
+            raise CdrError(f"there are {rows.shape[1]} numbers where there were {self._table.shape[1]} before")
+        end = self._rows + len(rows)
+        if end > len(self._table):
+            self._resize(max(end, len(self._table) + len(self._table) // 4))
+        self._table[self._rows : end] = rows
+        self._rows = end
+
+    def take(self) -> Array:
+        self._resize(self._rows)
+        return self._table
+
+    def _resize(self, rows: int) -> None:
+        self._table.resize((rows, self._table.shape[1]), refcheck=False)
 
 
 def _gather(data: bytes, starts: Int, count: int) -> Array:

@@ -16,12 +16,12 @@ FORMAT = 1
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """`period` [s] of a tick; names in the order of the arrays: moving joints, movable bodies, controllers."""
+    """`period` [s] of a tick; names in the order of the arrays: moving joints, movable bodies, controllers' joints."""
 
     period: float
     joints: tuple[str, ...]
     bodies: tuple[str, ...]
-    controllers: tuple[str, ...]
+    controllers: dict[str, tuple[str, ...]]
 
     def metadata(self) -> dict[str, str]:
         return {
@@ -46,13 +46,18 @@ def contents(values: Mapping[str, str]) -> Contents:
         raise ValueError(f"has the unknown format '{version}'")
     try:
         period = float(values["period"])
-        names = [json.loads(values[key]) for key in ("joints", "bodies", "controllers")]
+        joints, bodies, controllers = (json.loads(values[key]) for key in ("joints", "bodies", "controllers"))
     except (KeyError, ValueError, RecursionError) as error:
         raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
-    if not (math.isfinite(period) and period > 0) or not all(_is_names(value) for value in names):
+    groups = [joints, bodies, *(controllers.values() if isinstance(controllers, dict) else [None])]
+    if not (math.isfinite(period) and period > 0) or not all(map(_is_names, groups)):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")
-    joints, bodies, controllers = (tuple(value) for value in names)
-    return Contents(period=period, joints=joints, bodies=bodies, controllers=controllers)
+    return Contents(
+        period=period,
+        joints=tuple(joints),
+        bodies=tuple(bodies),
+        controllers={name: tuple(claimed) for name, claimed in controllers.items()},
+    )
 
 
 def _is_names(value: object) -> bool:

@@ -96,6 +96,7 @@ class _Reader:
         self._metadata: dict[str, dict[str, str]] = {}
         self._attachments: dict[str, bytes] = {}
         self._contents: Contents | None = None
+        self._types: dict[str, str] = {}
         self._columns: dict[str, Columns] = {}
         self._contacts: list[ContactSnapshot] = []
         self._events: list[TaskEvent] = []
@@ -163,8 +164,16 @@ class _Reader:
             topics.JOINT_STATES: Columns(joint_state_layout),
             topics.TF: Columns(body_layout(frozenset(self._contents.bodies), WORLD)),
         }
+        self._types = {
+            topics.JOINT_STATES: schemas.JOINT_STATE,
+            topics.TF: schemas.TF_MESSAGE,
+            topics.EVENTS: schemas.TASK_EVENT,
+            topics.CONTACTS: schemas.CONTACTS,
+        }
         for name in self._contents.controllers:
-            self._columns[ControllerChannel(name, ()).state_topic] = Columns(controller_state_layout)
+            topic = ControllerChannel(name, ()).state_topic
+            self._columns[topic] = Columns(controller_state_layout)
+            self._types[topic] = schemas.CONTROLLER_STATE
 
     def chunk(self, record: Record, indexes: Mapping[int, bytes]) -> None:
         self.guarded(record, lambda record: self._chunk(record, indexes))
@@ -181,7 +190,9 @@ class _Reader:
         for channel, found in places.items():
             if channel not in self._channels:
                 raise CdrError(f"it has a message of channel {channel}, which is not declared")
-            topic, _ = self._channels[channel]
+            topic, kind = self._channels[channel]
+            if kind != self._types.get(topic, kind):
+                raise CdrError(f"{topic} is not of type {self._types[topic]}")
             if topic in self._columns:
                 self._columns[topic].add(data, found)
             elif topic == topics.CONTACTS:
@@ -196,22 +207,14 @@ class _Reader:
                 self._path,
                 f"is not a recording of manipcli: no metadata record '{RECORD}' comes before its messages",
             )
-        wanted = {
-            topics.JOINT_STATES: schemas.JOINT_STATE,
-            topics.TF: schemas.TF_MESSAGE,
-            topics.EVENTS: schemas.TASK_EVENT,
-            topics.CONTACTS: schemas.CONTACTS,
-        }
-        for name in self._contents.controllers:
-            wanted[ControllerChannel(name, ()).state_topic] = schemas.CONTROLLER_STATE
-        missing = wanted.items() - set(self._channels.values())
-        if missing:
-            listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(missing))
-            raise BadRecording(self._path, f"is not a recording of manipcli: it lacks {listed}")
         return self._contents
 
     def recording(self, lost: str | None) -> Recording:
         """All of it, put together."""
+        there = {topic for topic, _ in self._channels.values()}
+        missing = [f"{topic} ({kind})" for topic, kind in self._types.items() if topic not in there]
+        if self._contents is not None and missing:
+            raise BadRecording(self._path, f"is not a recording of manipcli: it lacks {', '.join(missing)}")
         return assemble(
             self._path,
             self._known(),

@@ -79,7 +79,7 @@ class Recorder:
             period=period,
             joints=robot.joint_names,
             bodies=tuple(body.name for body in scene.movable),
-            controllers=tuple(controller.name for controller in controllers),
+            controllers={controller.name: controller.joints for controller in controllers},
         )
         self._container.metadata(RECORD, holds.metadata())
         for name, values in metadata.items():
@@ -186,5 +186,5 @@ def _check_names(path: Path, robot: RobotModel, scene: Scene, attachments: Seque
                 hint="give the body or frame of the task another name",
             )
     for name, times in Counter(attachments).items():
-        if times > 1 or name != Path(name).name or "\0" in name:
+        if times > 1 or name in ("", "..") or name != Path(name).name or "\0" in name:
             raise RecordingRefused(path, f"attachment '{name}' needs a plain file name of its own")

@@ -27,6 +27,8 @@ _SMALL_CHUNK = 1 << 20
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA, DATA_END = (
     0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09, 0x0C, 0x0F,
 )  # fmt: skip
+_NO_CRC = bytes(4)
+"""How other writers say that they made no checksum; ours always make one."""
 _FIRST_OPCODE, _LAST_OPCODE = 0x01, 0x7F
 _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
@@ -83,7 +85,7 @@ class Scan:
                 return
             body = file.read(length)
             if opcode == DATA_END:
-                if body != crc.to_bytes(4, "little"):
+                if body not in (crc.to_bytes(4, "little"), _NO_CRC):
                     raise BadRecording(self.path, "its checksum does not match: it was changed after it was written")
                 self._check_end(file, end, size, finished=finished)
                 return
@@ -103,14 +105,14 @@ class Scan:
     def _check_end(self, file: BinaryIO, start: int, size: int, *, finished: bool) -> None:
         """The summary is not needed to read the data, but it tells whether somebody was at the file."""
         if not finished:
-            self.lost = "only its index: all messages are there"
+            self.lost = "the index at its end is missing, though all messages are there"
             return
         if size - start > MAX_RECORD:
             raise BadRecording(self.path, "its summary is too large")
         rest = file.read(size - start)
         footer = len(rest) - len(MAGIC) - _FOOTER.size
         summary_start, crc = _FOOTER.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
-        if summary_start != start or crc != zlib.crc32(rest[: footer + _FOOTER.size - 4]):
+        if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + _FOOTER.size - 4])):
             raise BadRecording(self.path, "the checksum of its summary does not match: it was changed")
 
 
