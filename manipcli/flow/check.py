@@ -16,6 +16,7 @@ from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
+from manipcli.spec.tree import Plain
 
 
 def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:
@@ -57,12 +58,12 @@ def words(kind: str) -> tuple[str, ...]:
     return known[kind]
 
 
-def schema(kind: load.FileKind) -> Mapping[str, object]:
+def schema(kind: load.FileKind) -> Mapping[str, Plain]:
     """The JSON Schema of a kind of file."""
     texts = {
         "task": lambda: task_schema(STEPS, CONDITIONS, EXPECTATIONS),
         "robot": robot_schema,
         "controllers": controllers_schema,
     }
-    parsed: Mapping[str, object] = json.loads(texts[kind]())
+    parsed: Mapping[str, Plain] = json.loads(texts[kind]())
     return parsed

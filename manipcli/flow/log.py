@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,13 +16,13 @@ from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.conditions import CONDITIONS
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.plan.steps import STEPS
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.reading import read_recording
-from manipcli.record.recording import Recording
 from manipcli.record.recorder import Recorder
+from manipcli.record.recording import Recording
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
@@ -69,9 +70,18 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
                 "period": repr(task.spec.simulation.control_period),
             },
             "versions": {"manipcli": __version__, engine.name: engine.version()},
+            "meshes": mesh_hashes(task),
         },
         overwrite=overwrite,
     )
+
+
+def mesh_hashes(task: Task) -> dict[str, str]:
+    """SHA-256 of every mesh file of the robot and of the scene, by the URI or path as written."""
+    geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
+    geometries += [g for body in task.scene.bodies for g in body.geometries]
+    meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
+    return {uri: hashlib.sha256(meshes[uri].read_bytes()).hexdigest() for uri in sorted(meshes)}
 
 
 def judge_log(path: Path, *, being_written: bool = False) -> Verdict:

@@ -109,7 +109,7 @@ def start_position(task: Task) -> Array:
 def _steps(task: Task, planner: Planner, situation: Situation) -> Iterator[PlannedStep]:
     for step in task.spec.steps:
         planned = plan_step(planner, step, situation)
-        yield PlannedStep(id=step.id, verb=step.verb, plan=planned)
+        yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned)
         situation = planned.end
 
 
