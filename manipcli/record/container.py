@@ -62,6 +62,11 @@ class Container:
         self._end_ns = 0
 
     @property
+    def closed(self) -> bool:
+        """Finished, let go of, or failed: nothing can be written any more."""
+        return self._fd < 0
+
+    @property
     def time(self) -> float:
         """[s] of the last message that is safely in the file."""
         return self._end_ns / 1e9

@@ -134,7 +134,12 @@ class Recorder:
         self._container.finish()
 
     def close_partial(self) -> None:
-        """Stops without finishing: everything is flushed, the file keeps the name `*.partial`."""
+        """Stops without finishing: everything is flushed, the file keeps the name `*.partial`.
+
+        Does nothing once the recording is finished, has stopped or has failed.
+        """
+        if self._container.closed:
+            return
         try:
             self.flush()
         finally:

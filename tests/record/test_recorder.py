@@ -417,4 +417,16 @@ def test_a_recorder_that_failed_stays_failed(
     make_run(20).feed(recorder)
     with pytest.raises(RecordingFailed):
         recorder.finish({})
+    recorder.close_partial()
     assert (tmp_path / "run.mcap.partial").exists()
+
+
+def test_closing_a_finished_recording_leaves_it_alone(tmp_path: Path, make_run: MakeRun) -> None:
+    run = make_run(20)
+    path = run.write(tmp_path / "once.mcap")
+    recorder = run.recorder(tmp_path / "twice.mcap")
+    run.feed(recorder)
+    recorder.finish({"verdict": {"verdict": "passed"}})
+    recorder.close_partial()
+    assert (tmp_path / "twice.mcap").read_bytes() == path.read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["once.mcap", "twice.mcap"]
