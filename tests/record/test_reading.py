@@ -129,7 +129,7 @@ def test_truncated_anywhere_a_prefix_is_read(small: tuple[Any, Path], tmp_path: 
     layout_end = next(end for opcode, start, end in tops if opcode == 0x0C and b"bodies" in data[start:end])
     chunk_ends = [end for opcode, _, end in tops if opcode == 0x06]
     cuts = {size for _, start, end in tops for size in (start, start + 1, start + 9, (start + end) // 2, end - 1, end)}
-    cuts |= set(range(0, len(data), 97)) | set(range(len(data) - 40, len(data)))
+    cuts |= set(range(0, len(data), 199)) | set(range(len(data) - 40, len(data)))
     cut_path = tmp_path / "cut.mcap"
     for size in sorted(cuts):
         cut_path.write_bytes(data[:size])
@@ -153,7 +153,7 @@ def test_a_single_flipped_bit_is_noticed_anywhere(small: tuple[Any, Path], tmp_p
     tail = range(len(data) - 60, len(data))
     heads = [start + k for _, start, _ in records(data) for k in (0, 1, 5)]
     flipped_path = tmp_path / "flipped.mcap"
-    for position in {*range(0, len(data), 101), *heads, *tail}:
+    for position in {*range(0, len(data), 211), *heads, *tail}:
         flipped = bytearray(data)
         flipped[position] ^= 1 << (position % 8)
         flipped_path.write_bytes(flipped)

@@ -9,6 +9,7 @@ import tracemalloc
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ def log(written: Path, make_run: MakeRun) -> tuple[Any, Path]:
     return run, written if written.exists() else run.write(written)
 
 
+@lru_cache(maxsize=1)
 def decoded(path: Path) -> dict[str, list[tuple[int, Any]]]:
     """topic -> (log time [ns], message) as rosbags sees them, by nothing but the schemas in the file."""
     store = get_typestore(Stores.EMPTY)
