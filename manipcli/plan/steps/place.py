@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,7 +26,7 @@ from manipcli.spec.quantity import Length
 
 
 class PlaceSpec(Model):
-    """Carry above the place, lower straight, open, withdraw against the direction of approach."""
+    """Carry above the place, lower straight, open, withdraw against the direction of approach, rise."""
 
     object: str = Field(description="What is held and put down.")
     at: Literal["start"] | tuple[Length, Length] = Field(
@@ -33,7 +34,8 @@ class PlaceSpec(Model):
     )
     on: str | None = Field(None, description="The body whose top takes the object at [x, y].")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
-    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.2)
+    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.1, 0.18)
+    rise: Annotated[Range, Field(description="How far it then rises, above what it left [m].")] = (0.06, 0.14)
     posture: str = Field("open", description="The pose to which the hand opens.")
     speed: Speed = Field(0.5, description="Of carrying; lowering takes half of it.")
 
@@ -45,18 +47,20 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     X_OT = planner.held_in_tool(situation).inverse()
     X_WT = X_WG @ X_OT
 
-    def attempt(candidate: tuple[float, float]) -> StepPlan:
-        clearance, retreat = candidate
+    def attempt(candidate: tuple[float, float, float]) -> StepPlan:
+        clearance, retreat, rise = candidate
         draft = Draft(planner, situation)
         draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed, allowed=held)
         support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=held | support)
         draft.open(spec.posture)
-        draft.straight("withdraw", X_WT @ Transform.of(xyz=(0.0, 0.0, -retreat)), speed=spec.speed)
+        X_WR = X_WT @ Transform.of(xyz=(0.0, 0.0, -retreat))
+        draft.straight("withdraw", X_WR, speed=spec.speed)
+        draft.straight("rise", Transform.of(xyz=(0.0, 0.0, rise)) @ X_WR, speed=spec.speed)
         return draft.plan()
 
-    pairs = [(clearance, retreat) for clearance in spread(spec.clearance) for retreat in spread(spec.retreat)]
-    return first_feasible(attempt, pairs, what=f"no way to place '{spec.object}'")
+    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), spread(spec.rise))
+    return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 
 def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
