@@ -27,8 +27,10 @@ from manipcli.plan.steps.move import Speed
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle, Length
 
-YAWS_DEG = (0.0, 10.0, -10.0, 20.0, -20.0, 35.0, -35.0, 50.0, -50.0)
+YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 """Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
+SLOPES_DEG = (0.0, 30.0)
+"""Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 
 
 class ApproachSpec(Model):
@@ -66,11 +68,11 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
     p_WG = X_WO.apply([body.centre[0], body.centre[1], height])
 
-    def attempt(candidate: tuple[float, Array]) -> StepPlan:
-        distance, R_WT = candidate
+    def attempt(candidate: tuple[Array, float, float]) -> StepPlan:
+        R_WT, distance, slope = candidate
         X_WG = Transform.of(xyz=p_WG, R=R_WT)
         draft = Draft(planner, situation)
-        draft.reach("reach", X_WG @ Transform.of(xyz=(0.0, 0.0, -distance)), speed=spec.speed, hand=spec.open)
+        draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
         draft.straight("approach", X_WG, speed=spec.speed / 2)
         draft.close(
             spec.grasp.posture,
@@ -81,8 +83,19 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         return draft.plan()
 
     turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
-    candidates = itertools.product(spread(spec.approach.distance), turns)
+    candidates = itertools.product(turns, spread(spec.approach.distance), slopes())
     return first_feasible(attempt, candidates, what=f"no way to pick '{spec.object}'")
+
+
+def backed_off(X_WG: Transform, distance: float, slope: float) -> Transform:
+    """The tool `distance` [m] back along its axis, and higher by the `slope` [rad] of that way."""
+    up = Transform.of(xyz=(0.0, 0.0, distance * math.tan(slope)))
+    return up @ X_WG @ Transform.of(xyz=(0.0, 0.0, -distance))
+
+
+def slopes() -> tuple[float, ...]:
+    """The slopes [rad] that are tried, the straight one first."""
+    return tuple(math.radians(slope) for slope in SLOPES_DEG)
 
 
 def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[Array]:

@@ -21,12 +21,13 @@ from manipcli.plan.planner import Draft, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
+from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length
 
 
 class PlaceSpec(Model):
-    """Carry above the place, lower straight, open, withdraw against the direction of approach, rise."""
+    """Carry above the place, lower straight, open, withdraw against the direction of approach, rising."""
 
     object: str = Field(description="What is held and put down.")
     at: Literal["start"] | tuple[Length, Length] = Field(
@@ -34,8 +35,7 @@ class PlaceSpec(Model):
     )
     on: str | None = Field(None, description="The body whose top takes the object at [x, y].")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
-    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.1, 0.18)
-    rise: Annotated[Range, Field(description="How far it then rises, above what it left [m].")] = (0.06, 0.14)
+    retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
     speed: Speed = Field(0.5, description="Of carrying; lowering takes half of it.")
 
@@ -48,18 +48,16 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     X_WT = X_WG @ X_OT
 
     def attempt(candidate: tuple[float, float, float]) -> StepPlan:
-        clearance, retreat, rise = candidate
+        clearance, retreat, slope = candidate
         draft = Draft(planner, situation)
         draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed, allowed=held)
         support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=held | support)
         draft.open(spec.posture)
-        X_WR = X_WT @ Transform.of(xyz=(0.0, 0.0, -retreat))
-        draft.straight("withdraw", X_WR, speed=spec.speed)
-        draft.straight("rise", Transform.of(xyz=(0.0, 0.0, rise)) @ X_WR, speed=spec.speed)
+        draft.straight("withdraw", backed_off(X_WT, retreat, slope), speed=spec.speed)
         return draft.plan()
 
-    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), spread(spec.rise))
+    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), slopes()[::-1])
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 
