@@ -10,12 +10,14 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.load import Task, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task
+from manipcli.record.recorder import Recorder
 from manipcli.report.run_report import RunReport, Timing
 
 __all__ = [
@@ -64,9 +66,7 @@ def run_task(
         NotPlannable: a step has no plan; nothing was simulated.
     """
     began = time.perf_counter()
-    task = load_task(
-        path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside
-    )
+    task = load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
     loaded = time.perf_counter()
     plan = plan_task(task)
     planned = time.perf_counter()
@@ -75,18 +75,14 @@ def run_task(
     where = log if log is not None else default_log(task)
     recorder = open_log(task, plan, manager, where, overwrite=force or log is None)
     try:
-        simulate(task, plan, manager, recorder, progress)
-        status, cause = "complete", ""
-    except SimulationFailed as failure:
-        status, cause = "failed", str(failure)
-    except KeyboardInterrupt:
-        status, cause = "interrupted", "interrupted by the user"
-    recorder.metadata("run", {"status": status, "cause": cause})
-    simulated = time.perf_counter()
-
-    verdict = judge_log(recorder.partial_path, being_written=True)
-    recorder.finish(verdict_metadata(verdict))
-    judged = time.perf_counter()
+        status, cause = _carried_out(task, plan, manager, recorder, progress)
+        recorder.metadata("run", {"status": status, "cause": cause})
+        simulated = time.perf_counter()
+        verdict = judge_log(recorder.partial_path, being_written=True)
+        recorder.finish(verdict_metadata(verdict))
+        judged = time.perf_counter()
+    finally:
+        recorder.close_partial()
     return RunReport(
         verdict=verdict,
         wall_time=judged - began,
@@ -96,3 +92,16 @@ def run_task(
             load=loaded - began, plan=planned - loaded, simulate=simulated - planned, judge=judged - simulated
         ),
     )
+
+
+def _carried_out(
+    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
+) -> tuple[str, str]:
+    """Simulate; how the run ended, and why where it did not go to its end."""
+    try:
+        simulate(task, plan, manager, recorder, progress)
+    except SimulationFailed as failure:
+        return "failed", str(failure)
+    except KeyboardInterrupt:
+        return "interrupted", "interrupted by the user"
+    return "complete", ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, Self
 
 from manipcli.cli import console
+from manipcli.cli.interrupts import Interrupts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.report.text import describe_step
 
@@ -22,9 +23,13 @@ class NamedStep(Protocol):
 
 
 class StepProgress:
-    """The progress of one run; a context manager that leaves no half line behind."""
+    """The progress of one run; a context manager that leaves no half line behind.
 
-    def __init__(self, *, verbose: bool = False, quiet: bool = False) -> None:
+    Between two ticks is also where a run may be stopped: both `tick` and `step_started` raise what `interrupts` raises.
+    """
+
+    def __init__(self, *, verbose: bool = False, quiet: bool = False, interrupts: Interrupts | None = None) -> None:
+        self._interrupts = interrupts
         self._verbose = verbose
         self._quiet = quiet
         self._live = console.is_live() and not quiet
@@ -40,13 +45,15 @@ class StepProgress:
 
     def step_started(self, step: NamedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""
+        self._may_stop()
         self._head = f"[{index + 1}/{total}] {step.id}"
         self._next_drawing = 0.0
         if self._verbose and not self._live and not self._quiet:
             console.talk(f"{self._head}: started")
 
     def tick(self, simulated_time: float, wall: float) -> None:
-        """Called every control tick, so it does nothing unless a drawing is due. Both times in s from the start."""
+        """Called often, so it does nothing unless a drawing is due. Both times in s from the start."""
+        self._may_stop()
         if not self._live or wall < self._next_drawing:
             return
         self._next_drawing = wall + REDRAW_PERIOD
@@ -60,3 +67,7 @@ class StepProgress:
         if not self._quiet and (self._verbose or not self._live):
             count = self._head.split(" ", 1)[0]
             console.talk(f"{count} {describe_step(outcome)}")
+
+    def _may_stop(self) -> None:
+        if self._interrupts is not None:
+            self._interrupts.check()

@@ -28,21 +28,24 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Tell nothing but the result.")] = False,
 ) -> ExitCode:
     """Validate, plan, simulate, record and judge a task."""
-    from manipcli import pipeline
-    from manipcli.cli.progress import StepProgress
-    from manipcli.report import json, text
-    from manipcli.report.run_report import exit_code
+    from manipcli.cli.interrupts import Interrupts
 
-    with StepProgress(verbose=verbose, quiet=quiet) as progress:
-        report = pipeline.run_task(
-            task,
-            overrides=tuple(overrides or ()),
-            seed=seed,
-            log=log,
-            force=force,
-            package_path=tuple(package_path or ()),
-            allow_outside=allow_outside,
-            progress=progress,
-        )
-    console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
-    return exit_code(report.verdict)
+    with Interrupts() as interrupts:
+        from manipcli import pipeline
+        from manipcli.cli.progress import StepProgress
+        from manipcli.report import json, text
+        from manipcli.report.run_report import exit_code
+
+        with StepProgress(verbose=verbose, quiet=quiet, interrupts=interrupts) as progress:
+            report = pipeline.run_task(
+                task,
+                overrides=tuple(overrides or ()),
+                seed=seed,
+                log=log,
+                force=force,
+                package_path=tuple(package_path or ()),
+                allow_outside=allow_outside,
+                progress=progress,
+            )
+        console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
+        return exit_code(report.verdict)

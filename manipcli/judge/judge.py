@@ -12,7 +12,7 @@ from manipcli.core.registry import Seam
 from manipcli.judge.expectation import Evidence, Expectation, NotEvaluated, outcome
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.judge.steps import step_outcomes
-from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict, VerdictWord
+from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.model.condition import World
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -71,7 +71,7 @@ def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
     """Why the recording is not that of a run which came to its end."""
     errors = []
     if status == "interrupted":
-        errors.append(Finding("RUN101", "the run was interrupted"))
+        errors.append(Finding(INTERRUPTED, "the run was interrupted"))
     elif status == "crashed":
         errors.append(Finding("RUN102", "the run crashed", hint="its log ends where it did; see its last events"))
     elif status not in _JUDGED:

@@ -11,6 +11,9 @@ VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]
 StepWord = Literal["done", "failed", "timeout", "interrupted", "not_run"]
 
+INTERRUPTED = "RUN101"
+"""The code of the error that says: somebody stopped the run, in the middle of a step or between two."""
+
 
 @dataclass(frozen=True, slots=True)
 class StepOutcome:

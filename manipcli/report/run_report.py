@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from manipcli.core.errors import ExitCode
-from manipcli.judge.verdict import Verdict
+from manipcli.judge.verdict import INTERRUPTED, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,5 +43,5 @@ def exit_code(verdict: Verdict) -> ExitCode:
         return ExitCode.PASSED
     if verdict.verdict == "failed":
         return ExitCode.FAILED
-    interrupted = any(step.outcome == "interrupted" for step in verdict.steps)
+    interrupted = any(finding.code == INTERRUPTED for finding in verdict.errors)
     return ExitCode.INTERRUPTED if interrupted else ExitCode.INTERNAL

@@ -61,7 +61,7 @@ def _raising(error: BaseException) -> Callable[..., NoReturn]:
     [
         (PASSED, 0),
         (replace(PASSED, verdict="failed"), 1),
-        (replace(PASSED, verdict="error", steps=(replace(PASSED.steps[0], outcome="interrupted"),)), 2),
+        (replace(PASSED, verdict="error", errors=(Finding("RUN101", "stopped"),)), 2),
         (replace(PASSED, verdict="error", errors=(Finding("SIM100", "gone"),)), 3),
     ],
 )

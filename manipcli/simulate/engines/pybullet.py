@@ -17,7 +17,7 @@ from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
-from manipcli.simulate.quiet import stdout_nowhere, stdout_to_stderr
+from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
 UNLIMITED_EFFORT: Final = 1e6
@@ -31,7 +31,7 @@ class PybulletEngine:
     """One PyBullet world."""
 
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
-        with stdout_nowhere():
+        with silence():
             import pybullet
 
         with stdout_to_stderr():
