@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import Condition, Problem, World, needs_physics
 from manipcli.model.robot import RobotModel
@@ -19,6 +20,7 @@ from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record.recording import Recording
 from manipcli.spec.base import Model
+from manipcli.spec.quantity import Unit
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
@@ -128,8 +130,21 @@ def since(states: WorldState, first: int) -> WorldState:
 
 
 def describe(spec: Model) -> str:
-    """What was written, in one line: `object: ball, of: tray`."""
-    return ", ".join(f"{key}: {value}" for key, value in spec.model_dump(exclude_defaults=True).items())
+    """What was written, in one line and in the units of people: `object: cup, within: 5 deg`."""
+    written = spec.model_dump(exclude_defaults=True)
+    return ", ".join(f"{key}: {_described(value, type(spec), key)}" for key, value in written.items())
+
+
+def _described(value: object, spec: type[Model], key: str) -> str:
+    """A value of the field `key`; a number of one dimension gets its unit."""
+    if isinstance(value, float):
+        units = [unit for unit in spec.model_fields[key].metadata if isinstance(unit, Unit)]
+        if len(units) == 1 and len(units[0].dimensions) == 1:
+            return readable(value, units[0].dimensions[0].symbol)
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(f'{v:.6g}' if isinstance(v, float) else str(v) for v in value)}]"
+    return str(value)
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:

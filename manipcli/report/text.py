@@ -133,13 +133,13 @@ def _expectations(expectations: Sequence[ExpectationOutcome]) -> str:
 
 
 def _margin(expectation: ExpectationOutcome) -> str:
-    """`passes with 4.1 mm to spare (closest at 17.32 s)`, `fails by ...`, or why there is no margin."""
+    """`passes with 4.1 mm to spare (tightest at 17.32 s)`, `fails by ...`, or why there is no margin."""
     detail = f": {expectation.text}" if expectation.text else ""
     if expectation.outcome == "not_evaluated":
         return f"was never evaluated{detail}"
     passed = expectation.outcome == "passed"
-    when = "" if expectation.at is None else f" ({'closest' if passed else 'worst'} at {expectation.at:.2f} s)"
-    if expectation.margin is None:
+    when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
+    if not expectation.margin:  # none, or none to spare: 0 N between what never touched
         return f"{'passes' if passed else 'fails'}{when}{detail}"
     size = quantity(abs(expectation.margin), expectation.unit)
     return f"{f'passes with {size} to spare' if passed else f'fails by {size}'}{when}{detail}"

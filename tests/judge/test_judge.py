@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
+from manipcli.judge.expectation import describe
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
@@ -350,3 +351,10 @@ def test_unknown_names_are_told_before_anything_runs(
     member = EXPECTATIONS[name]
     (problem,) = member.check(member.spec.model_validate(written), ROBOT, SCENE, ("go", "wait_1"))
     assert (problem.loc, problem.hint) == (loc, hint)
+
+
+def test_what_was_expected_is_told_in_the_units_of_people() -> None:
+    upright = EXPECTATIONS["upright"].spec(object="cup", within="5 deg")
+    assert describe(upright) == "object: cup, within: 5 deg"
+    near = EXPECTATIONS["near"].spec(object="cup", to=[0.5, 0.2, 0.225], within=0.02)
+    assert describe(near) == "object: cup, to: [0.5, 0.2, 0.225], within: 20 mm"

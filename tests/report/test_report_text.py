@@ -51,9 +51,14 @@ def test_quantities_are_in_customary_units(value: float, unit: str, text: str) -
 
 def test_a_pass_says_how_much_there_was_to_spare() -> None:
     text = render_verdict(PASSED, "runs/pour.mcap")
-    assert "passes with 4.1 mm to spare (closest at 17.32 s)" in text
+    assert "passes with 4.1 mm to spare (tightest at 17.32 s)" in text
     assert "✓ pour passed: 1 of 1 step done, 1 of 1 expectation met" in text
     assert text.endswith("log: runs/pour.mcap")
+
+
+def test_a_pass_with_nothing_to_spare_is_a_pass() -> None:
+    outcome = ExpectationOutcome("no_collision", "passed", 0.0, "N", None, "never touched")
+    assert "passes: never touched" in render_verdict(replace(PASSED, expectations=(outcome,)), "x")
 
 
 def test_a_failure_begins_with_its_first_cause() -> None:
