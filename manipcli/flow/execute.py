@@ -15,7 +15,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.judge.verdict import StepOutcome, StepWord
-from manipcli.model.condition import World
+from manipcli.model.condition import World, needs_physics
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recorder import Recorder
@@ -78,9 +78,7 @@ def controllers(task: Task) -> ControllerManager:
     return build_controllers(file.spec, task.robot, period, place=lambda loc: file.place(*loc))
 
 
-def simulate(
-    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
-) -> None:
+def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None) -> None:
     """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
 
     Raises:
@@ -135,15 +133,14 @@ def _settle(task: Task, session: Session) -> None:
 class _Run:
     """One pass over the steps."""
 
-    def __init__(
-        self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None
-    ) -> None:
+    def __init__(self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None) -> None:
         self._task = task
         self._plan = plan
         self._session = session
         self._recorder = recorder
         self._progress = progress
-        self._executor = Executor(session)
+        self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
+        self._executor = Executor(session, touch=self._physics)
         self._world: World | None = None
 
     def steps(self) -> None:
@@ -199,11 +196,13 @@ class _Run:
         return MotionEnd("done", "; ".join(texts)) if texts else DONE
 
     def _until(self, step: StepSpec) -> Until | None:
-        """The step's condition as a question about the live state."""
+        """The step's condition as a question about the live state; None where only physics could answer it."""
         if step.until is None:
             return None
         condition = CONDITIONS[step.until.name]
         body, world = step.until.body, self._started_world()
+        if not self._physics and needs_physics(condition, body, self._task.scene):
+            return None
         return lambda state: bool(condition.margin(body, world, state) >= 0.0)
 
     def _started_world(self) -> World:

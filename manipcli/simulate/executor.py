@@ -34,10 +34,16 @@ DONE: Final = MotionEnd("done")
 
 
 class Executor:
-    """Carries motions out, one after the other."""
+    """Carries motions out, one after the other.
 
-    def __init__(self, session: Session) -> None:
+    Args:
+        session: what is stepped.
+        touch: whether anything can touch; where nothing can, a hand that closed on nothing is no failure.
+    """
+
+    def __init__(self, session: Session, *, touch: bool = True) -> None:
         self._session = session
+        self._touch = touch
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
         """Send the motion's goals and tick until all are reached and its duration is over.
@@ -60,7 +66,7 @@ class Executor:
             if not busy and awaited is not None and session.ticks % UNTIL_TICKS == 0 and awaited(state):
                 awaited = None
             if not busy and awaited is None:
-                return _held(motion, handles)
+                return _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
                 self._cancel(handles)
                 return MotionEnd("timeout", _late(motion, handles))
@@ -98,10 +104,10 @@ class Executor:
             handle.cancel()
 
 
-def _held(motion: Motion, handles: tuple[GoalHandle, ...]) -> MotionEnd:
+def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:
     """Done; unless the hand was to hold something and no finger met anything."""
     text = "; ".join(handle.result.text for handle in handles if handle.result is not None and handle.result.fingers)
-    if motion.grip is not None and motion.grip.must_hold:
+    if motion.grip is not None and motion.grip.must_hold and touch:
         stops = [stop for handle in handles if handle.result is not None for stop in handle.result.fingers]
         if "contact" not in stops and "stalled" not in stops:
             return MotionEnd("failed", f"the hand closed on nothing: {text}")
