@@ -164,7 +164,7 @@ class StepSpec(KeyedSpec):
     """What every step has beside its one verb key. `body` is the validated block under the verb."""
 
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
-    until: ConditionSpec | None = Field(None, description="Ends the step as soon as this holds.")
+    until: ConditionSpec | None = Field(None, description="The step ends once this holds, too.")
     timeout: Annotated[Time, Field(gt=0)] | None = Field(None, description="Fails the step after this [s], above 0.")
 
     @property
