@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
 
 from manipcli.control.factory import build_controllers
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Transform, frozen
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import build_scene
 from manipcli.model.condition import Problem
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.packages import Packages
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
+from manipcli.model.robot import Box, RobotModel
+from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -26,6 +30,7 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 
 Loc = tuple[str | int, ...]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,27 +86,50 @@ def load_task(
         allow_outside: files may lie outside of packages and the folders of the files that name them.
 
     Raises:
-        InvalidInput: every error of the first stage that has any: the task file; the robot and controllers files; the
-            scene, the names in steps and expectations, and the controllers' claims.
+        InvalidInput: every error of all three files at once; of the scene's geometry only once the task file is sound.
     """
-    task = load.load_task(
+    gathered = Gathered()
+    task = gathered(
+        lambda: load.load_task(
+            path, steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS, overrides=overrides, seed=seed
+        )
+    )
+    read = task or load.salvage_task(
         path, steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS, overrides=overrides, seed=seed
     )
-    robot_path, controllers_path = _named_file(task, path, "robot"), _named_file(task, path, "controllers")
-    robot_file = load.load_robot(robot_path, overrides=overrides)
-    controllers_file = load.load_controllers(controllers_path, overrides=overrides)
-    robot, notes = build_robot(
-        robot_file.spec,
-        file=robot_path,
-        package_path=package_path,
-        allow_outside=allow_outside,
-        place=lambda loc: robot_file.place(*loc),
+    if read is None:
+        raise gathered.refusal()
+    robot_path = gathered(lambda: _named_file(read, path, "robot"))
+    controllers_path = gathered(lambda: _named_file(read, path, "controllers"))
+    robot_file = robot_path and gathered(lambda: load.load_robot(robot_path, overrides=overrides))
+    controllers_file = controllers_path and gathered(
+        lambda: load.load_controllers(controllers_path, overrides=overrides)
+    )
+    built = (
+        robot_path
+        and robot_file
+        and gathered(
+            lambda: build_robot(
+                robot_file.spec,
+                file=robot_path,
+                package_path=package_path,
+                allow_outside=allow_outside,
+                place=lambda loc: robot_file.place(*loc),
+            )
+        )
     )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    scene = build_scene(task.spec, place=lambda loc: task.place(*loc), resolve=packages.resolve)
-    findings = [*_unknown_names(task, robot, scene), *_claims(controllers_file, robot, task.spec)]
-    if findings:
-        raise InvalidInput(findings)
+    scene = None
+    if task is not None:
+        whole = task
+        scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
+    if built:
+        gathered.findings += _unknown_names(read, built[0], scene or named_scene(read.spec))
+        if controllers_file:
+            gathered.findings += _claims(controllers_file, built[0], read.spec)
+    if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
+        raise gathered.refusal()
+    robot, notes = built
     return Task(
         file=task,
         robot_file=robot_file,
@@ -110,6 +138,47 @@ def load_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes),
     )
+
+
+class Gathered:
+    """Calls what may refuse its input, and keeps the findings of what does."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+
+    def __call__(self, step: Callable[[], T]) -> T | None:
+        """The result, or None where it was refused."""
+        try:
+            return step()
+        except InvalidInput as invalid:
+            self.findings += invalid.findings
+            return None
+
+    def refusal(self) -> InvalidInput:
+        """All of them, in the order of the files and of their lines."""
+        files = list(dict.fromkeys(finding.place.file for finding in self.findings if finding.place is not None))
+
+        def position(finding: Finding) -> tuple[int, int, int]:
+            place = finding.place
+            return (-1, 0, 0) if place is None else (files.index(place.file), place.line, place.column)
+
+        return InvalidInput(sorted(self.findings, key=position))
+
+
+def named_scene(spec: TaskSpec) -> Scene:
+    """The names of a scene that cannot be built: bodies that could be anything, so that only unknown names are told."""
+    one = Box((1.0, 1.0, 1.0))
+    origin = Transform.identity()
+    bodies = tuple(
+        Body(
+            name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
+            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=False, X_WO=origin,
+            interior=Interior(X_OS=origin, shape=one), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
+        )
+        for name in (*(("floor",) if spec.floor else ()), *spec.scene)
+    )  # fmt: skip
+    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
+    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, 0.0]))
 
 
 def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:

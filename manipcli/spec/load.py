@@ -19,6 +19,7 @@ from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros_form import rewrite
+from manipcli.spec.salvage import salvage
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node
 from manipcli.spec.unions import SpecMember, task_model
@@ -127,11 +128,36 @@ def load_task_text(
     seed: int | None = None,
 ) -> Located[TaskSpec]:
     """As `load_task`, from text; places call it `name`."""
-    wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
+    source, findings = _task_source(text, name, task_model(steps, conditions, expectations), overrides, seed)
+    return validate(source, task_model(steps, conditions, expectations), findings=findings)
+
+
+def salvage_task(
+    path: Path,
+    *,
+    steps: Seam[S],
+    conditions: Seam[C],
+    expectations: Seam[E],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+) -> Located[TaskSpec] | None:
+    """What remains of a task file that `load_task` refused, for checking it further; None where too little does."""
     model = task_model(steps, conditions, expectations)
+    try:
+        source, _ = _task_source(read_bytes(path), str(path), model, overrides, seed)
+    except InvalidInput:
+        return None
+    return salvage(source, model)
+
+
+def _task_source(
+    text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None
+) -> tuple[Source, list[Finding]]:
+    """The tree of a task, overrides and parameters put in, and what is wrong with those."""
+    wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     source, findings = _changed(_source(text, name, "TASK"), wanted, model)
     root, more = substitute(source.root, "TASK")
-    return validate(Source(name, root, "TASK"), model, findings=[*findings, *more])
+    return Source(name, root, "TASK"), [*findings, *more]
 
 
 def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:

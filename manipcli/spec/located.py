@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Generic, Literal, TypeVar
 
 from pydantic import ValidationError
@@ -23,11 +23,15 @@ Area = Literal["TASK", "ROBOT", "CTRL"]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file's tree, after parameters and overrides, and what it is called."""
+    """A file's tree, after parameters and overrides, and what it is called.
+
+    `kept`: where items of a list were left out, the indices in the file of those that remain, by the list's key.
+    """
 
     name: str
     root: Node
     area: Area
+    kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     def place(self, *path: str | int) -> Place:
         """Where the value at `path` stands; of what is not written, the nearest block around it."""
@@ -49,8 +53,13 @@ class Source:
     ) -> Finding:
         """Something to tell about the value (or, with `key`, the key) at `path`, under this kind of file's code."""
         place = self.key_place(*path) if key else self.place(*path)
-        where = f"{dotted(path)}: " if path else ""
+        where = f"{dotted(self._in_file(path))}: " if path else ""
         return Finding(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
+
+    def _in_file(self, path: Path) -> Path:
+        if len(path) > 1 and isinstance(path[0], str) and isinstance(path[1], int) and path[0] in self.kept:
+            return (path[0], self.kept[path[0]][path[1]], *path[2:])
+        return path
 
 
 @dataclass(frozen=True, slots=True)

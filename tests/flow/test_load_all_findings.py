@@ -1,0 +1,66 @@
+"""Every mistake of a task is told at once, each at its own place, and a mistake hides no other."""
+
+from pathlib import Path
+
+import pytest
+
+from manipcli.core.errors import InvalidInput
+from manipcli.flow.load import load_task
+
+ROOT = Path(__file__).parents[2]
+
+HEAD = f"""\
+task: bad
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+"""
+
+
+def findings(tmp_path: Path, text: str) -> list[tuple[int, int, str]]:
+    file = tmp_path / "bad.yaml"
+    file.write_text(HEAD + text)
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file)
+    return [
+        (f.place.line, f.place.column, f"{f.message} {f.hint or ''}")
+        for f in refused.value.findings
+        if f.place is not None
+    ]
+
+
+def test_schema_and_names_are_told_together_in_the_order_of_the_file(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+scene:
+  cup: {cup: {radius: 36 mm, height: 110 mm}, mass: 150 mm, pose: {}, frction: 1.0}
+steps:
+  - pick: {object: cop, grasp: {posture: wrap}}
+  - moove: {to: home}
+  - move: {to: hom}
+expect:
+  - near: {object: cup, to: strt, within: 2 cm}
+  - duration: {below: -1 s}
+""",
+    )
+    assert [place[:2] for place in found] == [(5, 53), (5, 71), (7, 20), (8, 5), (9, 16), (11, 29), (12, 23)]
+    for (_, _, text), hint in zip(found, ("mass", "friction", "cup", "move", "home", "start", "more than 0"), strict=True):
+        assert hint in text
+
+
+def test_an_item_keeps_its_number_when_the_one_before_it_is_faulty(tmp_path: Path) -> None:
+    found = findings(tmp_path, "steps:\n  - moove: {}\n  - move: {to: hom}\n")
+    assert [text.split(":")[0] for _, _, text in found] == ["steps[0]", "steps[1].move.to"]
+
+
+def test_a_faulty_body_is_still_known_by_its_name(tmp_path: Path) -> None:
+    found = findings(tmp_path, "scene:\n  cup: {box: {size: 1}}\nsteps:\n  - pick: {object: cup, grasp: {posture: wrap}}\n")
+    assert {line for line, _, _ in found} == {5}
+
+
+def test_a_missing_robot_file_is_told_where_it_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "bad.yaml"
+    file.write_text("task: bad\nrobot: nowhere.yaml\ncontrollers: no.yaml\nsteps:\n  - wait: 1 s\n")
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file)
+    assert [(f.place.line, f.place.column) for f in refused.value.findings if f.place] == [(2, 8), (3, 14)]
