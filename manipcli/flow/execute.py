@@ -209,7 +209,7 @@ class _Run:
         """What conditions are asked in; the start is the state at time 0."""
         if self._world is None:
             state = self._session.engine.read()
-            self._world = World(self._task.robot, self._task.scene, _copied(state))
+            self._world = World(self._task.robot, self._task.scene, state.map(np.copy))
         return self._world
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str, place: str) -> None:
@@ -217,16 +217,3 @@ class _Run:
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=place
         )
 
-
-def _copied(state: WorldState) -> WorldState:
-    """The engine overwrites its own arrays."""
-    return WorldState(
-        time=state.time.copy(),
-        position=state.position.copy(),
-        velocity=state.velocity.copy(),
-        effort=state.effort.copy(),
-        body_position=state.body_position.copy(),
-        body_quat_xyzw=state.body_quat_xyzw.copy(),
-        body_linear=state.body_linear.copy(),
-        body_angular=state.body_angular.copy(),
-    )
