@@ -183,9 +183,9 @@ class PybulletEngine:
         p, client = self._p, self._client
         constraint = p.createConstraint(
             self._robot,
-            self._joints[robot.joint_names.index(driver)],
-            self._robot,
             self._joints[robot.joint_names.index(follower)],
+            self._robot,
+            self._joints[robot.joint_names.index(driver)],
             jointType=p.JOINT_GEAR,
             jointAxis=list(robot.joint(follower).axis),
             parentFramePosition=[0, 0, 0],
@@ -195,7 +195,7 @@ class PybulletEngine:
         p.changeConstraint(
             constraint,
             gearRatio=-multiplier,
-            relativePositionTarget=-offset,
+            relativePositionTarget=offset,
             erp=MIMIC_ERP,
             maxForce=MIMIC_EFFORT,
             physicsClientId=client,
