@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -125,6 +125,7 @@ def load_task(
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
     if built:
         gathered.findings += _unknown_names(read, built[0], scene or named_scene(read.spec))
+        gathered.findings += _refused(read, built[0])
         if controllers_file:
             gathered.findings += _claims(controllers_file, built[0], read.spec)
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
@@ -221,6 +222,14 @@ def _unknown_names(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> 
         loc = ("simulation", "engine")
         findings.append(task.source.finding(230, loc, message, hint=f"engines: {', '.join(ENGINES.names)}"))
     return findings
+
+
+def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
+    """Why the engine of the task cannot hold its robot."""
+    engine = task.spec.simulation.engine
+    if engine not in ENGINES.names:
+        return ()
+    return tuple(replace(finding, place=task.place("robot")) for finding in ENGINES[engine].refuses(robot))
 
 
 def _claims(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from manipcli.control.controller import Interface
+from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -61,9 +62,18 @@ class Engine(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EngineMember:
-    """A member of the seam. `physics` tells judges what can be known: "none" leaves objects where they stand."""
+    """A member of the seam.
+
+    Attributes:
+        name: as in `simulation: {engine: ...}`.
+        physics: tells judges what can be known: "none" leaves objects where they stand.
+        refuses: (robot) -> everything for which the engine cannot hold this robot.
+        open: (robot, scene, settings) -> a running engine, for a robot that it does not refuse.
+        version: of the engine, for the log.
+    """
 
     name: str
     physics: Literal["full", "none"]
+    refuses: Callable[[RobotModel], tuple[Finding, ...]]
     open: Callable[[RobotModel, Scene, EngineSettings], Engine]
     version: Callable[[], str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -61,4 +62,8 @@ def _version() -> str:
     return __version__
 
 
-MEMBER = EngineMember(name="kinematic", physics="none", open=KinematicEngine, version=_version)
+def _refuses(robot: RobotModel) -> tuple[Finding, ...]:
+    return ()
+
+
+MEMBER = EngineMember(name="kinematic", physics="none", refuses=_refuses, open=KinematicEngine, version=_version)

@@ -10,16 +10,19 @@ from typing import Final, cast
 
 import numpy as np
 
-from manipcli.core.errors import SimulationFailed
+from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
-from manipcli.model.normalise import engine_urdf
+from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
+MAX_JOINTS: Final = 127
+"""Moving and fixed; with one more `getJointState` fails, with thousands the process."""
 UNLIMITED_EFFORT: Final = 1e6
 """Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
 MIMIC_ERP: Final = 0.2
@@ -31,6 +34,8 @@ class PybulletEngine:
     """One PyBullet world."""
 
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
+        if refused := refuses(robot):
+            raise InvalidInput(refused)
         with silence():
             import pybullet
 
@@ -153,6 +158,10 @@ class PybulletEngine:
                 physicsClientId=client,
             )
         self._names[self._robot] = "robot"
+        unlike = list(differences(p, client, self._robot, robot, self._link_names))
+        if unlike:
+            self.close()
+            raise ManipcliError(f"Bullet holds another robot than '{robot.name}': {'; '.join(unlike)}")
 
     def _start(self, robot: RobotModel, settings: EngineSettings) -> None:
         p, client = self._p, self._client
@@ -325,4 +334,17 @@ def _version() -> str:
     return "unknown"
 
 
-MEMBER = EngineMember(name="pybullet", physics="full", open=PybulletEngine, version=_version)
+def refuses(robot: RobotModel) -> tuple[Finding, ...]:
+    """More joints than Bullet reads the state of, and joints that move nothing that has mass."""
+    found = []
+    if len(robot.joints) > MAX_JOINTS:
+        message = f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
+        found.append(Finding("SIM120", message, hint="join links that are fixed to each other"))
+    for name in massless_joints(robot):
+        message = f"joint '{name}' moves nothing that has mass"
+        hint = f"give link '{robot.joint(name).child}' an <inertial>, or use an engine without physics"
+        found.append(Finding("SIM121", message, hint=hint))
+    return tuple(found)
+
+
+MEMBER = EngineMember(name="pybullet", physics="full", refuses=refuses, open=PybulletEngine, version=_version)

@@ -1,0 +1,80 @@
+"""What Bullet made of a robot, compared with what the robot is: Bullet drops what it does not like without a word."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import ModuleType
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.normalise import MASSLESS
+from manipcli.model.robot import Inertial, RobotModel
+
+RELATIVE: Final = 1e-4
+"""Of masses, lengths and moments; moments are moved by 1e-6 where rounding put them outside of what can be."""
+ABSOLUTE: Final = 1e-9
+REVOLUTE, PRISMATIC = 0, 1
+
+
+def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links: Mapping[int, str]) -> Iterator[str]:
+    """Everything in which the loaded `body` is not `robot`; `links`: link names by Bullet's indices, -1 the root.
+
+    Compares of each link the mass, the centre of mass, the moments of inertia and the number of collision shapes, and
+    of each joint the type and the limits. The root is held in place and has no mass in Bullet.
+    """
+    for k, name in links.items():
+        link = robot.link(name)
+        shapes = len(p.getCollisionShapeData(body, k, physicsClientId=client))
+        if shapes != len(link.collisions):
+            yield f"link '{name}' has {shapes} collision shapes instead of {len(link.collisions)}"
+        if k >= 0:
+            found = _inertial(p.getDynamicsInfo(body, k, physicsClientId=client))
+            yield from _unlike(name, link.inertial or MASSLESS, found)
+    for k in links:
+        if k >= 0:
+            yield from _unlike_joint(p.getJointInfo(body, k, physicsClientId=client), robot)
+
+
+def _inertial(info: tuple[object, ...]) -> Inertial:
+    mass, moments, p, quat = info[0], info[2], info[3], info[4]
+    X_LI = Transform.of(xyz=p, quat_xyzw=quat)  # type: ignore[arg-type]
+    return Inertial(mass=float(mass), X_LI=X_LI, inertia=np.diag(np.asarray(moments, dtype=float)))  # type: ignore[arg-type]
+
+
+def _unlike(name: str, wanted: Inertial, found: Inertial) -> Iterator[str]:
+    if not abs(found.mass - wanted.mass) <= ABSOLUTE + RELATIVE * wanted.mass:
+        yield f"link '{name}' has a mass of {found.mass:g} kg instead of {wanted.mass:g} kg"
+    elif wanted.mass == 0.0:
+        return
+    if not np.allclose(found.X_LI.p, wanted.X_LI.p, rtol=RELATIVE, atol=1e-6):
+        yield f"link '{name}' has its centre of mass at {found.X_LI.p} m instead of {wanted.X_LI.p} m"
+    want = _in_link(wanted)
+    if not np.allclose(_in_link(found), want, rtol=0.0, atol=ABSOLUTE + RELATIVE * float(np.abs(want).max())):
+        yield f"link '{name}' has other moments of inertia: {np.diag(_in_link(found))} instead of {np.diag(want)} kg m2"
+
+
+def _in_link(inertial: Inertial) -> Array:
+    """(3, 3) about the centre of mass, along the axes of the link."""
+    R = inertial.X_LI.R
+    return np.asarray(R @ inertial.inertia @ R.T)
+
+
+def _unlike_joint(info: tuple[object, ...], robot: RobotModel) -> Iterator[str]:
+    name = bytes(info[1]).decode()  # type: ignore[call-overload]
+    joint = robot.joint(name)
+    if not joint.moves:
+        return
+    if info[2] != (PRISMATIC if joint.type == "prismatic" else REVOLUTE):
+        yield f"joint '{name}' is of Bullet's type {info[2]}"
+    lower, upper, effort, velocity = (float(v) for v in info[8:12])  # type: ignore[arg-type]
+    limits = joint.limits
+    for word, found, wanted in (
+        ("lower limit", lower, limits.lower),
+        ("upper limit", upper, limits.upper),
+        ("effort limit", effort, limits.effort),
+        ("velocity limit", velocity, limits.velocity),
+    ):
+        if wanted is not None and not np.isclose(found, wanted, rtol=RELATIVE):
+            yield f"joint '{name}' has a {word} of {found:g} instead of {wanted:g}"
