@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from operator import attrgetter
 from pathlib import Path
 from types import ModuleType
 from typing import Final, cast
@@ -28,6 +29,13 @@ UNLIMITED_EFFORT: Final = 1e6
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
 """What a mimic coupling may carry [N m or N]."""
+
+Vector = tuple[float, float, float]
+Pair = tuple[int, int, int, int]
+"""Body a, body b, link of a, link of b."""
+ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float]
+"""What PyBullet says of a contact point, up to its distance and normal force."""
+_sides = attrgetter("a", "b")
 
 
 class PybulletEngine:
@@ -58,12 +66,10 @@ class PybulletEngine:
             physicsClientId=client,
         )
         self._names: dict[int, str] = {}
+        self._parts_of: dict[Pair, tuple[str, str]] = {}
         self._bodies = [self._add_body(body) for body in scene.bodies]
-        self._movable = [k for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed]
-        self._com_offset = [tuple(float(v) for v in body.X_OI.p) for body in scene.movable]
-        self._com_turned = [
-            None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
-            for body in scene.movable
+        self._movable = [
+            (k, *_centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
         self._load_robot(robot)
         self._start(robot, settings)
@@ -177,15 +183,16 @@ class PybulletEngine:
         for joint in robot.moving_joints:
             if joint.mimic is not None:
                 self._couple(robot, joint.name, joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
-        self._by_interface = {
-            interface: [k for k, used in enumerate(settings.interfaces) if used == interface]
-            for interface in ("effort", "position", "velocity")
-            if interface in settings.interfaces
-        }
+        efforts = [k for k, interface in enumerate(settings.interfaces) if interface == "effort"]
+        self._efforts_at: slice | list[int] = slice(None) if len(efforts) == len(self._joints) else efforts
+        self._effort_joints = [self._joints[k] for k in efforts]
+        self._applied = np.zeros(len(efforts))
+        self._motors = [
+            (k, self._joints[k], interface) for k, interface in enumerate(settings.interfaces) if interface != "effort"
+        ]
         limits = [joint.limits for joint in robot.moving_joints]
         self._efforts = [UNLIMITED_EFFORT if limit.effort is None else limit.effort for limit in limits]
         self._velocities = [limit.velocity or math.inf for limit in limits]
-        self._applied: list[float] = [0.0] * len(self._by_interface.get("effort", ()))
 
     def _couple(self, robot: RobotModel, follower: str, driver: str, multiplier: float, offset: float) -> None:
         """A gear constraint between the two joints' child links: follower - multiplier * driver = offset."""
@@ -215,83 +222,95 @@ class PybulletEngine:
         states = p.getJointStates(self._robot, self._joints, client)
         state.position[:] = [s[0] for s in states]
         state.velocity[:] = [s[1] for s in states]
-        state.effort[:] = [s[3] for s in states]
-        state.effort[self._by_interface.get("effort", [])] = self._applied
-        for row, k in enumerate(self._movable):
+        if self._motors:
+            state.effort[:] = [s[3] for s in states]
+        state.effort[self._efforts_at] = self._applied
+        for row, (k, offset, turned) in enumerate(self._movable):
             position, quat = p.getBasePositionAndOrientation(k, client)
             linear, angular = p.getBaseVelocity(k, client)
-            turned = self._com_turned[row]
             if turned is not None:
                 _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-            r = _rotated(quat, self._com_offset[row])
-            state.body_position[row] = (position[0] - r[0], position[1] - r[1], position[2] - r[2])
+            if offset is not None:
+                x, y, z = r = _rotated(quat, offset)
+                position = (position[0] - x, position[1] - y, position[2] - z)
+                linear = _minus_cross(linear, angular, r)
+            state.body_position[row] = position
             state.body_quat_xyzw[row] = quat
-            wx, wy, wz = angular
-            state.body_linear[row] = (
-                linear[0] - (wy * r[2] - wz * r[1]),
-                linear[1] - (wz * r[0] - wx * r[2]),
-                linear[2] - (wx * r[1] - wy * r[0]),
-            )
+            state.body_linear[row] = linear
             state.body_angular[row] = angular
         return state
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:
         p = self._p
-        for interface, rows in self._by_interface.items():
-            joints = [self._joints[k] for k in rows]
-            values = command[rows].tolist()
-            if interface == "effort":
-                p.setJointMotorControlArray(
-                    self._robot, joints, p.TORQUE_CONTROL, forces=values, physicsClientId=self._client
-                )
-                self._applied = values
-            elif interface == "velocity":
-                p.setJointMotorControlArray(
+        if self._effort_joints:
+            self._applied[:] = command[self._efforts_at]
+            p.setJointMotorControlArray(
+                self._robot,
+                self._effort_joints,
+                p.TORQUE_CONTROL,
+                forces=self._applied.tolist(),
+                physicsClientId=self._client,
+            )
+        for row, joint, interface in self._motors:
+            if interface == "velocity":
+                p.setJointMotorControl2(
                     self._robot,
-                    joints,
+                    joint,
                     p.VELOCITY_CONTROL,
-                    targetVelocities=values,
-                    forces=[self._efforts[k] for k in rows],
+                    targetVelocity=float(command[row]),
+                    force=self._efforts[row],
                     physicsClientId=self._client,
                 )
-            else:
-                for k, joint, value in zip(rows, joints, values, strict=True):
-                    p.setJointMotorControl2(
-                        self._robot,
-                        joint,
-                        p.POSITION_CONTROL,
-                        targetPosition=value,
-                        force=self._efforts[k],
-                        maxVelocity=self._velocities[k],
-                        physicsClientId=self._client,
-                    )
+            elif interface == "position":
+                p.setJointMotorControl2(
+                    self._robot,
+                    joint,
+                    p.POSITION_CONTROL,
+                    targetPosition=float(command[row]),
+                    force=self._efforts[row],
+                    maxVelocity=self._velocities[row],
+                    physicsClientId=self._client,
+                )
 
     def advance(self) -> None:
         for _ in range(self._substeps):
             self._p.stepSimulation(self._client)
 
     def robot_contacts(self) -> tuple[Contact, ...]:
-        return self._merged(self._p.getContactPoints(bodyA=self._robot, physicsClientId=self._client))
+        return self._merged(self._p.getContactPoints(self._robot, physicsClientId=self._client))
 
     def contacts(self) -> tuple[Contact, ...]:
         return self._merged(self._p.getContactPoints(physicsClientId=self._client))
 
-    def _merged(self, points: tuple[tuple[object, ...], ...]) -> tuple[Contact, ...]:
+    def _merged(self, points: tuple[ContactPoint, ...]) -> tuple[Contact, ...]:
         """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
-        if not points:
-            return ()
-        pairs: dict[tuple[int, int, int, int], tuple[float, float]] = {}
+        forces: dict[Pair, float] = {}
+        depths: dict[Pair, float] = {}
         for point in points:
-            distance, force = cast(tuple[float, float], point[8:10])
+            distance, force = point[8], point[9]
             if force > 0.0 or distance <= 0.0:
-                key = cast(tuple[int, int, int, int], point[1:5])
-                total, deepest = pairs.get(key, (0.0, math.inf))
-                pairs[key] = (total + force, min(deepest, distance))
-        found = []
-        for (body_a, body_b, link_a, link_b), (force, distance) in pairs.items():
-            a, b = sorted((self._part(body_a, link_a), self._part(body_b, link_b)))
-            found.append(Contact(a=a, b=b, force=force, distance=distance))
-        return tuple(sorted(found, key=lambda contact: (contact.a, contact.b)))
+                pair = point[1:5]
+                if pair not in forces:
+                    forces[pair], depths[pair] = force, distance
+                else:
+                    forces[pair] += force
+                    if distance < depths[pair]:
+                        depths[pair] = distance
+        if not forces:
+            return ()
+        found = [Contact(*self._parts(pair), force, depths[pair]) for pair, force in forces.items()]
+        if len(found) > 1:
+            found.sort(key=_sides)
+        return tuple(found)
+
+    def _parts(self, pair: Pair) -> tuple[str, str]:
+        """The names of the two, in their order."""
+        known = self._parts_of.get(pair)
+        if known is None:
+            body_a, body_b, link_a, link_b = pair
+            a, b = self._part(body_a, link_a), self._part(body_b, link_b)
+            known = self._parts_of[pair] = (a, b) if a <= b else (b, a)
+        return known
 
     def _part(self, body: int, link: int) -> str:
         return f"robot/{self._link_names[link]}" if body == self._robot else self._names[body]
@@ -312,15 +331,30 @@ def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
     return cast(int, p.GEOM_MESH)
 
 
-def _rotated(quat: tuple[float, ...], v: tuple[float, ...]) -> tuple[float, float, float]:
-    """R(quat_xyzw) v in plain floats: numpy costs ten times as much for three numbers."""
+def _centre(body: Body) -> tuple[Vector | None, tuple[float, ...] | None]:
+    """Where Bullet's frame of a body, which is that of its principal inertia, stands in the body's own: the position of
+    the one, and the rotation back; None where there is nothing to change."""
+    x, y, z = (float(v) for v in body.X_OI.p)
+    turned = None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
+    return (x, y, z) if x or y or z else None, turned
+
+
+# Plain floats: numpy costs ten times as much for three numbers.
+
+
+def _rotated(quat: tuple[float, ...], v: Vector) -> Vector:
+    """R(quat_xyzw) v."""
     x, y, z, w = quat
-    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
-    return (
-        v[0] + w * tx + y * tz - z * ty,
-        v[1] + w * ty + z * tx - x * tz,
-        v[2] + w * tz + x * ty - y * tx,
-    )
+    a, b, c = v
+    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
+
+
+def _minus_cross(v: Vector, a: Vector, b: Vector) -> Vector:
+    """v - a x b."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return v[0] - (ay * bz - az * by), v[1] - (az * bx - ax * bz), v[2] - (ax * by - ay * bx)
 
 
 def _version() -> str:
