@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,11 +43,11 @@ class WorldState:
         return WorldState(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(NamedTuple):
     """Two touching parts. `a` and `b` name a body, or `robot/<link>`; sorted so that a <= b.
 
     `force` [N]: sum of the normal forces between the two; `distance` [m]: the deepest, negative when penetrating.
+    A named tuple, because a control tick makes many, at a third of a dataclass's cost.
     """
 
     a: str
