@@ -101,8 +101,7 @@ class JointTrajectoryController:
             command=self._command,
         )
         self._measured = np.zeros(n)
-        self._error, self._error_rate, self._magnitude = np.zeros((3, n))
-        self._violated = np.zeros(n, dtype=np.bool_)
+        self._error, self._error_rate = np.zeros((2, n))
         self._activated = False
         self._clear(time=0.0)
 
@@ -214,12 +213,9 @@ class JointTrajectoryController:
         goal, tolerances = self._goal, self._tolerances
         assert goal is not None
         if row < self._end_row or row == 0:
-            if tolerances.enforces_path:
-                np.abs(self._error, out=self._magnitude)
-                np.greater(self._magnitude, tolerances.path, out=self._violated)
-                if np.count_nonzero(self._violated):
-                    text = tolerances.path_text(self._facts, self._error, time, time - self._began)
-                    return self._abort(goal, ErrorCode.PATH_TOLERANCE_VIOLATED, text, time)
+            if tolerances.outside_path(self._error):
+                text = tolerances.path_text(self._facts, self._error, time, time - self._began)
+                return self._abort(goal, ErrorCode.PATH_TOLERANCE_VIOLATED, text, time)
             if row < self._end_row:
                 return False
         if tolerances.inside_goal(self._error, self._error_rate):

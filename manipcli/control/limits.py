@@ -131,16 +131,19 @@ class JointLimiter:
         self._positions = np.flatnonzero([kind == "position" for kind in kinds])
         self._velocities = np.flatnonzero([kind == "velocity" for kind in kinds])
         efforts = ~uncommanded
-        # Outside this band lies nothing but joints that need a second look; infinite: joints without effort command.
+        # Infinite: joints without effort command.
         self._watch_lower = np.where(efforts, self._lower, -math.inf)
         self._watch_upper = np.where(efforts, self._upper, math.inf)
         self._watch_velocity = np.where(efforts, self._velocity, math.inf)
-        self._minus_effort = -self._effort
+        # Nothing is cut while position, velocity and command (3 n) lie within these, and all commands are efforts.
+        self._least = np.concatenate((self._watch_lower, -self._watch_velocity, -self._effort))
+        self._most = np.concatenate((self._watch_upper, self._watch_velocity, self._effort))
+        self._plain = not len(self._positions) and not len(self._velocities)
+        self._seen = np.zeros(3 * n)
+        self._above, self._below = np.zeros((2, 3 * n), dtype=np.bool_)
         self.saturations = np.zeros(n, dtype=np.int64)
         self.saturated = np.zeros(n, dtype=np.bool_)
         self._limited = np.zeros(n)
-        self._speed = np.zeros(n)
-        self._flag = np.zeros(n, dtype=np.bool_)
         self._previous = np.full(n, math.nan)
 
     def reset(self) -> None:
@@ -151,27 +154,28 @@ class JointLimiter:
 
     def apply(self, command: Array, position: Array, velocity: Array, dt: float) -> Array:
         """The limited command (n); the array is valid until the next call. `position`, `velocity` (n) are measured."""
-        limited, flag = self._limited, self._flag
-        np.maximum(command, self._minus_effort, out=limited)
-        np.minimum(limited, self._effort, out=limited)
-        np.abs(velocity, out=self._speed)
-        outside = np.count_nonzero(np.greater(self._speed, self._watch_velocity, out=flag))
-        outside += np.count_nonzero(np.less_equal(position, self._watch_lower, out=flag))
-        outside += np.count_nonzero(np.greater_equal(position, self._watch_upper, out=flag))
-        if outside:
-            limited[:] = limit_effort(
-                command,
-                effort=self._effort,
-                position=position,
-                velocity=velocity,
-                lower=self._watch_lower,
-                upper=self._watch_upper,
-                max_velocity=self._watch_velocity,
-            )
-        if len(self._positions) or len(self._velocities):
+        limited, seen, n = self._limited, self._seen, len(self._limited)
+        seen[:n], seen[n : 2 * n], seen[2 * n :] = position, velocity, command
+        np.greater(seen, self._least, out=self._above)
+        np.less(seen, self._most, out=self._below)
+        np.logical_and(self._above, self._below, out=self._above)
+        if np.count_nonzero(self._above) == 3 * n and self._plain:
+            limited[:] = command
+            self.saturated.fill(False)
+            return limited
+        limited[:] = limit_effort(
+            command,
+            effort=self._effort,
+            position=position,
+            velocity=velocity,
+            lower=self._watch_lower,
+            upper=self._watch_upper,
+            max_velocity=self._watch_velocity,
+        )
+        if not self._plain:
             self._apply_others(command, position, dt)
-        if np.count_nonzero(np.not_equal(limited, command, out=self.saturated)):
-            self.saturations += self.saturated
+        np.not_equal(limited, command, out=self.saturated)
+        self.saturations += self.saturated
         return limited
 
     def _apply_others(self, command: Array, position: Array, dt: float) -> None:

@@ -44,13 +44,12 @@ class JointVectors(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Slot:
-    """A controller, where its joints stand in a joint vector, and the buffers that it is given."""
+    """A controller, where its joints stand in a joint vector, and its own copy of what was measured there."""
 
     controller: Controller
     index: Index
     measured: JointState
-    feed_forward: Array | None
-    contact_force: Array
+    adds: bool
 
 
 class ControllerManager:
@@ -101,8 +100,7 @@ class ControllerManager:
             controller=controller,
             index=slice(where[0], where[0] + n) if adjacent else np.array(where, dtype=np.intp),
             measured=JointState(position=np.zeros(n), velocity=np.zeros(n), effort=np.zeros(n)),
-            feed_forward=None if controller.feed_forward == "none" else np.zeros(n),
-            contact_force=np.zeros(n),
+            adds=controller.feed_forward != "none",
         )
 
     def __getitem__(self, name: str) -> Controller:
@@ -147,17 +145,9 @@ class ControllerManager:
             measured.position[:] = position[index]
             measured.velocity[:] = velocity[index]
             measured.effort[:] = effort[index]
-            addition = slot.feed_forward
-            if addition is not None:
-                if feed_forward is None:
-                    addition = None
-                else:
-                    addition[:] = feed_forward[index]
-            if contact_force is None:
-                output = slot.controller.update(time, period, measured, addition)
-            else:
-                slot.contact_force[:] = contact_force[index]
-                output = slot.controller.update(time, period, measured, addition, contact_force=slot.contact_force)
+            addition = feed_forward[index] if slot.adds and feed_forward is not None else None
+            force = contact_force[index] if contact_force is not None else None
+            output = slot.controller.update(time, period, measured, addition, contact_force=force)
             commands[index] = output.command
             outputs.append(output)
         self.outputs = tuple(outputs)

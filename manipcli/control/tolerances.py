@@ -15,12 +15,14 @@ from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerances:
-    """`path`, `goal` (n) rad or m; `stopped_velocity` per second; infinite: not enforced. `goal_time` [s]."""
+    """`path`, `goal` (n) rad or m; `stopped_velocity` per second; infinite: not enforced. `goal_time` [s];
+    `least_path`: the smallest of `path`."""
 
     path: Array
     goal: Array
     stopped_velocity: float
     goal_time: float
+    least_path: float
 
     @staticmethod
     def of(joints: tuple[str, ...], constraints: ConstraintsSpec) -> Tolerances:
@@ -33,16 +35,21 @@ class Tolerances:
         if unknown:
             raise InvalidArgument("CTRL104", f"tolerances of '{unknown[0]}', which is not a joint of the controller")
         each = [constraints.joints.get(joint, JointConstraintSpec()) for joint in joints]
+        path = np.array([c.trajectory or math.inf for c in each])
         return Tolerances(
-            path=np.array([c.trajectory or math.inf for c in each]),
+            path=path,
             goal=np.array([c.goal or math.inf for c in each]),
             stopped_velocity=constraints.stopped_velocity_tolerance or math.inf,
             goal_time=constraints.goal_time,
+            least_path=float(path.min()),
         )
 
-    @property
-    def enforces_path(self) -> bool:
-        return bool(np.isfinite(self.path).any())
+    def outside_path(self, error: Array) -> bool:
+        """Whether some joint is outside its path tolerance."""
+        # The largest error is at most their norm: nearly always this alone answers. NaN does not pass here.
+        if error.dot(error) < self.least_path**2:
+            return False
+        return bool((np.abs(error) > self.path).any())
 
     def inside_goal(self, error: Array, error_rate: Array) -> bool:
         """Whether every joint is within goal tolerance and slow enough, now."""
