@@ -34,13 +34,18 @@ class EngineSettings:
 class Engine(Protocol):
     """Joint vectors follow `RobotModel.moving_joints`, body arrays `Scene.movable`."""
 
+    @property
+    def ideal(self) -> bool:
+        """Whether it follows references instead of commands."""
+        ...
+
     def read(self) -> WorldState:
         """The true state now; `time` is the session's to fill. The arrays are overwritten by the next read."""
         ...
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:
         """Commands (n), each in its joint's interface, held until the next write; and the references (n) behind
-        them, which only an ideal engine uses."""
+        them, which are only there for an ideal engine."""
         ...
 
     def advance(self) -> None:

@@ -12,6 +12,7 @@ from manipcli.control.joint_trajectory_controller import JointTrajectoryControll
 from manipcli.core.errors import InvalidArgument
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.plan.hand import fingers
 from manipcli.plan.step import Grip, Motion
 from manipcli.simulate.session import Session
 
@@ -126,17 +127,3 @@ def _gripper_goal(robot: RobotModel, gripper: GripperController, grip: Grip) -> 
         force=grip.force,
         fingers=fingers(robot, gripper.joints),
     )
-
-
-def fingers(robot: RobotModel, joints: tuple[str, ...]) -> tuple[tuple[int, ...], ...]:
-    """The joints of a hand by finger: a joint below another one of the hand is of the same finger."""
-    found: list[list[int]] = []
-    for k, name in enumerate(joints):
-        child = robot.joint(name).child
-        for finger in found:
-            if any(child in robot.descendants(robot.joint(joints[j]).child) for j in finger):
-                finger.append(k)
-                break
-        else:
-            found.append([k])
-    return tuple(tuple(finger) for finger in found)

@@ -78,20 +78,19 @@ class Session:
         self.state = engine.read()
         self._limiter = manager.limiter([joint.limits for joint in robot.moving_joints])
         self._kinematics = kinematics
-        self._feed_forward = "gravity" if "gravity" in manager.feed_forward else None
-        if "inverse_dynamics" in manager.feed_forward:
-            self._feed_forward = "inverse_dynamics"
+        self._dynamics = "inverse_dynamics" in manager.feed_forward
+        self._gravity = [manager.index(each.name) for each in manager.controllers if each.feed_forward == "gravity"]
         n = len(robot.joint_names)
         self._position, self._velocity, self._acceleration = np.zeros((3, n))
         self._addition = np.zeros(n)
-        self._gravity_only = np.array([want == "gravity" for want in manager.feed_forward])
         self._contact_force = np.zeros(n)
         self._joint_of_part = _joint_of_part(robot)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
-        self._robot_touched: tuple[Contact, ...] = ()
+        self._touched: tuple[Contact, ...] = ()
         self._others: tuple[Contact, ...] = ()
         self._indices = [manager.index(controller.name) for controller in manager.controllers]
+        self._accelerates = [controller.feed_forward == "inverse_dynamics" for controller in manager.controllers]
 
     @property
     def time(self) -> float:
@@ -121,10 +120,12 @@ class Session:
         self._touch(state)
         command = self.manager.update(time, state, self._wanted(state), self._contact_force)
         outputs = self.manager.outputs
-        for index, output in zip(self._indices, outputs, strict=True):
-            self._position[index] = output.position
-            self._velocity[index] = output.velocity
-            self._acceleration[index] = output.acceleration
+        for index, output, accelerates in zip(self._indices, outputs, self._accelerates, strict=True):
+            if self.engine.ideal:
+                self._position[index] = output.position
+                self._velocity[index] = output.velocity
+            if accelerates:
+                self._acceleration[index] = output.acceleration
         command = self._limiter.apply(command, state.position, state.velocity, self.period)
         self.engine.write(command, self._position, self._velocity)
         self.observer.tick(self.ticks, state, outputs)
@@ -134,41 +135,53 @@ class Session:
 
     def _wanted(self, state: WorldState) -> Array | None:
         """Feed-forward efforts (n): gravity at the measured position, or inverse dynamics along the reference."""
-        if self._feed_forward is None:
-            return None
-        gravity = self._kinematics.gravity(state.position)
-        if self._feed_forward == "gravity":
-            return gravity
-        dynamics = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
-        return np.where(self._gravity_only, gravity, dynamics)
+        if not self._dynamics:
+            return self._kinematics.gravity(state.position) if self._gravity else None
+        efforts = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+        if self._gravity:
+            gravity = self._kinematics.gravity(state.position)
+            for index in self._gravity:
+                efforts[index] = gravity[index]
+        return efforts
 
     def _touch(self, state: WorldState) -> None:
         """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""
-        touched = self.engine.robot_contacts()
+        before = self._touched
         slow = self.ticks % SLOW == 0
-        if touched or self._robot_touched:
-            self._contact_force[:] = 0.0
-            for contact in touched:
-                a, b = self._joint_of_part.get(contact.a), self._joint_of_part.get(contact.b)
-                if (a is None) != (b is None):
-                    self._contact_force[a if a is not None else b] += contact.force
         if slow:
             self._refuse_runaway(state)
             everything = self.engine.contacts()
+            self._touched = tuple(c for c in everything if _of_robot(c))
             self._others = tuple(c for c in everything if not _of_robot(c))
-        if slow or touched or self._robot_touched:
-            self.observer.contacts(self.ticks, touched + self._others)
-        self._robot_touched = touched
+        else:
+            self._touched = self.engine.robot_contacts()
+        if self._touched or before:
+            forces = [0.0] * len(self._contact_force)
+            for a, b, force, _ in self._touched:
+                joint_a, joint_b = self._joint_of_part.get(a), self._joint_of_part.get(b)
+                if joint_a is None:
+                    if joint_b is not None:
+                        forces[joint_b] += force
+                elif joint_b is None:
+                    forces[joint_a] += force
+            self._contact_force[:] = forces
+            self.observer.contacts(self.ticks, self._touched + self._others)
+        elif slow:
+            self.observer.contacts(self.ticks, self._others)
 
     def _refuse_runaway(self, state: WorldState) -> None:
         speeds = np.abs(state.velocity)
-        if not (speeds < self._runaway).all():
+        if np.count_nonzero(speeds < self._runaway) < len(speeds):
             k = int(np.argmax(np.where(np.isfinite(speeds), speeds / self._runaway, np.inf)))
             raise SimulationFailed(
                 f"joint '{self.robot.joint_names[k]}' runs away at {state.velocity[k]:.3g} per second; "
                 "its controller may be unstable (gains too high for the control period)",
                 time=self.time,
             )
+        slow = np.abs(state.body_linear) < 0.5 * BODY_SPEED  # along each axis
+        high = state.body_position[:, 2] > FALLEN
+        if np.count_nonzero(slow) == slow.size and np.count_nonzero(high) == high.size:
+            return
         for k, body in enumerate(self.scene.movable):
             speed = float(np.linalg.norm(state.body_linear[k]))
             if not speed < BODY_SPEED:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from manipcli.core.errors import Finding
@@ -14,6 +16,8 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 
 class KinematicEngine:
     """Perfect tracking on any interface; mimic joints follow their driver exactly. Fast, for tests of all the rest."""
+
+    ideal: Final = True
 
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         n, m = len(robot.joint_names), len(scene.movable)

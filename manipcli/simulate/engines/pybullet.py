@@ -41,6 +41,8 @@ _sides = attrgetter("a", "b")
 class PybulletEngine:
     """One PyBullet world."""
 
+    ideal: Final = False
+
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         if refused := refuses(robot):
             raise InvalidInput(refused)
