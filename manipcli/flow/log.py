@@ -20,7 +20,7 @@ from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.plan.steps import STEPS
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.reading import read_recording
+from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
 from manipcli.record.recording import Recording
 from manipcli.simulate.engines import ENGINES
@@ -94,7 +94,7 @@ def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
     Raises:
         InvalidInput: the file is no log of ours, or is damaged.
     """
-    recording = read_recording(path, being_written=being_written)
+    recording = open_recording(path, being_written=being_written)
     task = load_task_text(
         recording.attachments[TASK],
         f"{path.name}/{TASK}",

@@ -1,13 +1,15 @@
 """The contract of expectations: what a task may expect of its recording, each answered with a signed margin.
 
-Every condition is an expectation too: it must hold at the end (`at_end`). The others look at the whole recording.
+An expectation is asked about spans of the recording and the worst answer counts; its scope says about which spans, so
+that a recording of any length is judged in bounded memory. Every condition is an expectation too: it must hold at the
+end (`at_end`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
@@ -17,29 +19,30 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import Condition, Problem, World, needs_physics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.model.state import WorldState
-from manipcli.record.recording import Recording
+from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Unit
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
 
+Scope = Literal["always", "end"]
+"""What an expectation is asked about: every span of the recording, or one span of its last `END_WINDOW` seconds (all
+of it when it is shorter)."""
+
 S = TypeVar("S", bound=Model)
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What expectations are judged by.
+    """What expectations are judged by, besides the span they are asked about.
 
     Attributes:
-        recording: the log; `states` follow `world.robot` and `world.scene`.
         world: robot, scene, and the first recorded state as the start.
         physics: False when the engine moved no bodies and knew no contacts.
         steps: how the steps went.
     """
 
-    recording: Recording
     world: World
     physics: bool
     steps: tuple[StepOutcome, ...]
@@ -70,40 +73,35 @@ class Expectation(Generic[S]):
     Attributes:
         name: the word in YAML.
         spec: what the user writes under that word.
-        evaluate: (spec, evidence) -> the worst margin, or why there is none.
+        scope: which spans it is asked about.
+        evaluate: (spec, evidence, span) -> the worst margin in the span, or why there is none. The span has at least
+            one tick; its states follow robot and scene of the evidence.
         check: (spec, robot, scene, ids of the task's steps) -> what in the spec these do not know.
     """
 
     name: str
     spec: type[S]
-    evaluate: Callable[[S, Evidence], Measured | NotEvaluated]
+    scope: Scope
+    evaluate: Callable[[S, Evidence, Span], Measured | NotEvaluated]
     check: Callable[[S, RobotModel, Scene, tuple[str, ...]], tuple[Problem, ...]]
 
 
 def at_end(condition: Condition[Any]) -> Expectation[Any]:
-    """The expectation that a condition holds at the end.
+    """The expectation that a condition holds at the end: its smallest margin there, which bounds the last state's."""
 
-    Its margin is the smallest over the last `END_WINDOW` seconds of the recording (over all of it when it is
-    shorter), so that it also bounds the last state's.
-    """
-
-    def evaluate(spec: Model, evidence: Evidence) -> Measured | NotEvaluated:
-        scene, states = evidence.world.scene, evidence.recording.states
+    def evaluate(spec: Model, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
+        scene = evidence.world.scene
         if not evidence.physics and needs_physics(condition, spec, scene):
             movable = {body.name for body in scene.movable}
             names = ", ".join(f"'{name}'" for name in condition.bodies(spec, scene) if name in movable)
             return NotEvaluated(f"the engine has no physics, so {names} never moved", condition.unit)
-        if states.time.size == 0:
-            return NotEvaluated("the recording holds no state", condition.unit)
-        # Half a nanosecond of slack: recorded times are whole nanoseconds.
-        first = int(np.searchsorted(states.time, states.time[-1] - END_WINDOW - 0.5e-9))
-        margins = condition.margin(spec, evidence.world, since(states, first))
-        return worst(margins, states.time[first:], condition.unit, describe(spec))
+        margins = condition.margin(spec, evidence.world, span.states)
+        return worst(margins, span.states.time, condition.unit, describe(spec))
 
     def check(spec: Model, robot: RobotModel, scene: Scene, steps: tuple[str, ...]) -> tuple[Problem, ...]:
         return condition.check(spec, robot, scene)
 
-    return Expectation(name=condition.name, spec=condition.spec, evaluate=evaluate, check=check)
+    return Expectation(name=condition.name, spec=condition.spec, scope="end", evaluate=evaluate, check=check)
 
 
 def worst(margins: Array, times: Array, unit: str, text: str) -> Measured | NotEvaluated:
@@ -115,18 +113,11 @@ def worst(margins: Array, times: Array, unit: str, text: str) -> Measured | NotE
     return Measured(margin=float(margins[k]), unit=unit, at=float(times[k]), text=text)
 
 
-def since(states: WorldState, first: int) -> WorldState:
-    """The states from index `first` on."""
-    return WorldState(
-        time=states.time[first:],
-        position=states.position[first:],
-        velocity=states.velocity[first:],
-        effort=states.effort[first:],
-        body_position=states.body_position[first:],
-        body_quat_xyzw=states.body_quat_xyzw[first:],
-        body_linear=states.body_linear[first:],
-        body_angular=states.body_angular[first:],
-    )
+def worse(one: Measured | NotEvaluated, other: Measured | NotEvaluated) -> Measured | NotEvaluated:
+    """The answer that counts of two, the first of equal ones: what could not be evaluated once, never passes."""
+    if isinstance(one, NotEvaluated):
+        return one
+    return other if isinstance(other, NotEvaluated) or other.margin < one.margin else one
 
 
 def describe(spec: Model) -> str:

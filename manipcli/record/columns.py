@@ -111,29 +111,59 @@ class Layout:
 
 
 class Columns:
-    """The numbers of one channel over a whole recording. `parse`: a message to its layout."""
+    """The numbers of one channel on their way from chunks to spans.
 
-    def __init__(self, parse: Callable[[CdrReader], Layout]) -> None:
+    Args:
+        topic: what errors call it.
+        parse: a message to its layout.
+        names: of the joints or bodies that every message must hold, in this order.
+        widths: of the runs of doubles that every message must hold.
+    """
+
+    def __init__(
+        self, topic: str, parse: Callable[[CdrReader], Layout], names: tuple[str, ...], widths: tuple[int, ...]
+    ) -> None:
+        self._topic = topic
         self._parse = parse
-        self._names: tuple[str, ...] | None = None
-        self._times: list[Int] = []
-        self._runs: dict[int, _Growing] = {}
+        self._names = names
+        self._widths = widths
+        self._newest = -1
+        self._parts: list[tuple[Int, list[Array]]] = []
+
+    def __len__(self) -> int:
+        """Messages that were added and not yet taken."""
+        return sum(len(times) for times, _ in self._parts)
 
     def add(self, data: bytes, places: Places) -> None:
         """The channel's messages of one chunk.
 
         Raises:
-            CdrError: a message is cut, or names other things than the ones before.
+            CdrError: a message is cut, holds other things than it should, or is older than the one before it.
         """
+        times = np.concatenate(([self._newest], places.times))
+        back = np.flatnonzero(np.diff(times) <= 0)
+        if len(back):
+            raise CdrError(f"time runs backwards in {self._topic} after t = {times[back[0]] / 1e9:.3f} s")
+        self._newest = int(times[-1])
         for part, layout in self._alike(data, places):
-            if self._names is None:
-                self._names = layout.names
             if layout.names != self._names:
-                raise CdrError("names other joints or bodies than the messages before it")
-            self._times.append(part.times)
-            for k, (offset, count) in enumerate(layout.runs):
-                column = self._runs.setdefault(k, _Growing(count))
-                column.append(_gather(data, part.starts + offset, count))
+                raise CdrError(f"{self._topic} names other joints or bodies than the metadata")
+            if tuple(count for _, count in layout.runs) != self._widths:
+                raise CdrError(f"{self._topic} has another number of values than of names")
+            runs = [_gather(data, part.starts + offset, count) for offset, count in layout.runs]
+            self._parts.append((part.times, runs))
+
+    def take(self, count: int) -> tuple[Int, list[Array]]:
+        """The first `count` messages: log times [ns], and each run (count, width). The columns let go of them."""
+        if len(self._parts) != 1:
+            times = np.concatenate([np.zeros(0, dtype=np.int64), *(times for times, _ in self._parts)])
+            empty = [np.zeros((0, width)) for width in self._widths]
+            runs = [np.concatenate([none, *(runs[k] for _, runs in self._parts)]) for k, none in enumerate(empty)]
+            self._parts = [(times, runs)]
+        times, runs = self._parts.pop()
+        if count < len(times):
+            self._parts = [(times[count:], [run[count:] for run in runs])]
+        return times[:count], [run[:count] for run in runs]
 
     def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, Layout]]:
         """The messages in groups of one layout each."""
@@ -149,57 +179,6 @@ class Columns:
         start = int(places.starts[k])
         return self._parse(CdrReader(memoryview(data)[start : start + int(places.lengths[k])]))
 
-    @property
-    def names(self) -> tuple[str, ...] | None:
-        """None before the first message."""
-        return self._names
-
-    @property
-    def times(self) -> Int:
-        """Log times [ns]."""
-        return np.concatenate(self._times) if self._times else np.zeros(0, dtype=np.int64)
-
-    def take(self, k: int, width: int) -> Array:
-        """(T, width) the k-th run of doubles of every message, once: the columns let go of it.
-
-        Raises:
-            CdrError: there is a message whose run has another width.
-        """
-        column = self._runs.pop(k, None)
-        found = np.zeros((0, width)) if column is None else column.take()
-        if found.shape != (sum(len(times) for times in self._times), width):
-            raise CdrError(f"there are not {width} numbers where they should be")
-        return found
-
-
-class _Growing:
-    """A table that grows by rows, by a quarter and in place: a long recording is held once, where a list of parts and
-    their concatenation would hold it twice."""
-
-    def __init__(self, width: int) -> None:
-        self._table = np.zeros((0, width))
-        self._rows = 0
-
-    def append(self, rows: Array) -> None:
-        """
-        Raises:
-            CdrError: the rows have another width than those before.
-        """
-        if rows.shape[1] != self._table.shape[1]:
-            raise CdrError(f"there are {rows.shape[1]} numbers where there were {self._table.shape[1]} before")
-        end = self._rows + len(rows)
-        if end > len(self._table):
-            self._resize(max(end, len(self._table) + len(self._table) // 4))
-        self._table[self._rows : end] = rows
-        self._rows = end
-
-    def take(self) -> Array:
-        self._resize(self._rows)
-        return self._table
-
-    def _resize(self, rows: int) -> None:
-        self._table.resize((rows, self._table.shape[1]), refcheck=False)
-
 
 def _gather(data: bytes, starts: Int, count: int) -> Array:
     """(T, count) doubles that begin at `starts`."""
@@ -208,6 +187,13 @@ def _gather(data: bytes, starts: Int, count: int) -> Array:
     kind = np.dtype((np.void, 8 * count))
     runs = np.ndarray((len(data) - kind.itemsize + 1,), dtype=kind, buffer=data, strides=(1,))
     return runs[starts].view("<f8").reshape(len(starts), count)
+
+
+def singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
+    """(log time [ns], reader) of each message."""
+    view = memoryview(data)
+    for ns, start, length in zip(places.times.tolist(), places.starts.tolist(), places.lengths.tolist(), strict=True):
+        yield ns, CdrReader(view[start : start + length])
 
 
 def joint_state_layout(reader: CdrReader) -> Layout:

@@ -1,33 +1,25 @@
-"""Reads a recording back: all ticks at once, from a finished file as from the one a killed run left behind."""
+"""Reads a recording back, from a finished file as from the one a killed run left behind.
+
+One pass over the file verifies its checksum and keeps what is small; chunks are opened where that is needed only. The
+ticks in them are read when somebody goes through the spans.
+"""
 
 from __future__ import annotations
 
-import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from manipcli.model.state import Contact
 from manipcli.record import channels as topics
 from manipcli.record import schemas
-from manipcli.record.assembly import assemble
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.columns import (
-    Columns,
-    Places,
-    body_layout,
-    controller_state_layout,
-    indexed,
-    joint_state_layout,
-    walked,
-)
+from manipcli.record.columns import indexed, singly, walked
 from manipcli.record.contents import RECORD, Contents, contents
 from manipcli.record.faults import BadRecording
-from manipcli.record.messages import WORLD
-from manipcli.record.recording import ContactSnapshot, Recording, TaskEvent
+from manipcli.record.recording import Recording, TaskEvent
 from manipcli.record.scan import (
     ATTACHMENT,
     CHANNEL,
@@ -37,10 +29,14 @@ from manipcli.record.scan import (
     MESSAGE_INDEX,
     METADATA,
     SCHEMA,
+    ChunkPlace,
     Record,
     Scan,
+    guarded,
+    message_index,
     open_chunk,
 )
+from manipcli.record.spans import FileSpans
 
 if TYPE_CHECKING:
     from mcap.records import Attachment
@@ -51,41 +47,47 @@ MAX_NAMED = 4096
 MAX_ATTACHED = 1 << 30
 """[byte] of all attachments together."""
 
-R = TypeVar("R")
 
-
-def read_recording(path: Path, *, being_written: bool = False) -> Recording:
-    """Everything in one recording.
+def open_recording(path: Path, *, being_written: bool = False) -> Recording:
+    """A recording whose spans are read from the file when they are asked for: its memory does not grow with its length.
 
     Args:
         path: an `.mcap` file, or the `.mcap.partial` of a run that was killed.
         being_written: the file is a run's partial file that has just been flushed: that it has no end is no loss.
 
     Raises:
-        BadRecording: not a recording of manipcli, of a later format, damaged, or out of bounds. A file that merely
-            lacks its end is read as far as it goes, and `lost` says so.
+        BadRecording: not a recording of manipcli, of a later format, damaged, or out of bounds; from going through
+            the spans, too. A file that merely lacks its end is read as far as it goes, and `lost` says so.
     """
     reader = _Reader(path)
     scan = Scan(path, being_written=being_written)
     chunk: Record | None = None
     indexes: dict[int, bytes] = {}
+    end = 0
     for record in scan:
-        if record.opcode == MESSAGE_INDEX:
-            channel, entries = reader.guarded(record, _message_index)
+        if record.opcode == MESSAGE_INDEX and chunk is not None:
+            channel, entries = guarded(path, record, message_index)
             indexes[channel] = entries
+            end = record.end
             continue
         if chunk is not None:
-            reader.chunk(chunk, indexes)
-        chunk, indexes = (record if record.opcode == CHUNK else None), {}
-        if chunk is None:
+            reader.chunk(chunk, indexes, end)
+        chunk, indexes, end = (record if record.opcode == CHUNK else None), {}, record.end
+        if chunk is None and record.opcode != MESSAGE_INDEX:
             reader.declaration(record)
     if chunk is not None:
-        reader.chunk(chunk, indexes)
+        # Some of its indexes may have been cut off.
+        reader.chunk(chunk, {}, end)
     return reader.recording(scan.lost)
 
 
+def read_recording(path: Path, *, being_written: bool = False) -> Recording:
+    """Everything in one recording, all ticks in memory: see `open_recording`, and `Recording.whole`."""
+    return open_recording(path, being_written=being_written).whole()
+
+
 class _Reader:
-    """What was declared so far, and the columns that grow chunk by chunk."""
+    """What was declared so far, and what happened."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -97,19 +99,9 @@ class _Reader:
         self._attachments: dict[str, bytes] = {}
         self._contents: Contents | None = None
         self._types: dict[str, str] = {}
-        self._columns: dict[str, Columns] = {}
-        self._contacts: list[ContactSnapshot] = []
         self._events: list[TaskEvent] = []
-
-    def guarded(self, record: Record, read: Callable[[Record], R]) -> R:
-        """What `read` makes of a record; what it stumbles over becomes an error that says where."""
-        from mcap.exceptions import McapError
-
-        try:
-            return read(record)
-        except (McapError, CdrError, struct.error, UnicodeDecodeError) as error:
-            cause = f": {error}" if isinstance(error, CdrError) else ""
-            raise BadRecording(self._path, f"the record at byte {record.offset} is damaged{cause}") from error
+        self._chunks: list[ChunkPlace] = []
+        self._newest = -1
 
     def declaration(self, record: Record) -> None:
         """Anything but a chunk."""
@@ -119,7 +111,7 @@ class _Reader:
                 raise BadRecording(self._path, f"declares more than {MAX_NAMED} channels, schemas and attachments")
         elif record.opcode == MESSAGE:
             raise BadRecording(self._path, "has messages outside chunks; manipcli writes none")
-        self.guarded(record, self._declaration)
+        guarded(self._path, record, self._declaration)
 
     def _declaration(self, record: Record) -> None:
         from mcap import records
@@ -160,10 +152,6 @@ class _Reader:
             self._contents = contents(values)
         except ValueError as error:
             raise BadRecording(self._path, str(error)) from error
-        self._columns = {
-            topics.JOINT_STATES: Columns(joint_state_layout),
-            topics.TF: Columns(body_layout(frozenset(self._contents.bodies), WORLD)),
-        }
         self._types = {
             topics.JOINT_STATES: schemas.JOINT_STATE,
             topics.TF: schemas.TF_MESSAGE,
@@ -171,15 +159,21 @@ class _Reader:
             topics.CONTACTS: schemas.CONTACTS,
         }
         for name in self._contents.controllers:
-            topic = ControllerChannel(name, ()).state_topic
-            self._columns[topic] = Columns(controller_state_layout)
-            self._types[topic] = schemas.CONTROLLER_STATE
+            self._types[ControllerChannel(name, ()).state_topic] = schemas.CONTROLLER_STATE
 
-    def chunk(self, record: Record, indexes: Mapping[int, bytes]) -> None:
-        self.guarded(record, lambda record: self._chunk(record, indexes))
-
-    def _chunk(self, record: Record, indexes: Mapping[int, bytes]) -> None:
+    def chunk(self, record: Record, indexes: Mapping[int, bytes], end: int) -> None:
+        """A chunk; its indexes, which end at `end`, say whether anything in it is needed yet."""
         self._known()
+        self._chunks.append(ChunkPlace(record.offset, end))
+        topic = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
+        if not indexes or "" in topic.values() or topics.EVENTS in topic.values():
+            guarded(self._path, record, lambda record: self._opened(record, indexes))
+            return
+        for channel, entries in indexes.items():
+            if topic[channel] == topics.JOINT_STATES and entries:
+                self._newest = int.from_bytes(entries[-16:-8], "little")
+
+    def _opened(self, record: Record, indexes: Mapping[int, bytes]) -> None:
         data = open_chunk(self._path, record)
         places = indexed(data, indexes)
         if places is None:
@@ -190,15 +184,11 @@ class _Reader:
         for channel, found in places.items():
             if channel not in self._channels:
                 raise CdrError(f"it has a message of channel {channel}, which is not declared")
-            topic, kind = self._channels[channel]
-            if kind != self._types.get(topic, kind):
-                raise CdrError(f"{topic} is not of type {self._types[topic]}")
-            if topic in self._columns:
-                self._columns[topic].add(data, found)
-            elif topic == topics.CONTACTS:
-                self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in _singly(data, found)]
-            elif topic == topics.EVENTS:
-                self._events += [_event(ns, reader) for ns, reader in _singly(data, found)]
+            topic, _ = self._channels[channel]
+            if topic == topics.EVENTS:
+                self._events += [_event(ns, reader) for ns, reader in singly(data, found)]
+            elif topic == topics.JOINT_STATES:
+                self._newest = int(found.times[-1])
 
     def _known(self) -> Contents:
         """What the file holds, once it is sure that it holds it."""
@@ -211,43 +201,32 @@ class _Reader:
 
     def recording(self, lost: str | None) -> Recording:
         """All of it, put together."""
+        known = self._known()
         there = {topic for topic, _ in self._channels.values()}
         missing = [f"{topic} ({kind})" for topic, kind in self._types.items() if topic not in there]
-        if self._contents is not None and missing:
+        if missing:
             raise BadRecording(self._path, f"is not a recording of manipcli: it lacks {', '.join(missing)}")
-        return assemble(
-            self._path,
-            self._known(),
-            self._columns,
-            contacts=tuple(self._contacts),
+        for topic, kind in self._channels.values():
+            if kind != self._types.get(topic, kind):
+                raise BadRecording(self._path, f"{topic} is not of type {self._types[topic]}")
+        if lost is not None and self._newest >= 0:
+            lost = f"{lost}; recorded until t = {self._newest / 1e9:.3f} s"
+        return Recording(
+            joint_names=known.joints,
+            body_names=known.bodies,
+            spans=FileSpans(
+                path=self._path,
+                contents=known,
+                channels={channel: topic for channel, (topic, _) in self._channels.items()},
+                chunks=tuple(self._chunks),
+                cut=lost is not None,
+            ),
             events=tuple(self._events),
             metadata=self._metadata,
             attachments=self._attachments,
             lost=lost,
+            period=known.period,
         )
-
-
-def _message_index(record: Record) -> tuple[int, bytes]:
-    """Channel, and the pairs of log time and offset as they stand."""
-    channel, length = struct.unpack_from("<HI", record.body)
-    if length != len(record.body) - 6 or length % 16:
-        raise CdrError("a message index has another length than it says")
-    return channel, record.body[6:]
-
-
-def _singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
-    """(log time [ns], reader) of each message."""
-    view = memoryview(data)
-    for ns, start, length in zip(places.times.tolist(), places.starts.tolist(), places.lengths.tolist(), strict=True):
-        yield ns, CdrReader(view[start : start + length])
-
-
-def _contacts(reader: CdrReader) -> tuple[Contact, ...]:
-    reader.header()
-    return tuple(
-        Contact(a=reader.text(), b=reader.text(), force=reader.f64(), distance=reader.f64())
-        for _ in range(reader.count(16))
-    )
 
 
 def _event(ns: int, reader: CdrReader) -> TaskEvent:

@@ -1,8 +1,15 @@
-"""A log read back: the only witness that judge, replay and report know. `read_recording` makes it."""
+"""A log read back: the only witness that judge, replay and report know.
+
+What is small is there at once; what grows with time comes span by span, so that an hour is judged in the memory of a
+minute. `read_recording` makes a recording that holds everything, `open_recording` one that reads spans from its file.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.state import Contact, WorldState
@@ -33,6 +40,14 @@ class ControllerTrace:
     position: Array
     output: Array
 
+    def map(self, change: Callable[[Array], Array]) -> ControllerTrace:
+        """The same with every array changed."""
+        return ControllerTrace(self.name, self.joints, *(change(array) for array in self.arrays))
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+        return self.times, self.reference_position, self.reference_velocity, self.position, self.output
+
 
 @dataclass(frozen=True, slots=True)
 class ContactSnapshot:
@@ -43,20 +58,133 @@ class ContactSnapshot:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
-    """Everything in one log. `states` has a leading time axis T (control ticks, from 0).
+class Span:
+    """Successive control ticks: `states` with a leading time axis T, each controller's trace on the same ticks, and
+    the changes of contacts among them."""
 
-    `metadata`: name -> key -> value; `attachments`: name -> bytes; `lost`: why the end is missing, or None.
-    `period`: [s] of a tick. Velocities of bodies are central differences of their recorded poses.
+    states: WorldState
+    controllers: tuple[ControllerTrace, ...]
+    contacts: tuple[ContactSnapshot, ...]
+
+    def since(self, time: float) -> Span:
+        """The ticks from `time` [s] on, and the contacts that hold on them."""
+        first = int(np.searchsorted(self.states.time, time))
+        valid = [k for k, snapshot in enumerate(self.contacts) if snapshot.time <= time]
+        return Span(
+            states=self.states.map(lambda a: a[first:]),
+            controllers=tuple(trace.map(lambda a: a[first:]) for trace in self.controllers),
+            contacts=self.contacts[valid[-1] if valid else 0 :],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Everything in one log.
+
+    Attributes:
+        joint_names, body_names: the order of the arrays of states.
+        spans: at least one; each follows the one before without a gap. May be gone through as often as one likes;
+            where they come from a file, that reads it again.
+        events: what happened in the task.
+        metadata: name -> key -> value.
+        attachments: name -> bytes.
+        lost: why the end is missing, or None.
+        period: [s] of a tick.
+
+    Velocities of bodies are central differences of their recorded poses.
     """
 
     joint_names: tuple[str, ...]
     body_names: tuple[str, ...]
-    states: WorldState
-    controllers: tuple[ControllerTrace, ...]
-    contacts: tuple[ContactSnapshot, ...]
+    spans: Iterable[Span]
     events: tuple[TaskEvent, ...]
     metadata: dict[str, dict[str, str]]
     attachments: dict[str, bytes]
     lost: str | None
     period: float = 0.0
+
+    def whole(self) -> Recording:
+        """The same with all ticks in one span in memory: some 1.2 kB a tick for an arm with a hand and two objects."""
+        return replace(self, spans=(self._span(),))
+
+    @property
+    def states(self) -> WorldState:
+        """The states of all control ticks, from 0."""
+        return self._span().states
+
+    @property
+    def controllers(self) -> tuple[ControllerTrace, ...]:
+        """What each controller did on all ticks."""
+        return self._span().controllers
+
+    @property
+    def contacts(self) -> tuple[ContactSnapshot, ...]:
+        """Every change of contacts."""
+        return self._span().contacts
+
+    def _span(self) -> Span:
+        match self.spans:
+            case (Span() as only,):
+                return only
+        return joined(self.spans)
+
+
+def joined(spans: Iterable[Span]) -> Span:
+    """At least one span, as one; each is let go of before the next is asked for."""
+    iterator = iter(spans)
+    first = next(iterator)
+    following = next(iterator, None)
+    if following is None:
+        return first
+    tables = [_Growing(array) for array in _arrays(first)]
+    contacts = [*first.contacts]
+    while following is not None:
+        for table, array in zip(tables, _arrays(following), strict=True):
+            table.append(array)
+        contacts += following.contacts
+        following = next(iterator, None)
+    arrays = (table.take() for table in tables)
+    return Span(
+        states=first.states.map(lambda _: next(arrays)),
+        controllers=tuple(trace.map(lambda _: next(arrays)) for trace in first.controllers),
+        contacts=tuple(contacts),
+    )
+
+
+def _arrays(span: Span) -> list[Array]:
+    """Every array of a span, states first, in the order of `map`."""
+    found: list[Array] = []
+
+    def keep(array: Array) -> Array:
+        found.append(array)
+        return array
+
+    span.states.map(keep)
+    for trace in span.controllers:
+        found += trace.arrays
+    return found
+
+
+class _Growing:
+    """A table that grows by rows, by a quarter and in place: a long recording is held once, where a list of parts and
+    their concatenation would hold it twice."""
+
+    def __init__(self, rows: Array) -> None:
+        self._table = rows.copy()
+        self._rows = len(rows)
+
+    def append(self, rows: Array) -> None:
+        end = self._rows + len(rows)
+        if end > len(self._table):
+            self._resize(max(end, len(self._table) + len(self._table) // 4))
+        self._table[self._rows : end] = rows
+        self._rows = end
+
+    def take(self) -> Array:
+        """All rows, read-only."""
+        self._resize(self._rows)
+        self._table.flags.writeable = False
+        return self._table
+
+    def _resize(self, rows: int) -> None:
+        self._table.resize((rows, *self._table.shape[1:]), refcheck=False)

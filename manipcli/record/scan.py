@@ -10,11 +10,12 @@ import os
 import stat
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
+from manipcli.record.cdr import CdrError
 from manipcli.record.container import MAGIC
 from manipcli.record.faults import BadRecording
 
@@ -34,6 +35,8 @@ _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _FOOTER = struct.Struct("<BQQQI")
 
+R = TypeVar("R")
+
 
 @dataclass(frozen=True, slots=True)
 class Record:
@@ -42,6 +45,19 @@ class Record:
     opcode: int
     offset: int
     body: bytes
+
+    @property
+    def end(self) -> int:
+        """Where the next record begins."""
+        return self.offset + _HEAD.size + len(self.body)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkPlace:
+    """Where a chunk and the message indexes behind it stand in the file."""
+
+    start: int
+    end: int
 
 
 class Scan:
@@ -124,6 +140,44 @@ def _is_finished(file: BinaryIO, size: int) -> bool:
     file.seek(size - tail)
     end = file.read(tail)
     return end.endswith(MAGIC) and end.startswith(_HEAD.pack(FOOTER, 20))
+
+
+def records_at(path: Path, file: BinaryIO, place: ChunkPlace) -> Iterator[Record]:
+    """A chunk and its indexes once more, from a file that was scanned before.
+
+    Raises:
+        BadRecording: they are not there any more.
+    """
+    file.seek(place.start)
+    offset = place.start
+    while offset < place.end:
+        head = file.read(_HEAD.size)
+        opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
+        body = file.read(length) if length <= place.end - offset - _HEAD.size else b""
+        if len(head) < _HEAD.size or len(body) < length or (opcode == CHUNK) != (offset == place.start):
+            raise BadRecording(path, "changed while it was read")
+        record = Record(opcode, offset, body)
+        yield record
+        offset = record.end
+
+
+def guarded(path: Path, record: Record, read: Callable[[Record], R]) -> R:
+    """What `read` makes of a record; what it stumbles over becomes an error that says where."""
+    from mcap.exceptions import McapError
+
+    try:
+        return read(record)
+    except (McapError, CdrError, struct.error, UnicodeDecodeError) as error:
+        cause = f": {error}" if isinstance(error, CdrError) else ""
+        raise BadRecording(path, f"the record at byte {record.offset} is damaged{cause}") from error
+
+
+def message_index(record: Record) -> tuple[int, bytes]:
+    """Channel, and the pairs of log time and offset as they stand."""
+    channel, length = struct.unpack_from("<HI", record.body)
+    if length != len(record.body) - 6 or length % 16:
+        raise CdrError("a message index has another length than it says")
+    return channel, record.body[6:]
 
 
 def open_chunk(path: Path, record: Record) -> bytes:

@@ -17,7 +17,7 @@ from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.model.build_scene import build_scene
 from manipcli.model.robot import Group, Joint, JointLimits, Link, RobotModel
 from manipcli.model.state import Contact, WorldState
-from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, TaskEvent
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
 from manipcli.spec.base import Model
 from manipcli.spec.task import BodySpec, TaskSpec
 
@@ -80,9 +80,7 @@ def recording(**changes: Any) -> Recording:
     made = Recording(
         joint_names=("j1", "slide"),
         body_names=("ball", "cube"),
-        states=states,
-        controllers=(trace,),
-        contacts=(ContactSnapshot(0.0, (Contact("cube", "desk", 9.81, -1e-5),)),),
+        spans=(Span(states, (trace,), (ContactSnapshot(0.0, (Contact("cube", "desk", 9.81, -1e-5),)),)),),
         events=(*step("go", 0.0, 1.0), *step("wait_1", 1.0, 2.0)),
         metadata={
             "run": {
@@ -97,7 +95,14 @@ def recording(**changes: Any) -> Recording:
         attachments={"plan.json": json.dumps(plan).encode()},
         lost=None,
     )
-    return replace(made, **changes)
+    return changed(made, **changes)
+
+
+def changed(made: Recording, **changes: Any) -> Recording:
+    """The recording with other fields, of its own or of its one span."""
+    (span,) = made.spans
+    within = {name: changes.pop(name) for name in ("states", "controllers", "contacts") if name in changes}
+    return replace(made, spans=(replace(span, **within),), **changes)
 
 
 def _planned(name: str) -> dict[str, object]:
@@ -132,7 +137,7 @@ def moved(body: int, from_tick: int, by: tuple[float, float, float], to_tick: in
     made = recording()
     position = made.states.body_position.copy()
     position[from_tick:to_tick, body] += by
-    return replace(made, states=replace(made.states, body_position=position))
+    return changed(made, states=replace(made.states, body_position=position))
 
 
 def test_a_task_without_expectations_passes_when_its_steps_are_done_and_says_so() -> None:
@@ -181,13 +186,13 @@ def test_what_holds_at_the_end_must_have_held_for_half_a_second() -> None:
 
 def test_a_recording_shorter_than_the_window_is_judged_whole() -> None:
     made = recording()
-    short = replace(made, states=WorldState(**{f: getattr(made.states, f)[:3] for f in WorldState.__slots__}))
+    short = changed(made, states=made.states.map(lambda a: a[:3]))
     assert one(short, "at_rest", object="cube").outcome == "passed"
 
 
 def test_bodies_and_joints_are_matched_by_name() -> None:
     made = recording()
-    swapped = replace(
+    swapped = changed(
         made,
         body_names=("cube", "ball"),
         states=replace(made.states, body_position=made.states.body_position[:, ::-1].copy()),
@@ -211,7 +216,7 @@ def test_tracking_names_the_worst_joint_its_unit_and_its_moment(column: int) -> 
     position = trace.position.copy()
     position[70, column] = -0.08
     position[90, 1 - column] = 0.06
-    found = one(replace(made, controllers=(replace(trace, position=position),)), "tracking", group="all", within=0.05)
+    found = one(changed(made, controllers=(replace(trace, position=position),)), "tracking", group="all", within=0.05)
     assert found.outcome == "failed"
     assert found.margin == pytest.approx(-0.03)
     assert found.at == pytest.approx(0.7)
@@ -260,7 +265,7 @@ def test_without_physics_nothing_that_moves_by_physics_is_evaluated_and_the_verd
 
 def test_a_recording_without_states_evaluates_nothing() -> None:
     made = recording()
-    empty = replace(made, states=WorldState(**{f: getattr(made.states, f)[:0] for f in WorldState.__slots__}))
+    empty = changed(made, states=made.states.map(lambda a: a[:0]))
     verdict = judged(empty, ("duration", {"below": 60}), ("near", {"object": "cube", "to": "start", "within": 1}))
     assert [e.outcome for e in verdict.expectations] == ["not_evaluated", "not_evaluated"]
     assert verdict.verdict == "failed"
@@ -325,6 +330,63 @@ def test_a_run_that_physics_ended_is_failed_and_not_an_error() -> None:
     events = (*step("go", 0.0, 1.0), *step("wait_1", 1.0, 1.5, "failed", "'cube' explodes at t = 1.500 s"))
     verdict = judged(recording(events=events, metadata=run(status="failed")))
     assert (verdict.verdict, verdict.errors) == ("failed", ())
+
+
+@pytest.mark.parametrize("length", [1, 7, 50, 51, 200])
+def test_a_recording_is_judged_the_same_in_spans_of_any_length(length: int) -> None:
+    """Bodies move all the time, and every kind of expectation has its worst moment somewhere else."""
+    made = moved(1, 160, (0.0, 0.015, 0.0), 170)
+    trace = made.controllers[0]
+    position = trace.position.copy()
+    position[70, 1] = -0.04
+    touching = touches((0.2, "desk", "robot/one", 2.0), (0.9, "desk", "robot/finger", 5.0)).contacts
+    made = changed(made, controllers=(replace(trace, position=position),), contacts=touching)
+    cut = replace(made, spans=[_ticks(made, k, k + length) for k in range(0, T, length)])
+    expect: tuple[tuple[str, dict[str, Any]], ...] = (
+        ("near", {"object": "cube", "to": "start", "within": 0.02}),
+        ("at_rest", {"object": "ball"}),
+        ("tracking", {"group": "all", "within": 0.05}),
+        ("no_collision", {"pairs": [["robot", "desk"]], "below": 10}),
+        ("duration", {"below": 60}),
+        ("step_done", {"step": "go"}),
+    )
+    assert judged(cut, *expect) == judged(made, *expect)
+    assert [e.at for e in judged(cut, *expect).expectations[:4]] == pytest.approx([1.6, 1.5, 0.7, 0.9])
+
+
+def _ticks(made: Recording, start: int, end: int) -> Span:
+    (span,) = made.spans
+    times = span.states.time[start:end]
+    return Span(
+        span.states.map(lambda a: a[start:end]),
+        tuple(trace.map(lambda a: a[start:end]) for trace in span.controllers),
+        tuple(c for c in span.contacts if times[0] <= c.time <= times[-1]),
+    )
+
+
+def test_a_span_since_a_moment_keeps_the_contacts_that_hold_then() -> None:
+    span = _ticks(touches((0.2, "a", "b", 1.0), (0.5, "a", "b", 2.0), (0.8, "a", "b", 3.0)), 0, T)
+    cut = span.since(0.6)
+    assert cut.states.time[0] == pytest.approx(0.6)
+    assert len(cut.controllers[0].times) == len(cut.states.time)
+    assert [snapshot.contacts[0].force for snapshot in cut.contacts] == [2.0, 3.0]
+    assert [snapshot.time for snapshot in span.since(0.1).contacts] == [0.2, 0.5, 0.8]
+
+
+def test_spans_are_gone_through_once_whatever_is_asked() -> None:
+    """A file of an hour is read once."""
+
+    class Counted:
+        times = 0
+
+        def __iter__(self) -> Any:
+            self.times += 1
+            return iter(recording().spans)
+
+    spans = Counted()
+    judged(replace(recording(), spans=spans), ("duration", {"below": 60}), ("tracking", {"group": "all", "within": 1}))
+    judged(replace(recording(), spans=spans, body_names=("ball",)))
+    assert spans.times == 2
 
 
 def test_the_same_recording_gives_the_same_verdict() -> None:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvaluated
+from manipcli.judge.expectation import Evidence, Expectation, Measured
+from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Time
 
@@ -17,15 +18,12 @@ class DurationSpec(Model):
     below: Annotated[Time, Field(gt=0)] = Field(description="Longest simulated time [s].")
 
 
-def evaluate(spec: DurationSpec, evidence: Evidence) -> Measured | NotEvaluated:
+def evaluate(spec: DurationSpec, evidence: Evidence, span: Span) -> Measured:
     """`below` minus the time of the last recorded state [s]."""
-    times = evidence.recording.states.time
-    if times.size == 0:
-        return NotEvaluated("the recording holds no state", "s")
-    end = float(times[-1])
+    end = float(span.states.time[-1])
     return Measured(margin=spec.below - end, unit="s", at=end, text=f"{end:.3f} s of {spec.below:g} s")
 
 
 DURATION = Expectation(
-    name="duration", spec=DurationSpec, evaluate=evaluate, check=lambda spec, robot, scene, steps: ()
+    name="duration", spec=DurationSpec, scope="end", evaluate=evaluate, check=lambda spec, robot, scene, steps: ()
 )

@@ -11,6 +11,7 @@ from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvalu
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
 
@@ -28,7 +29,7 @@ class NoCollisionSpec(Model):
     )
 
 
-def evaluate(spec: NoCollisionSpec, evidence: Evidence) -> Measured | NotEvaluated:
+def evaluate(spec: NoCollisionSpec, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
     """`below` minus the largest normal force [N] between any of the pairs, at any time.
 
     A pair that never pressed has the margin `below`: 0 N to spare when any touch counts, which still passes.
@@ -36,7 +37,7 @@ def evaluate(spec: NoCollisionSpec, evidence: Evidence) -> Measured | NotEvaluat
     if not evidence.physics:
         return NotEvaluated("the engine has no physics, so nothing can touch", "N")
     force, at, text = 0.0, None, "never touched"
-    for snapshot in evidence.recording.contacts:
+    for snapshot in span.contacts:
         for contact in snapshot.contacts:
             if contact.force > force and any(_matches(pair, contact.a, contact.b) for pair in spec.pairs):
                 force, at = contact.force, snapshot.time
@@ -67,4 +68,4 @@ def check(spec: NoCollisionSpec, robot: RobotModel, scene: Scene, steps: tuple[s
     return tuple(problems)
 
 
-NO_COLLISION = Expectation(name="no_collision", spec=NoCollisionSpec, evaluate=evaluate, check=check)
+NO_COLLISION = Expectation(name="no_collision", spec=NoCollisionSpec, scope="always", evaluate=evaluate, check=check)

@@ -9,6 +9,7 @@ from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvalu
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 
 
@@ -18,7 +19,7 @@ class StepDoneSpec(Model):
     step: str = Field(description="Id of a step of the task.")
 
 
-def evaluate(spec: StepDoneSpec, evidence: Evidence) -> Measured | NotEvaluated:
+def evaluate(spec: StepDoneSpec, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
     """1 when the step is done, -1 otherwise; there is no half a step."""
     for step in evidence.steps:
         if step.id == spec.step:
@@ -34,4 +35,4 @@ def check(spec: StepDoneSpec, robot: RobotModel, scene: Scene, steps: tuple[str,
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, steps)),)
 
 
-STEP_DONE = Expectation(name="step_done", spec=StepDoneSpec, evaluate=evaluate, check=check)
+STEP_DONE = Expectation(name="step_done", spec=StepDoneSpec, scope="end", evaluate=evaluate, check=check)

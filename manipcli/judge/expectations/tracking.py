@@ -12,6 +12,7 @@ from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvalu
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue
 
@@ -23,14 +24,14 @@ class TrackingSpec(Model):
     within: Annotated[JointValue, Field(gt=0)] = Field(description="Largest difference of a joint [rad or m].")
 
 
-def evaluate(spec: TrackingSpec, evidence: Evidence) -> Measured | NotEvaluated:
+def evaluate(spec: TrackingSpec, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
     """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of joints and run."""
     robot = evidence.world.robot
     found: Measured | None = None
     for name in robot.group(spec.group).joints:
         unit = "m" if robot.joint(name).type == "prismatic" else "rad"
-        trace = next((trace for trace in evidence.recording.controllers if name in trace.joints), None)
-        if trace is None or trace.times.size == 0:
+        trace = next((trace for trace in span.controllers if name in trace.joints), None)
+        if trace is None:
             return NotEvaluated(f"the recording holds no reference of joint '{name}'", unit)
         k = trace.joints.index(name)
         margins = spec.within - np.abs(trace.reference_position[:, k] - trace.position[:, k])
@@ -51,4 +52,4 @@ def check(spec: TrackingSpec, robot: RobotModel, scene: Scene, steps: tuple[str,
     return (Problem(("group",), message, did_you_mean(spec.group, groups)),)
 
 
-TRACKING = Expectation(name="tracking", spec=TrackingSpec, evaluate=evaluate, check=check)
+TRACKING = Expectation(name="tracking", spec=TrackingSpec, scope="always", evaluate=evaluate, check=check)

@@ -1,0 +1,190 @@
+"""The spans of a recording, read from its file chunk by chunk whenever somebody goes through them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.state import Contact, WorldState
+from manipcli.record import channels as topics
+from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.channels import ControllerChannel
+from manipcli.record.columns import (
+    Columns,
+    Places,
+    body_layout,
+    controller_state_layout,
+    indexed,
+    joint_state_layout,
+    singly,
+    walked,
+)
+from manipcli.record.contents import Contents
+from manipcli.record.differences import body_velocities
+from manipcli.record.faults import BadRecording
+from manipcli.record.messages import WORLD
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
+from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, records_at
+
+
+@dataclass(frozen=True, slots=True)
+class FileSpans:
+    """An iterable of the spans in a file; never more of them than three are in memory.
+
+    Attributes:
+        path: the file.
+        contents: what it says it holds.
+        channels: channel id -> topic.
+        chunks: where its chunks stand.
+        cut: whether its end is missing, so that messages of the last tick may be, too.
+    """
+
+    path: Path
+    contents: Contents
+    channels: Mapping[int, str]
+    chunks: tuple[ChunkPlace, ...]
+    cut: bool
+
+    def __iter__(self) -> Iterator[Span]:
+        """
+        Raises:
+            BadRecording: a chunk is damaged, the parts contradict each other, or time runs backwards.
+        """
+        before: Span | None = None
+        span: Span | None = None
+        for after in self._without_velocities():
+            if span is not None:
+                yield _with_velocities(before, span, after)
+            before, span = span, after
+        assert span is not None, "there is one span at least"
+        yield _with_velocities(before, span, None)
+
+    def _without_velocities(self) -> Iterator[Span]:
+        reader = _SpanReader(self.contents, self.channels)
+        empty = True
+        try:
+            with self.path.open("rb") as file:
+                for place in self.chunks:
+                    span = self._chunk(file, place, reader)
+                    if span is not None:
+                        empty = False
+                        yield span
+        except OSError as error:
+            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+        if reader.waiting and not self.cut:
+            raise BadRecording(self.path, "joints, bodies and controllers are not recorded at the same times")
+        if empty:
+            yield reader.span(0)
+
+    def _chunk(self, file: BinaryIO, place: ChunkPlace, reader: _SpanReader) -> Span | None:
+        chunk, *indexes = records_at(self.path, file, place)
+
+        def read(record: Record) -> Span | None:
+            data = open_chunk(self.path, record)
+            found = indexed(data, dict(message_index(index) for index in indexes))
+            # No indexes that account for every byte: they were cut off, or another tool wrote the file.
+            reader.add(data, walked(data)[0] if found is None else found)
+            return reader.span(reader.ready) if reader.ready else None
+
+        return guarded(self.path, chunk, read)
+
+
+class _SpanReader:
+    """Gathers the messages of successive chunks, and gives them out once a tick is complete."""
+
+    def __init__(self, contents: Contents, channels: Mapping[int, str]) -> None:
+        n, m = len(contents.joints), len(contents.bodies)
+        self._channels = channels
+        self._controllers = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
+        self._columns = {
+            topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_layout, contents.joints, (n,) * 3),
+            topics.TF: Columns(topics.TF, body_layout(frozenset(contents.bodies), WORLD), contents.bodies, (7,) * m),
+        }
+        for controller in self._controllers:
+            topic, widths = controller.state_topic, (len(controller.joints),) * 4
+            self._columns[topic] = Columns(topic, controller_state_layout, controller.joints, widths)
+        self._contacts: list[ContactSnapshot] = []
+
+    @property
+    def ready(self) -> int:
+        """Ticks of which every message is there."""
+        return min(len(columns) for columns in self._columns.values())
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there are messages of a tick that is not complete."""
+        return any(len(columns) for columns in self._columns.values())
+
+    def add(self, data: bytes, places: Mapping[int, Places]) -> None:
+        for channel, found in places.items():
+            if channel not in self._channels:
+                raise CdrError(f"it has a message of channel {channel}, which is not declared")
+            topic = self._channels[channel]
+            if topic in self._columns:
+                self._columns[topic].add(data, found)
+            elif topic == topics.CONTACTS:
+                self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
+
+    def span(self, ticks: int) -> Span:
+        """The next `ticks`, with velocities of bodies left at zero; with 0 ticks, all contacts."""
+        ns, (position, velocity, effort) = self._columns[topics.JOINT_STATES].take(ticks)
+        body_ns, poses = self._columns[topics.TF].take(ticks)
+        taken = [self._columns[controller.state_topic].take(ticks) for controller in self._controllers]
+        for times in (body_ns, *(times for times, _ in taken)):
+            if not np.array_equal(ns, times):
+                raise CdrError("joints, bodies and controllers are not recorded at the same times")
+        time = _settled(ns / 1e9)
+        bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
+        zeros = np.zeros_like(bodies[..., :3])
+        states = WorldState(time, position, velocity, effort, bodies[..., :3], bodies[..., 3:], zeros, zeros)
+        return Span(
+            states=states.map(_settled),
+            controllers=tuple(
+                ControllerTrace(controller.name, controller.joints, time, *map(_settled, runs))
+                for controller, (_, runs) in zip(self._controllers, taken, strict=True)
+            ),
+            contacts=self._contacts_until(time[-1] if ticks else np.inf),
+        )
+
+    def _contacts_until(self, time: float) -> tuple[ContactSnapshot, ...]:
+        now = tuple(snapshot for snapshot in self._contacts if snapshot.time <= time)
+        self._contacts = [snapshot for snapshot in self._contacts if snapshot.time > time]
+        return now
+
+
+def _with_velocities(before: Span | None, span: Span, after: Span | None) -> Span:
+    """The span with velocities of its bodies, for which the ticks next to it are needed."""
+    near = [span.states]
+    if before is not None:
+        near.insert(0, before.states.map(lambda a: a[-1:]))
+    if after is not None:
+        near.append(after.states.map(lambda a: a[:1]))
+    linear, angular = body_velocities(
+        np.concatenate([states.time for states in near]),
+        np.concatenate([states.body_position for states in near]),
+        np.concatenate([states.body_quat_xyzw for states in near]),
+    )
+    first = 0 if before is None else 1
+    mine = slice(first, first + len(span.states.time))
+    states = replace(span.states, body_linear=_settled(linear[mine]), body_angular=_settled(angular[mine]))
+    return replace(span, states=states)
+
+
+def _contacts(reader: CdrReader) -> tuple[Contact, ...]:
+    reader.header()
+    return tuple(
+        Contact(a=reader.text(), b=reader.text(), force=reader.f64(), distance=reader.f64())
+        for _ in range(reader.count(16))
+    )
+
+
+def _settled(values: Array) -> Array:
+    """Contiguous and read-only."""
+    array = np.ascontiguousarray(values)
+    array.flags.writeable = False
+    return array
