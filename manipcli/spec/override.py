@@ -115,7 +115,7 @@ def _set(node: Node, override: Override, done: Path, rest: tuple[str, ...], mode
         raise _nowhere(override, f"'{dotted(done)}' is {shown(node)}, which has no '{escape(part)}' in it", None)
     entry = node.entries.get(part)
     if entry is None:
-        if further:
+        if further or done == ("params",):  # a new parameter would change nothing: nobody asks for it
             _may_be_added(node, override, done, part, model)
         entry = Entry(override.place, MappingNode({}, override.place))
     below = _set(entry.node, override, (*done, part), further, model)

@@ -158,6 +158,7 @@ class ConditionSpec(KeyedSpec):
 
 
 _ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+_NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 
 
 class StepSpec(KeyedSpec):
@@ -191,6 +192,15 @@ class TaskSpec(Model):
     start: str | None = Field(None, description="The named pose that the robot starts in. Default: all joints at 0.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ConditionSpec, ...] = Field((), description="What must hold at the end, or over the run.")
+
+    @field_validator("task", mode="after")
+    @classmethod
+    def _file_name(cls, name: str) -> str:
+        """The name is that of a file, too, on every system, and must not lead elsewhere."""
+        if not _NAME.fullmatch(name):
+            hint = "a task is called by letters, digits, '_', '-', '+', '.' and spaces inside, 100 at most"
+            raise problem("conflict", f"{name[:100]!r} cannot be the name of a task: it names its log", hint=hint)
+        return name
 
     @field_validator("steps", mode="after")
     @classmethod

@@ -364,6 +364,16 @@ def test_all_findings_of_a_file_are_told_at_once_in_its_order() -> None:
     ]
 
 
+@pytest.mark.parametrize("name", ["../../escape", "a/b", ".", "..", ".hidden", "a ", "", "x\\ty", "n" * 101, "a\\\\b"])
+def test_a_task_cannot_be_called_what_no_file_can(name: str) -> None:
+    assert str(only(TASK.replace("task: pour", f'task: "{name}"'))).startswith("t.yaml:1:7: error[")
+
+
+@pytest.mark.parametrize("name", ["pour", "pour 2", "v1.2-beta+x", "茶碗", "p", "n" * 100])
+def test_a_task_is_called_what_a_file_can(name: str) -> None:
+    assert load(TASK.replace("task: pour", f'task: "{name}"')).spec.task == name
+
+
 def test_a_generated_id_gives_way_to_a_given_one() -> None:
     spec = load(TASK.replace("id: last", "id: wait_2")).spec
     assert [step.id for step in spec.steps] == ["move_1", "pour_1", "wait_2", "wait_3"]
@@ -472,6 +482,7 @@ def test_an_override_sets_any_field(override: str, path: str, value: object) -> 
         ("scene.cup.mas=80 g", "--set scene.cup.mas=80 g: error[TASK201]: scene.cup: unknown key 'mas'", "'mass'"),
         ("scene.cup.mass=80 mm", "--set scene.cup.mass=80 mm: error[TASK207]: scene.cup.mass: '80 mm' is a length", ""),
         ("scene.cap.mass=1", "--set scene.cap.mass=1: error[TASK212]: there is no 'cap' in 'scene'", "'cup'"),
+        ("params.tlit=1", "--set params.tlit=1: error[TASK212]: there is no 'tlit' in 'params'", "'tilt'"),
         ("scnee.cup.mass=1", "--set scnee.cup.mass=1: error[TASK212]: there is no 'scnee' at the top", "'scene'"),
         ("simulation.sed.x=1", "--set simulation.sed.x=1: error[TASK212]: there is no 'sed' in 'simulation'", "'seed'"),
         ("steps.9.pour=3", "--set steps.9.pour=3: error[TASK212]: there is no item '9': 'steps' has 4 items", "last"),
@@ -512,7 +523,7 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=1
 
 
 @given(
-    name=TEXTS,
+    name=st.from_regex(r"\w[\w .+-]{0,10}\w", fullmatch=True),
     description=TEXTS,
     body=TEXTS,
     mass=st.floats(1e-300, 1e300),
