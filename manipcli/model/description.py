@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +24,11 @@ class Description:
 
 
 def read_description(
-    path: Path, *, packages: Packages, arguments: Mapping[str, str | int | float | bool] = {}
+    path: Path,
+    *,
+    packages: Packages,
+    arguments: Mapping[str, str | int | float | bool] = {},
+    allow_env: Collection[str] = (),
 ) -> Description:
     """Reads and expands a description.
 
@@ -32,6 +36,7 @@ def read_description(
         path: URDF or xacro; xacro is told by its name or by the namespace on its root element.
         packages: finds the packages and files it names.
         arguments: for `<xacro:arg>`.
+        allow_env: environment variables that `$(env NAME)` and `$(optenv NAME)` may read.
 
     Raises:
         InvalidInput: with file, line and column.
@@ -43,7 +48,8 @@ def read_description(
     if path.suffix == ".xacro" or declared:
         from manipcli.model.xacro import expand
 
-        document, findings = expand(path, {name: argument_text(value) for name, value in arguments.items()}, packages)
+        words = {name: argument_text(value) for name, value in arguments.items()}
+        document, findings = expand(path, words, packages, allow_env=allow_env)
     elif arguments:
         names = ", ".join(arguments)
         raise invalid("XACRO003", f"'{path.name}' is plain URDF and has no arguments; given: {names}")

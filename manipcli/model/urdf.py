@@ -47,7 +47,7 @@ def read_parts(description: Description) -> Parts:
     places: dict[tuple[str, str], Place] = {}
     name = root.attributes.get("name", "").strip()
     if not name:
-        reader.report("URDF003", "<robot> has no attribute 'name'", root.place, severity="warning")
+        reader.report("URDF050", "<robot> has no attribute 'name'", root.place, severity="warning")
     links_by_name = _named(reader, root, "link", places)
     joints_by_name = _named(reader, root, "joint", places)
     if not links_by_name:

@@ -7,9 +7,10 @@ files, evaluating expressions and `$(...)`, loading YAML, warnings. The module t
 from __future__ import annotations
 
 import importlib.util
+import os
 import threading
 import xml.dom.minidom
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -28,13 +29,16 @@ MAX_INCLUDE_DEPTH = 32
 _loading = threading.Lock()
 
 
-def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> tuple[Document, tuple[Finding, ...]]:
+def expand(
+    path: Path, arguments: Mapping[str, str], packages: Packages, *, allow_env: Collection[str] = ()
+) -> tuple[Document, tuple[Finding, ...]]:
     """The document of a xacro file with everything expanded; its elements know where they were written.
 
     Args:
         path: the file.
         arguments: values of `<xacro:arg>`.
         packages: finds what it includes.
+        allow_env: environment variables that it may read.
 
     Returns:
         The document and the warnings that the description itself or the expansion gave.
@@ -42,7 +46,7 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> tupl
     Raises:
         InvalidInput: with the place of the innermost element that was being expanded, and the macros around it.
     """
-    return _Expansion(packages).run(path, arguments)
+    return _Expansion(packages, frozenset(allow_env)).run(path, arguments)
 
 
 def _private_module() -> ModuleType:
@@ -64,8 +68,9 @@ def _private_module() -> ModuleType:
 class _Expansion:
     """The doors of one private module, and what they count."""
 
-    def __init__(self, packages: Packages) -> None:
+    def __init__(self, packages: Packages, allow_env: frozenset[str]) -> None:
         self._packages = packages
+        self._allow_env = allow_env
         self._module = _private_module()
         self._evaluate = Evaluator()
         self._findings: list[Finding] = []
@@ -231,9 +236,24 @@ class _Expansion:
             names["arg"] = lambda name: _typed(self._argument(name))
             names["find"] = lambda name: str(self._packages.root(name))
             return str(self._evaluate(rest, names))
-        if command in {"env", "optenv", "command", "cwd", "anon"}:
+        if command in {"env", "optenv"}:
+            return self._environment(command, rest)
+        if command in {"command", "cwd", "anon"}:
             raise Refused(f"$({command} ...) is not allowed in a description; pass an argument ($(arg NAME)) instead")
         raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
+
+    def _environment(self, command: str, rest: str) -> str:
+        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
+        name, _, default = rest.partition(" ")
+        if name not in self._allow_env:
+            raise Refused(
+                f"$({command} {name}): a description may not read the environment; allow it with "
+                f"--allow-env {name}, or pass an argument ($(arg NAME)) instead"
+            )
+        value = os.environ.get(name)
+        if value is None and command == "env":
+            raise NameError(f"environment variable '{name}' is not set")
+        return default.strip() if value is None else value
 
     def _arguments(self) -> dict[str, str]:
         found: dict[str, str] = self._module.substitution_args_context["arg"]
