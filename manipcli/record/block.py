@@ -15,12 +15,13 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
+from manipcli.record.actuators import ActuatorSide
 from manipcli.record.channels import Channel, ControllerChannel
 from manipcli.record.messages import WORLD
 from manipcli.record.rows import RowBlock, Times, controller_state_template, joint_state_template, tf_template
 
 PLOT_PERIOD = 0.01
-"""[s] between two messages of the topics that only serve viewers (reference, error)."""
+"""[s] between two messages of the topics that only serve viewers (reference, error, actuators)."""
 
 Index = npt.NDArray[np.uint64]
 Places = npt.NDArray[np.intp]
@@ -93,11 +94,15 @@ class Block:
         self._controllers = [_ControllerRows(controller, robot, capacity) for controller in controllers]
         frames = [(joint.parent, joint.child) for joint in joints] + [(WORLD, body.name) for body in bodies]
         states = [controller_state_template(ids[c.state_topic], c.joints, c.interface) for c in controllers]
+        self._actuators = ActuatorSide(robot)
         plots = [
             joint_state_template(ids[topic], c.joints, effort=False)
             for c in controllers
             for topic in (c.reference_topic, c.error_topic)
         ]
+        if self._actuators.names:
+            turned = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
+            plots.append(turned)
         measured = joint_state_template(ids[topics.JOINT_STATES], robot.joint_names, effort=True)
         self._fast = RowBlock([measured, tf_template(ids[topics.TF], frames), *states], capacity)
         self._slow = RowBlock(plots, capacity)
@@ -141,6 +146,8 @@ class Block:
             state, plots = rows.values(position, velocity, effort)
             fast += state
             slow += [values[plotted] for values in plots]
+        if self._actuators.names:
+            slow += self._actuators.values(position[plotted], velocity[plotted], effort[plotted])
         self._fast.fill(times, self._fast_written + 1, fast)
         self._slow.fill(times[plotted], self._slow_written + 1, slow)
         self._fast_written += T

@@ -12,6 +12,7 @@ ROBOT_DESCRIPTION = "/robot_description"
 TF_STATIC = "/tf_static"
 TF = "/tf"
 JOINT_STATES = "/joint_states"
+ACTUATOR_STATES = "/actuator_states"
 CONTACTS = "/contacts"
 EVENTS = "/task/events"
 ROSOUT = "/rosout"
@@ -69,6 +70,7 @@ def channel_table(controllers: Sequence[ControllerChannel]) -> tuple[Channel, ..
         (CONTACTS, schemas.CONTACTS, False),
         (EVENTS, schemas.TASK_EVENT, False),
         (ROSOUT, schemas.LOG, False),
+        (ACTUATOR_STATES, schemas.JOINT_STATE, False),
     ]
     for controller in controllers:
         rows += [

@@ -11,7 +11,19 @@ import pytest
 
 from manipcli.control.controller import ControllerOutput
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.robot import Box, Cylinder, Geometry, Joint, JointLimits, Link, Mesh, Mimic, RobotModel, Sphere
+from manipcli.model.robot import (
+    Box,
+    Cylinder,
+    Geometry,
+    Joint,
+    JointLimits,
+    Link,
+    Mesh,
+    Mimic,
+    RobotModel,
+    Sphere,
+    TransmissionTag,
+)
 from manipcli.model.scene import Body, Frame, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
@@ -41,7 +53,12 @@ def _robot() -> RobotModel:
     )
     links = tuple(Link(name, None, (), ()) for name in names)
     X_WB = Transform.of(xyz=(0.0, 0.0, 0.5), rpy=(0.0, 0.0, 0.4))
-    return RobotModel("testbot", "base", links, joints, (), (), (), X_WB, "<robot name='testbot'>é</robot>")
+    transmissions = (
+        TransmissionTag("arm", "SimpleTransmission", ("slide",), (-50.0,), (0.2,), ("slide_motor",), (2.0,)),
+        TransmissionTag("turn", "SimpleTransmission", ("shoulder",), (3.0,), (0.0,), (), ()),
+        TransmissionTag("two", "Differential", ("spin", "copy"), (1.0, 1.0), (0.0, 0.0), ("a", "b"), (1.0, 1.0)),
+    )
+    return RobotModel("testbot", "base", links, joints, (), (), transmissions, X_WB, "<robot name='testbot'>é</robot>")
 
 
 def _body(name: str, *geometries: Geometry, fixed: bool = False) -> Body:

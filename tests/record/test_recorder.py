@@ -115,6 +115,22 @@ def test_every_message_decodes_to_what_was_put_in(log: tuple[Any, Path]) -> None
     )
 
 
+def test_actuators_stand_on_the_other_side_of_their_transmissions(log: tuple[Any, Path]) -> None:
+    """Position and velocity grow by the reduction (-50 at the joint times 2 at the actuator), power is kept."""
+    run, path = log
+    states = decoded(path)["/actuator_states"]
+    assert [time for time, _ in states] == [k * 10_000_000 for k in range(-(-T // 10))]
+    # A transmission whose actuator has no name lends it its own; one of two joints is not simple.
+    assert states[0][1].name == ["slide_motor", "turn"]
+    position, velocity, effort = (
+        np.array([getattr(message, field) for _, message in states]) for field in ("position", "velocity", "effort")
+    )
+    s, joints = run.states, [1, 0]
+    np.testing.assert_allclose(position, (s.position[::10, joints] - (0.2, 0.0)) * (-100.0, 3.0), rtol=1e-14)
+    np.testing.assert_allclose(velocity, s.velocity[::10, joints] * (-100.0, 3.0), rtol=1e-14)
+    np.testing.assert_allclose(velocity * effort, (s.velocity * s.effort)[::10, joints], rtol=1e-14)
+
+
 def test_tf_holds_moving_links_by_forward_kinematics_and_bodies_as_given(log: tuple[Any, Path]) -> None:
     run, path = log
     topics = decoded(path)
