@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Array, frozen
+from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
+from manipcli.plan.hand import with_mimics
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
@@ -100,10 +101,7 @@ def start_position(task: Task) -> Array:
     if chosen is not None:
         pose = robot.pose(chosen)
         q[robot.indices(pose.joints)] = pose.positions
-    for k, joint in enumerate(robot.moving_joints):
-        if joint.mimic is not None:
-            q[k] = joint.mimic.multiplier * q[robot.joint_names.index(joint.mimic.joint)] + joint.mimic.offset
-    return frozen(q)
+    return with_mimics(robot, q)
 
 
 def _steps(task: Task, planner: Planner, situation: Situation) -> Iterator[PlannedStep]:

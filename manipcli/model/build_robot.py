@@ -13,7 +13,7 @@ from manipcli.model.description import Description, read_description
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
 from manipcli.model.packages import NotFound, Packages, Unread
-from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
+from manipcli.model.robot import Group, Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
 from manipcli.model.urdf import Parts, read_parts
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
 
@@ -113,7 +113,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
     moving = {joint.name: joint for joint in joints if joint.moves}
     groups = build_groups(reporter, spec, links, joints)
     poses = build_poses(reporter, spec, groups, moving)
-    tool = _tool(reporter, spec, links)
+    tool = _tool(reporter, spec, groups, links)
     for k, pair in enumerate(spec.collision_ignore):
         for name in pair:
             _known_link(reporter, name, links, ("collision_ignore", k))
@@ -301,7 +301,11 @@ def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) 
     return name in names
 
 
-def _tool(reporter: Reporter, spec: RobotSpec, links: Sequence[Link]) -> Tool | None:
-    if spec.tool is None or not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
+def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: Sequence[Link]) -> Tool | None:
+    """The tool as written, else the tip of the first group, else none."""
+    if spec.tool is None:
+        tip = groups[0].tip if groups else None
+        return None if tip is None else Tool(link=tip, X_LT=Transform.identity())
+    if not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
         return None
     return Tool(link=spec.tool.link, X_LT=transform(spec.tool.pose))

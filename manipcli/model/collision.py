@@ -1,11 +1,11 @@
 """Does the robot touch itself or the scene? Exact for primitive shapes, convex hulls for meshes (conservative).
 
-`CollisionChecker(kinematics, scene)` holds the shapes; `checker.at(...)` fixes a situation (where the bodies stand,
-what the robot carries, which contacts are allowed), and that answers for as many joint positions as wanted:
+`CollisionChecker(kinematics, scene)` holds the shapes; `checker.at(...)` fixes where the bodies stand, what the robot
+carries and which contacts are allowed, and that `CollisionQuery` answers for as many joint positions as wanted:
 
-    situation = checker.at(poses, carried=Carried("cup", link="palm", X_LO=X_LO), ignore=pairs(hand_links, "cup"))
-    hit = situation.check(q)                                 # CollisionHit | None
-    hit = situation.check_trajectory(columns, q, times, positions)
+    query = checker.at(poses, carried=Carried("cup", link="palm", X_LO=X_LO), ignore=pairs(hand_links, "cup"))
+    hit = query.check(q)                                 # CollisionHit | None
+    hit = query.check_trajectory(columns, q, times, positions)
 
 Parts are named as contacts are: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
 link and is checked against the scene and the other links. Never checked: links that no moving joint, or only one,
@@ -100,7 +100,9 @@ class CollisionChecker:
         carried: Carried | None = None,
         ignore: Iterable[Pair] = (),
         margin: float | None = None,
-    ) -> Situation:
+        absent: Iterable[str] = (),
+        only: str | None = None,
+    ) -> CollisionQuery:
         """Fix where things stand.
 
         Args:
@@ -108,12 +110,17 @@ class CollisionChecker:
             carried: a movable body that the robot holds.
             ignore: pairs of parts whose contact is allowed (`pairs` makes them); order does not matter.
             margin: instead of the checker's [m].
+            absent: bodies that are not there (what lies in a carried cup).
+            only: a part; pairs without it are not checked.
         """
         where = {body.name: body.X_WO for body in self.scene.bodies}
         if poses is not None:
             where |= {body.name: pose for body, pose in zip(self.scene.movable, poses, strict=True)}
         parts = list(self._links)
+        gone = frozenset(absent)
         for body, shapes in self._bodies.items():
+            if body in gone:
+                continue
             role: Literal["carried", "scene"] = "scene"
             joint, X_JO = 0, _se3(where[body])
             if carried is not None and carried.body == body:
@@ -125,18 +132,19 @@ class CollisionChecker:
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
-        return Situation(self._kinematics, parts, self._near, allowed, self.margin if margin is None else margin)
+        margin = self.margin if margin is None else margin
+        return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, only=only)
 
     def _touching_at_zero(self) -> set[frozenset[str]]:
         """Links that touch with every joint at zero (or at its limit nearest to zero): so made, so allowed."""
         limits = [joint.limits for joint in self._kinematics.robot.moving_joints]
         lower = [-np.inf if limit.lower is None else limit.lower for limit in limits]
         upper = [np.inf if limit.upper is None else limit.upper for limit in limits]
-        zero = Situation(self._kinematics, self._links, self._near, self._ignored, 0.0)
+        zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, 0.0)
         return {frozenset((hit.a, hit.b)) for hit in zero.every(np.clip(np.zeros(len(limits)), lower, upper))}
 
 
-class Situation:
+class CollisionQuery:
     """Fixed obstacles, a fixed load, fixed allowances; see `CollisionChecker.at`."""
 
     def __init__(
@@ -146,6 +154,8 @@ class Situation:
         near: frozenset[tuple[int, int]],
         allowed: set[frozenset[str]],
         margin: float,
+        *,
+        only: str | None = None,
     ) -> None:
         import pinocchio as pin
 
@@ -160,6 +170,8 @@ class Situation:
         for i, a in enumerate(parts):
             for j in range(i + 1, len(parts)):
                 b = parts[j]
+                if only is not None and only not in (a.name, b.name):
+                    continue
                 if _may_meet(a, b, near) and frozenset((a.name, b.name)) not in allowed:
                     self._geometry.addCollisionPair(pin.CollisionPair(i, j))
         self._data = kinematics.model.createData()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, TypeVar
 
@@ -13,6 +13,9 @@ from manipcli.plan.step import StepPlan
 from manipcli.spec.quantity import Length
 
 C = TypeVar("C")
+REASONS = 3
+"""How many reasons a refusal tells."""
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?")  # not the digits of a name
 
 
 def _pair(value: object) -> object:
@@ -34,15 +37,22 @@ def first_feasible(attempt: Callable[[C], StepPlan], candidates: Iterable[C], *,
     """The plan of the first candidate that has one.
 
     Raises:
-        NotPlannable: none has; names what was tried, and the distinct reasons, the commonest first.
+        NotPlannable: none has; tells how many were tried and the commonest reasons, of which those that differ only in
+            their numbers count as one and are told by their first. The hint is that of the commonest.
     """
-    reasons: dict[str, int] = {}
+    reasons: dict[str, list[NotPlannable]] = {}
     for candidate in candidates:
         try:
             return attempt(candidate)
         except NotPlannable as refusal:
-            reasons[refusal.cause] = reasons.get(refusal.cause, 0) + 1
-    tried = sum(reasons.values())
-    listed = sorted(reasons.items(), key=lambda item: -item[1])
-    told = "; ".join(f"{cause} ({count} of {tried})" for cause, count in itertools.islice(listed, 3))
-    raise NotPlannable(f"{what}: {told}")
+            reasons.setdefault(_NUMBER.sub("#", refusal.cause), []).append(refusal)
+    if not reasons:
+        raise NotPlannable(f"{what}: there is nothing to try")
+    commonest = sorted(reasons.values(), key=lambda refusals: -len(refusals))
+    first, tried = commonest[0][0], sum(map(len, commonest))
+    if tried == 1:
+        raise NotPlannable(f"{what}: {first.cause}", hint=first.hint)
+    told = "; ".join(f"{refusals[0].cause} ({len(refusals)} of {tried})" for refusals in commonest[:REASONS])
+    more = len(commonest) - REASONS
+    others = f"; and {more} other reason{'s' if more > 1 else ''}" if more > 0 else ""
+    raise NotPlannable(f"{what}, {tried} ways tried: {told}{others}", hint=first.hint)

@@ -32,11 +32,13 @@ class Situation:
         position: (n) of `RobotModel.moving_joints`.
         bodies: `X_WO` of every movable body, in the order of `Scene.movable`.
         carried: what the hand holds.
+        closed: the hand was closed to hold something, and not opened since; moves leave it as it is.
     """
 
     position: Array
     bodies: tuple[Transform, ...]
     carried: Carried | None = None
+    closed: bool = False
 
     def moved(self, position: Array) -> Situation:
         """The same with the robot at `position`."""

@@ -189,7 +189,11 @@ class TaskSpec(Model):
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
     frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
-    start: str | None = Field(None, description="The named pose that the robot starts in. Default: all joints at 0.")
+    start: str | None = Field(
+        None,
+        description="The named pose that the robot starts in. Default: `home` if it has one; else every joint at 0, or "
+        "at the limit nearest to 0.",
+    )
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ConditionSpec, ...] = Field((), description="What must hold at the end, or over the run.")
 

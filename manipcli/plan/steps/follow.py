@@ -4,23 +4,35 @@
         joint_names: [joint_1, joint_2]
         points:
           - {positions: [0, 0], velocities: [0, 0], time_from_start: {secs: 3}}
+
+Between two points the curve is linear, cubic or quintic by what both give; the first is led to from where the robot
+is, at rest. Position and velocity limits hold for every curve; a linear one has infinite acceleration at its points and
+a cubic one infinite jerk, so those limits are asked only of curves that can keep them.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from manipcli.core.errors import NotPlannable
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
+from manipcli.plan.limits import MotionLimits
 from manipcli.plan.names import unknown_joint
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time
+
+HERE = 1e-3
+"""A first point at 0 s nearer than this [rad or m] to where the robot is counts as there: messages are rounded."""
 
 
 class DurationSpec(Model):
@@ -74,26 +86,51 @@ class FollowSpec(Model):
             if point.seconds <= before:
                 raise ValueError(f"point {k}: time_from_start {point.seconds:g} s is not after {before:g} s")
             before = point.seconds
+        if before <= 0.0:
+            raise ValueError("the last point's time_from_start is 0 s: there is no time to move in")
+        moving = [name for name, v in zip(self.joint_names, self.points[-1].velocities, strict=False) if v != 0.0]
+        if moving:
+            raise ValueError(f"the last point must be at rest; its velocity of {moving[0]} is not 0")
         return self
 
 
 def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The points as they are, from the situation on; refused where they leave a limit."""
-    draft = Draft(planner, situation)
-    draft.follow(
-        "follow",
-        spec.joint_names,
-        times=np.array([point.seconds for point in spec.points]),
-        positions=np.array([point.positions for point in spec.points]),
-        velocities=_all_or_none([point.velocities for point in spec.points]),
-        accelerations=_all_or_none([point.accelerations for point in spec.points]),
-    )
+    """The points as they are, from the situation on.
+
+    Raises:
+        NotPlannable: a limit is left (names joint, value, limit and time), something is in the way, or a first point at
+            0 s is not where the robot is.
+    """
+    names = spec.joint_names
+    start = situation.position[planner.robot.indices(names)]
+    points = [
+        TrajectoryPoint(point.positions, point.seconds, point.velocities, point.accelerations) for point in spec.points
+    ]
+    if points[0].time_from_start <= 0.0:
+        off = np.abs(np.array(points[0].positions) - start)
+        worst = int(np.argmax(off))
+        if off[worst] > HERE:
+            raise NotPlannable(
+                f"the first point, at 0 s, has joint '{names[worst]}' at {points[0].positions[worst]:.4f}; "
+                f"it is at {start[worst]:.4f} then",
+                hint="give the point a later time_from_start, or `move` there first",
+            )
+        points[0] = replace(points[0], positions=start)
+    trajectory = JointTrajectory.from_points(names, points, TrajectoryPoint(start))
+    draft = Draft(planner, situation, verb="follow")
+    draft.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
     return draft.plan()
 
 
-def _all_or_none(rows: list[tuple[float, ...]]) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """(k, n), or None where some point leaves them out."""
-    return np.array(rows) if all(rows) else None
+def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:
+    """What every curve between two points can keep; infinite where one cannot."""
+    orders = trajectory.orders
+    lowest = trajectory.order if orders is None else int(np.minimum(orders[:-1], orders[1:]).min())
+    limits = MotionLimits.of(robot, trajectory.names)
+    unlimited = np.full(len(trajectory.names), np.inf)
+    if lowest < QUINTIC:
+        limits = replace(limits, jerk=unlimited)
+    return replace(limits, acceleration=unlimited) if lowest < CUBIC else limits
 
 
 def check(spec: FollowSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

@@ -12,8 +12,9 @@ from pydantic import Field
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
@@ -24,7 +25,7 @@ DEFAULT_FORCE = 8.0
 class GraspSpec(Model):
     """How the hand closes. A grasp holds by friction alone."""
 
-    object: str | None = Field(None, description="What is grasped; it is carried from then on.")
+    object: str | None = Field(None, description="What is grasped; carried from then on. Default: not said.")
     posture: str = Field("closed", description="The named pose that the hand closes towards.")
     force: Annotated[Force, Field(gt=0, description="Contact force at which a finger stops [N].")] = DEFAULT_FORCE
     until: Literal["contact", "posture"] = Field(
@@ -33,7 +34,13 @@ class GraspSpec(Model):
 
 
 def plan(spec: GraspSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """One motion of the hand."""
+    """One motion of the hand.
+
+    Raises:
+        NotPlannable: the hand holds something already, or would not touch the object.
+    """
+    if spec.object is not None:
+        planner.free_hand(situation, spec.object)
     draft = Draft(planner, situation)
     draft.close(spec.posture, force=spec.force, must_hold=spec.until == "contact", body=spec.object)
     return draft.plan()

@@ -13,8 +13,9 @@ from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
@@ -31,13 +32,13 @@ class LiftSpec(Model):
 
 def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
     """A straight line of the tool, its orientation kept."""
-    held = planner.held(situation, spec.object)
+    planner.held(situation, spec.object)
     under = planner.touching(situation, spec.object)
 
     def attempt(height: float) -> StepPlan:
-        draft = Draft(planner, situation)
+        draft = Draft(planner, situation, verb="lift")
         up = Transform.of(xyz=(0.0, 0.0, height))
-        draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=held | under)
+        draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=under)
         return draft.plan()
 
     return first_feasible(attempt, spread(spec.by), what=f"no height to lift '{spec.object}' by")

@@ -1,5 +1,8 @@
 """`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
 
+While the hand is closed on something, `move` leaves it closed: of a named pose only the joints of the arm count then,
+and joints of the hand named one by one are refused. `release` and `place` open it.
+
     - move: {to: home}
     - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
     - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
@@ -15,8 +18,9 @@ from manipcli.model.build_scene import pose_transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue
@@ -42,15 +46,20 @@ class MoveSpec(Model):
             raise ValueError("say either `to` (a named pose or joints) or `pose` (of the tool)")
         if self.to is not None and self.path == "linear":
             raise ValueError("`path: linear` needs a tool `pose`, not `to`")
+        if self.to == {}:
+            raise ValueError("`to` names no joint")
         return self
 
 
 def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """One motion; a named pose that includes the hand moves the hand at the same time."""
-    draft = Draft(planner, situation)
+    """One motion; a named pose that includes the hand moves the hand at the same time, unless it holds something."""
+    draft = Draft(planner, situation, verb="move")
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
-        draft.joints("move", pose.joints, pose.positions, speed=spec.speed)
+        values = dict(zip(pose.joints, pose.positions, strict=True))
+        arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
+        chosen = arm if situation.closed and arm else values
+        draft.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.speed)
     elif spec.to is not None:
         draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
     elif spec.pose is not None:

@@ -14,12 +14,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
@@ -61,17 +63,29 @@ class PickSpec(Model):
 
 
 def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The first of the candidate directions, rolls and distances that is reachable and free."""
+    """The first of the candidate directions, rolls, distances and slopes that is reachable and free.
+
+    Raises:
+        NotPlannable: the hand holds something already, or no candidate is possible.
+    """
+    planner.free_hand(situation, spec.object)
     X_WO = planner.body_pose(situation, spec.object)
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
     p_WG = X_WO.apply([body.centre[0], body.centre[1], height])
 
-    def attempt(candidate: tuple[Array, float, float]) -> StepPlan:
-        R_WT, distance, slope = candidate
+    out_of_reach: dict[int, NotPlannable | None] = {}
+
+    def attempt(candidate: tuple[tuple[int, Array], float, float]) -> StepPlan:
+        (k, R_WT), distance, slope = candidate
         X_WG = Transform.of(xyz=p_WG, R=R_WT)
         draft = Draft(planner, situation)
+        if k not in out_of_reach:  # said once for all distances and slopes, which it does not depend on
+            out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
+        refusal = out_of_reach[k]
+        if refusal is not None:
+            raise refusal
         draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
         draft.straight("approach", X_WG, speed=spec.speed / 2)
         draft.close(
@@ -83,7 +97,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         return draft.plan()
 
     turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
-    candidates = itertools.product(turns, spread(spec.approach.distance), slopes())
+    candidates = itertools.product(enumerate(turns), spread(spec.approach.distance), slopes())
     return first_feasible(attempt, candidates, what=f"no way to pick '{spec.object}'")
 
 

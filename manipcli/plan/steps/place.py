@@ -1,7 +1,7 @@
 """`place`: set a held object down, let go, and withdraw.
 
     - place: {object: cup, at: start}
-    - place: {object: block, at: [0.5, 0.2], on: table}
+    - place: {object: block, at: [0.5, 0.2], on: table, yaw: 90 deg}
 """
 
 from __future__ import annotations
@@ -12,18 +12,23 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
+from manipcli.model.robot import Cylinder, RobotModel
+from manipcli.model.scene import Body, Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Length
+from manipcli.spec.quantity import Angle, Length
+
+UPRIGHT = np.cos(np.radians(5.0))
+"""What stands straighter than this (cosine of its tilt) can be placed on."""
 
 
 class PlaceSpec(Model):
@@ -33,7 +38,10 @@ class PlaceSpec(Model):
     at: Literal["start"] | tuple[Length, Length] = Field(
         "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `on`."
     )
-    on: str | None = Field(None, description="The body whose top takes the object at [x, y].")
+    on: str | None = Field(None, description="The body that takes the object at [x, y]: on its top, or inside a tray.")
+    yaw: Angle | None = Field(
+        None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held."
+    )
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
@@ -41,8 +49,8 @@ class PlaceSpec(Model):
 
 
 def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The object keeps the orientation about the vertical in which it is held, and stands upright."""
-    held = planner.held(situation, spec.object)
+    """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`."""
+    planner.held(situation, spec.object)
     X_WG = _goal(spec, planner, situation)
     X_OT = planner.held_in_tool(situation).inverse()
     X_WT = X_WG @ X_OT
@@ -50,9 +58,9 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     def attempt(candidate: tuple[float, float, float]) -> StepPlan:
         clearance, retreat, slope = candidate
         draft = Draft(planner, situation)
-        draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed, allowed=held)
+        draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
         support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
-        draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=held | support)
+        draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
         draft.open(spec.posture)
         draft.straight("withdraw", backed_off(X_WT, retreat, slope), speed=spec.speed)
         return draft.plan()
@@ -66,25 +74,50 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
     body = planner.scene.body(spec.object)
     if spec.at == "start":
         return body.X_WO
+    assert spec.on is not None  # `check` asks for it
+    X_WU = planner.body_pose(situation, spec.on)
+    under = planner.scene.body(spec.on)
+    if X_WU.R[2, 2] < UPRIGHT:
+        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.on}', which is tilted")
+    floor, size = _surface(under)
+    x, y, _ = X_WU.inverse().apply([*spec.at, 0.0]) - under.centre
+    if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
+        raise NotPlannable(
+            f"[{spec.at[0]:g}, {spec.at[1]:g}] m lies beside '{spec.on}', whose middle is at "
+            f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m"
+        )
     bottom = float(body.centre[2] - body.size[2] / 2)
-    top = 0.0
-    if spec.on is not None:
-        under = planner.scene.body(spec.on)
-        top = float(planner.body_pose(situation, spec.on).p[2] + under.centre[2] + under.size[2] / 2)
-    R_WO = planner.body_pose(situation, spec.object).R
-    x_axis = R_WO[:, 0]
-    yaw = float(np.arctan2(x_axis[1], x_axis[0]))
-    return Transform.of(xyz=(spec.at[0], spec.at[1], top - bottom), rpy=(0.0, 0.0, yaw))
+    x_axis = planner.body_pose(situation, spec.object).R[:, 0]
+    yaw = float(np.arctan2(x_axis[1], x_axis[0])) if spec.yaw is None else spec.yaw
+    return Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
+
+
+def _surface(under: Body) -> tuple[float, tuple[float, float]]:
+    """Height [m] above its O of what a body offers to stand on, and the size (x, y) [m] of that."""
+    if under.interior is None:
+        return float(under.centre[2] + under.size[2] / 2), (float(under.size[0]), float(under.size[1]))
+    shape, middle = under.interior.shape, float(under.interior.X_OS.p[2])
+    if isinstance(shape, Cylinder):
+        return middle - shape.length / 2, (2 * shape.radius, 2 * shape.radius)
+    return middle - shape.size[2] / 2, shape.size[:2]
 
 
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown bodies and postures; a place without a support."""
     found = unknown_body(scene, spec.object, ("object",), movable=True)
     found += unknown_pose(robot, spec.posture, ("posture",))
-    if spec.on is not None:
+    if spec.on is not None and spec.on == spec.object:
+        found += (Problem(loc=("on",), message=f"'{spec.object}' cannot be placed on itself"),)
+    elif spec.on is not None:
         found += unknown_body(scene, spec.on, ("on",))
     elif spec.at != "start":
         found += (Problem(loc=("at",), message="[x, y] needs the body it is on", hint="add `on: BODY`"),)
+    if spec.at == "start":
+        found += tuple(
+            Problem(loc=(word,), message=f"`{word}` goes with `at: [x, y]`", hint="`at: start` says it all")
+            for word, value in (("on", spec.on), ("yaw", spec.yaw))
+            if value is not None
+        )
     return found
 
 

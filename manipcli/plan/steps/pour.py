@@ -5,10 +5,12 @@
       timeout: 15 s
 
 Said by the objects' geometry: the lip (lowest point of the rim, when tilted) stands over the middle of the container.
-With h the height of the rim above O, r its radius, a the axis and w = a x z the horizontal direction in which the cup
-tips, a turn by theta about a puts the lip at
+With c the middle of the rim, r its radius, a the axis and w = a x z the horizontal direction in which the upright cup
+tips, all from O in the world, a turn R by theta about a puts the lip at
 
-    p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z.
+    p_O + R (c + r w) = p_O + (h sin(theta) + r cos(theta)) w + (h cos(theta) - r sin(theta)) z
+
+where the latter holds for a rim at the height h above O.
 """
 
 from __future__ import annotations
@@ -25,8 +27,9 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Body, Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
@@ -51,10 +54,10 @@ class PourSpec(Model):
 
 def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
     """The first of the candidate directions, senses and clearances that is reachable and free."""
-    held = planner.held(situation, spec.object)
+    planner.held(situation, spec.object)
     body = planner.scene.body(spec.object)
     X_TO = planner.held_in_tool(situation)
-    R_WT = planner.tool_pose(situation).R
+    R_WT = _righted(planner.body_pose(situation, spec.object).R) @ planner.tool_pose(situation).R
     receiver = planner.scene.body(spec.into)
     X_WR = planner.body_pose(situation, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
@@ -66,12 +69,14 @@ def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
         theta = sense * spec.tilt
         lip = mouth + clearance * UP
         R_tilt = matrix_from_axis_angle(a, theta)
-        p_WT = lip - _lip_offset(body, a, theta) - R_tilt @ R_WT0 @ X_TO.p
+        p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
         draft = Draft(planner, situation)
-        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.speed, allowed=held)
-        draft.turn("tilt", a, theta, speed=spec.speed, allowed=held)
+        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.speed)
+        draft.turn("tilt", a, theta, speed=spec.speed)
         draft.dwell("dwell", spec.dwell, awaits=True)
-        draft.turn("tilt back", a, -theta, speed=spec.speed, allowed=held)
+        if spec.tilt > math.pi / 2:
+            draft.spill(spec.into)
+        draft.back("tilt back")
         return draft.plan()
 
     candidates = itertools.product(
@@ -97,18 +102,26 @@ def _senses(planner: Planner, situation: Situation, mouth: Array, R_WT: Array) -
     return (sense, -sense)
 
 
-def _lip_offset(body: Body, axis: Array, theta: float) -> Array:
-    """From O to the lip, in the world, once the cup has turned by `theta` about the horizontal `axis`."""
-    sense = math.copysign(1.0, theta)
-    h = float(body.centre[2] + body.size[2] / 2)
-    r = float(max(body.size[0], body.size[1]) / 2)
-    w = sense * np.cross(axis, UP)
-    s, c = math.sin(abs(theta)), math.cos(abs(theta))
-    return np.asarray((h * s + r * c) * w + (h * c - r * s) * UP)
+def _lip(body: Body, R_WO: Array, w: Array) -> Array:
+    """From O to the lip (3,), in the world, of the upright cup that will tip towards the unit vector `w`."""
+    rim = R_WO @ np.array([body.centre[0], body.centre[1], body.centre[2] + body.size[2] / 2])
+    radius = float(max(body.size[0], body.size[1]) / 2)
+    return np.asarray(rim + radius * w)
+
+
+def _righted(R_WO: Array) -> Array:
+    """The smallest turn (3, 3), in the world, that makes a tilted cup stand upright."""
+    axis = np.cross(R_WO[:, 2], UP)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-9:
+        return np.eye(3)
+    return matrix_from_axis_angle(axis / sine, math.atan2(sine, float(R_WO[2, 2])))
 
 
 def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown bodies."""
+    """Unknown bodies, or one into itself."""
+    if spec.object == spec.into:
+        return (Problem(loc=("into",), message=f"'{spec.object}' cannot be poured into itself"),)
     return unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
 
 

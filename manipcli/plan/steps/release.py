@@ -10,8 +10,9 @@ from pydantic import Field
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_pose
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
 

@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.plan.planner import Draft, Planner
+from manipcli.plan.draft import Draft
+from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Time

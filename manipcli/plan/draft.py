@@ -1,0 +1,354 @@
+"""Motions in the making: each verb plans one from where the last ended, timed, verified and free of collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
+from manipcli.model.collision import RESOLUTION, Carried
+from manipcli.model.robot import Cylinder
+from manipcli.plan.hand import closed_on, ramp, with_mimics
+from manipcli.plan.limits import MotionLimits
+from manipcli.plan.path import ANGULAR_STEP, JointPath, follow_poses, joint_path, linear_path
+from manipcli.plan.planner import CLEARANCE, NOTHING, Pairs, Planner
+from manipcli.plan.rest_to_rest import rest_to_rest
+from manipcli.plan.retimer import retime
+from manipcli.plan.step import Grip, Motion, Situation, StepPlan
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.verify import verify
+
+
+class Draft:
+    """The motions of one step. What refuses one is told with its label, unless the step has no other."""
+
+    def __init__(self, planner: Planner, situation: Situation, *, verb: str = "") -> None:
+        """
+        Args:
+            planner: what to plan with.
+            situation: where the first motion begins.
+            verb: of the step; a motion of this label is the step itself.
+        """
+        self._planner = planner
+        self._now = situation
+        self._verb = verb
+        self._motions: list[Motion] = []
+
+    @property
+    def now(self) -> Situation:
+        """Where the motions so far lead."""
+        return self._now
+
+    def plan(self) -> StepPlan:
+        """What was drafted."""
+        return StepPlan(motions=tuple(self._motions), end=self._now)
+
+    def with_body(self, name: str, X_WO: Transform) -> Situation:
+        """The present situation, with one body put elsewhere."""
+        return replace(self._now, bodies=self._put({name: X_WO}))
+
+    def joints(self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0) -> None:
+        """Straight in joint space; joints of the hand are moved by their own controller at the same time.
+
+        Raises:
+            NotPlannable: joints of the hand are named while it is closed on something.
+        """
+        hand = self._planner.gripper_joints
+        values = dict(zip(names, target, strict=True))
+        arm = [name for name in names if name not in hand]
+        if self._now.closed and len(arm) < len(names):
+            carried = self._now.carried
+            what = "is closed on something" if carried is None else f"holds '{carried.body}'"
+            named = next(name for name in names if name in hand)
+            raise NotPlannable(
+                f"joint '{named}' belongs to the hand, which {what}",
+                hint="`release` or `place` opens the hand" if carried is not None else "`release` opens the hand",
+            )
+        with self._told(label):
+            trajectory = self._rest_to_rest(arm, [values[name] for name in arm], speed) if arm else None
+        self._add(label, trajectory, self._grip({name: values[name] for name in names if name in hand}))
+
+    def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
+        """Why no posture of the arm has the tool there, nothing touched and the hand in its pose `hand`; None if one.
+
+        Nothing is drafted: this asks, before a way is planned, whether its end can be reached at all.
+        """
+        try:
+            with self._told(label):
+                self._solved(X_WT, self._grip(self._posture(hand)))
+        except NotPlannable as refusal:
+            return refusal
+        return None
+
+    def reach(self, label: str, X_WT: Transform, *, speed: float = 1.0, hand: str | None = None) -> None:
+        """The tool to a pose, straight in joint space; the hand goes to its pose `hand` meanwhile.
+
+        Of the arm's postures with the tool there, those that touch something are passed over.
+        """
+        solver = self._planner.solver
+        grip = None if hand is None else self._grip(self._posture(hand))
+        with self._told(label):
+            goal = self._solved(X_WT, grip)
+            trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
+        self._add(label, trajectory, grip)
+
+    def straight(self, label: str, X_WT: Transform, *, speed: float = 1.0, allowed: Pairs = NOTHING) -> None:
+        """The tool on a straight line to a pose."""
+        with self._told(label):
+            trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
+        self._add(label, trajectory, None, allowed=allowed)
+
+    def turn(self, label: str, axis: Array, angle: float, *, speed: float = 1.0) -> None:
+        """The tool turns in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
+        X_WT = self._planner.tool_pose(self._now)
+        count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
+        poses = [
+            Transform.of(xyz=X_WT.p, R=matrix_from_axis_angle(axis, k / count * angle) @ X_WT.R)
+            for k in range(count + 1)
+        ]
+        with self._told(label):
+            trajectory = self._timed(follow_poses(self._planner.solver, self._now.position, poses), speed)
+        self._add(label, trajectory, None)
+
+    def back(self, label: str) -> None:
+        """The last trajectory, from its end to its beginning.
+
+        Limits are symmetric and what was passed freely is free on the way back, so nothing is planned or checked anew.
+        """
+        done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
+        assert done.velocities is not None and done.accelerations is not None  # every drafted one but `follow` has both
+        accelerations = done.accelerations[::-1].copy()
+        accelerations[-1] = 0.0  # at rest
+        trajectory = JointTrajectory(
+            names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
+            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(accelerations),
+        )  # fmt: skip
+        self._accept(label, trajectory, None, trajectory.duration)
+
+    def follow(self, label: str, points: JointTrajectory, *, limits: MotionLimits) -> None:
+        """Given points, which begin where the last motion ended; at every control tick, and at their end.
+
+        Args:
+            label: of the motion.
+            points: what lies between them is linear, cubic or quintic.
+            limits: what the curve must keep; infinite where it cannot.
+        """
+        period = self._planner.period
+        ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
+        times = np.append(np.arange(ticks) * period, points.duration)
+        q, v, a = points.sample(times)
+        smooth = bool(np.isfinite(limits.acceleration).all())
+        trajectory = JointTrajectory(
+            names=points.names, times=times, positions=q, velocities=v, accelerations=a if smooth else None
+        )
+        with self._told(label):
+            verify(trajectory, limits)
+        self._add(label, trajectory, None)
+
+    def close(self, posture: str, *, force: float, must_hold: bool, body: str | None) -> None:
+        """The hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
+
+        The fingers are predicted to stop where the first link of each touches the body.
+
+        Raises:
+            NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and would not touch it.
+        """
+        planner = self._planner
+        grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
+        if grip is None:
+            raise _no_gripper(posture)
+        duration = self._grip_time(grip)
+        if body is None:
+            self._accept("close", None, grip, duration)
+            self._now = replace(self._now, closed=True)
+            return
+        query = planner.grasping(self._now, body)
+        closed, touched = closed_on(planner.robot, query, self._now.position, grip.joints, grip.target)
+        if must_hold and not touched:
+            raise NotPlannable(
+                f"the hand, closed to '{posture}', does not touch '{body}'",
+                hint="move the hand to the object first, or close it further",
+            )
+        stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
+        self._refuse_collision("close", None, stopped, planner.hand_contacts(body))
+        link = planner.tool_link
+        X_LW = planner.kinematics.forward(closed, link).inverse()
+        carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
+        self._motions.append(Motion("close", trajectory=None, grip=grip, duration=duration))
+        self._now = replace(self._now, position=closed, carried=carried, closed=True)
+
+    def open(self, posture: str) -> None:
+        """The hand to a pose; what it held stays where it is.
+
+        Raises:
+            NotPlannable: no gripper controller moves the hand, or something else than the object is in its way.
+        """
+        grip = self._grip(self._posture(posture))
+        if grip is None:
+            raise _no_gripper(posture)
+        allowed = NOTHING
+        if self._now.carried is not None:
+            allowed = self._planner.hand_contacts(self._now.carried.body)
+        self._now = replace(self._now, carried=None, closed=False)
+        self._add("open", None, grip, allowed=allowed)
+
+    def dwell(self, label: str, duration: float, *, awaits: bool = False) -> None:
+        """Hold still for `duration` [s]."""
+        self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=awaits))
+
+    def spill(self, into: str) -> None:
+        """What lay in the carried object is predicted to lie on the floor of the container `into` now."""
+        planner, carried = self._planner, self._now.carried
+        interior = planner.scene.body(into).interior
+        if carried is None or interior is None:
+            return
+        shape = interior.shape
+        depth = shape.length if isinstance(shape, Cylinder) else shape.size[2]
+        X_WS = planner.body_pose(self._now, into) @ interior.X_OS
+        landed = {}
+        for name in planner.contents(self._now, carried.body):
+            body = planner.scene.body(name)
+            bottom = body.centre[2] - body.size[2] / 2
+            landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], -depth / 2 - bottom))
+        self._now = replace(self._now, bodies=self._put(landed))
+
+    @contextmanager
+    def _told(self, label: str) -> Iterator[None]:
+        """Refusals inside are told with the motion they are about."""
+        try:
+            yield
+        except NotPlannable as refusal:
+            if label == self._verb:
+                raise
+            raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint) from refusal
+
+    def _solved(self, X_WT: Transform, grip: Grip | None) -> Array:
+        """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
+        planner = self._planner
+        seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
+        return planner.solver.solve(X_WT, seed, planner.rng, refuse=planner.query(self._now).check)
+
+    def _posture(self, name: str) -> dict[str, float]:
+        pose = self._planner.robot.pose(name)
+        return dict(zip(pose.joints, pose.positions, strict=True))
+
+    def _limits(self, names: Sequence[str], speed: float) -> MotionLimits:
+        return MotionLimits.of(self._planner.robot, names, velocity_scale=speed, acceleration_scale=speed)
+
+    def _rest_to_rest(self, names: Sequence[str], target: npt.ArrayLike, speed: float) -> JointTrajectory:
+        limits = self._limits(names, speed)
+        start = self._now.position[self._planner.robot.indices(tuple(names))]
+        trajectory = rest_to_rest(start, target, limits, period=self._planner.period)
+        verify(trajectory, limits)
+        return trajectory
+
+    def _timed(self, path: JointPath, speed: float) -> JointTrajectory:
+        limits = self._limits(path.names, speed)
+        trajectory = retime(joint_path(path.names, path.waypoints), limits, period=self._planner.period)
+        verify(trajectory, limits)
+        return trajectory
+
+    def _add(
+        self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
+    ) -> None:
+        """Accept a motion if nothing is in its way."""
+        self._refuse_collision(label, trajectory, grip, allowed)
+        duration = 0.0 if grip is None else self._grip_time(grip)
+        self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
+
+    def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, duration: float) -> None:
+        before = self._now
+        if grip is not None:
+            self._now = self._now.moved(self._with(grip.joints, grip.target))
+        if trajectory is not None:
+            self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
+            self._carry(before)
+        self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
+
+    def _refuse_collision(
+        self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, allowed: Pairs
+    ) -> None:
+        query = self._planner.query(self._now, allowed)
+        times, positions = self._swept(trajectory, grip)
+        hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
+        if hit is None:
+            return
+        carried = self._now.carried
+        hint = "no way around is searched for: `move` to a pose from which the way is free"
+        if carried is not None and hit.time <= 0.0 and carried.body in (hit.a, hit.b):
+            hint = f"`lift` '{carried.body}' first"
+        near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
+        raise NotPlannable(
+            f"'{hit.a}' would come within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) "
+            f"at t = {hit.time:.2f} s of '{label}'",
+            hint=hint,
+        )
+
+    def _swept(self, trajectory: JointTrajectory | None, grip: Grip | None) -> tuple[Array, Array]:
+        """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""
+        robot = self._planner.robot
+        times = np.zeros(1) if trajectory is None else trajectory.times
+        if grip is not None:
+            speed, late = self._planner.gripper_speed, self._grip_time(grip) - times[-1]
+            more = int(np.ceil(max(0.0, late) * speed / (0.5 * RESOLUTION)))
+            times = np.append(times, times[-1] + late * np.arange(1, more + 1) / max(1, more))
+        positions = np.tile(self._now.position, (len(times), 1))
+        if trajectory is not None:
+            columns = robot.indices(trajectory.names)
+            positions[:, columns] = trajectory.positions[-1]
+            positions[: len(trajectory.times), columns] = trajectory.positions
+        if grip is not None:
+            columns = robot.indices(grip.joints)
+            positions[:, columns] = ramp(self._now.position[columns], grip.target, speed * times)
+            positions = np.asarray(with_mimics(robot, positions))
+        return times, positions
+
+    def _carry(self, before: Situation) -> None:
+        """What is held goes with the hand, and what lies in that goes with it."""
+        carried = before.carried
+        if carried is None:
+            return
+        planner = self._planner
+        X_WO = planner.kinematics.forward(self._now.position, carried.link) @ carried.X_LO
+        X_WA = planner.body_pose(before, carried.body)
+        moved = {carried.body: X_WO}
+        for name in planner.contents(before, carried.body):
+            moved[name] = X_WO @ X_WA.inverse() @ planner.body_pose(before, name)
+        self._now = replace(self._now, bodies=self._put(moved))
+
+    def _put(self, where: dict[str, Transform]) -> tuple[Transform, ...]:
+        """X_WO of all movable bodies, some of them put elsewhere."""
+        movable = self._planner.scene.movable
+        return tuple(where.get(body.name, X_WO) for body, X_WO in zip(movable, self._now.bodies, strict=True))
+
+    def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
+        """The present position with some joints elsewhere; joints that mimic them follow."""
+        q = np.array(self._now.position)
+        q[self._planner.robot.indices(tuple(names))] = values
+        return with_mimics(self._planner.robot, q)
+
+    def _grip(self, targets: dict[str, float], *, force: float | None = None, must_hold: bool = False) -> Grip | None:
+        """A goal for the joints that a gripper controller moves, or None where there is none."""
+        joints = self._planner.gripper_joints
+        if not any(name in targets for name in joints):
+            return None
+        here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
+        target = frozen([targets.get(name, here[name]) for name in joints])
+        return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
+
+    def _grip_time(self, grip: Grip) -> float:
+        """How long the references take to the target [s]."""
+        here = self._now.position[self._planner.robot.indices(grip.joints)]
+        return float(np.max(np.abs(grip.target - here))) / self._planner.gripper_speed
+
+
+def _no_gripper(posture: str) -> NotPlannable:
+    return NotPlannable(
+        f"pose '{posture}' has no joint that a gripper controller moves",
+        hint="add a controller of type `gripper` for the hand's joints to the controllers file",
+    )

@@ -1,0 +1,91 @@
+"""What planning knows of hands: which joints make a finger, and where the fingers will stop on an object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.model.collision import CollisionQuery
+from manipcli.model.robot import RobotModel
+
+STEPS = 40
+"""Points of the way of a closing hand at which contact is looked for."""
+
+
+def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """The joints of a hand by finger: a joint below another one of the hand is of the same finger."""
+    found: list[list[int]] = []
+    for k, name in enumerate(joints):
+        child = robot.joint(name).child
+        for finger in found:
+            if any(child in robot.descendants(robot.joint(joints[j]).child) for j in finger):
+                finger.append(k)
+                break
+        else:
+            found.append([k])
+    return tuple(tuple(finger) for finger in found)
+
+
+def moved_links(robot: RobotModel, joints: Sequence[str]) -> frozenset[str]:
+    """The links below `joints` and below those that mimic them."""
+    driven = set(joints) | {joint.name for joint in robot.joints if joint.mimic and joint.mimic.joint in joints}
+    return frozenset().union(*(robot.descendants(robot.joint(name).child) for name in driven))
+
+
+def with_mimics(robot: RobotModel, q: Array) -> Array:
+    """`q` (..., n) with every mimic joint where its driver has it: multiplier * q_driver + offset."""
+    result = np.array(q, dtype=np.float64)
+    for k, joint in enumerate(robot.moving_joints):
+        if joint.mimic is not None:
+            driver = result[..., robot.joint_names.index(joint.mimic.joint)]
+            result[..., k] = joint.mimic.multiplier * driver + joint.mimic.offset
+    return frozen(result)
+
+
+def ramp(here: Array, target: Array, way: Array) -> Array:
+    """(k, m): every joint on its way from `here` to `target` (m), each by as much as `way` (k) [rad or m] at most.
+
+    This is how a gripper controller moves its references: all joints at one speed, the nearest arrives first.
+    """
+    delta = target - here
+    return np.asarray(here + np.clip(delta, -way[:, None], way[:, None]))
+
+
+def closed_on(
+    robot: RobotModel, query: CollisionQuery, q: Array, joints: tuple[str, ...], target: Array
+) -> tuple[Array, frozenset[str]]:
+    """Where the hand stops when each finger closes towards `target` until one of its links touches.
+
+    Args:
+        robot: whose hand it is.
+        query: touches where hand and object do, and nowhere else.
+        q: (n) all moving joints, the hand open.
+        joints: (m) of the hand.
+        target: (m) position of a hand that closes on nothing.
+
+    Returns:
+        (n) the predicted position, and the links that touch then, as `robot/<link>`.
+    """
+    columns = robot.indices(joints)
+    parts = fingers(robot, joints)
+    links = [{f"robot/{link}" for link in moved_links(robot, [joints[j] for j in finger])} for finger in parts]
+    moving = np.ones(len(joints), dtype=bool)
+    here = q[columns]
+    position = np.array(q)
+    touched: set[str] = set()
+    for way in np.linspace(0.0, float(np.max(np.abs(target - here))), STEPS + 1)[:, None]:
+        reference = ramp(here, target, way)[0]
+        position[columns] = np.where(moving, reference, position[columns])
+        position = np.array(with_mimics(robot, position))
+        if not query.touches(position):
+            continue
+        names = {name for hit in query.every(position) for name in (hit.a, hit.b)}
+        for finger, own in zip(parts, links, strict=True):
+            if own & names:
+                moving[list(finger)] = False
+                touched |= own & names
+        if not moving.any():
+            break
+    return frozen(position), frozenset(touched)
