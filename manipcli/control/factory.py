@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -13,9 +14,17 @@ from manipcli.control.joint_trajectory_controller import JointTrajectoryControll
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Compat
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import Joint, RobotModel
 from manipcli.spec.controllers import ControllerSpec, ControllersSpec, GripperSpec, JointTrajectorySpec
+
+STALL_VELOCITY: Final = 0.02
+STALL_SPEED: Final = 0.001
+"""A finger joint slower than this is stalled, where nobody says [rad/s; m/s]."""
+GOAL_ANGLE: Final = 0.05
+GOAL_DISTANCE: Final = 0.002
+"""A finger joint this near to its target has arrived, where nobody says [rad; m]: far less than a hand's stroke."""
 
 Where = Callable[[tuple[str | int, ...]], Place | None]
 """The place in the file of a value, by its keys from the top: ("controllers", "arm", "joints", 0)."""
@@ -74,12 +83,18 @@ def _build(name: str, spec: ControllerSpec, robot: RobotModel, compat: Compat) -
         fingers=fingers_of(spec.joints, robot),
         speed=spec.speed,
         max_effort=np.array([min(own, math.inf if j.limits.effort is None else j.limits.effort) for j in joints]),
-        stall_velocity=spec.stall_velocity,
+        stall_velocity=_each(joints, spec.stall_velocity, turning=STALL_VELOCITY, sliding=STALL_SPEED),
         stall_time=spec.stall_time,
-        goal_tolerance=spec.goal_tolerance,
+        goal_tolerance=_each(joints, spec.goal_tolerance, turning=GOAL_ANGLE, sliding=GOAL_DISTANCE),
         feed_forward=wants,
         compat=compat,
     )
+
+
+def _each(joints: Sequence[Joint], stated: float | None, *, turning: float, sliding: float) -> Array:
+    """(n) what was stated, or the default of each joint's type."""
+    defaults = [sliding if joint.type == "prismatic" else turning for joint in joints]
+    return np.array(defaults if stated is None else [stated] * len(joints))
 
 
 def fingers_of(joints: tuple[str, ...], robot: RobotModel) -> tuple[tuple[int, ...], ...]:

@@ -68,7 +68,8 @@ class GripperController:
         fingers: joint indices of each finger, where a goal does not say; empty: each joint is a finger.
         speed: [rad/s or m/s] of the references.
         max_effort: (n) or a number, N m or N; None: unlimited here.
-        stall_velocity, stall_time, goal_tolerance: see above.
+        stall_velocity, goal_tolerance: see above; (n) or a number, rad/s or m/s and rad or m.
+        stall_time: see above [s].
         contact_time: [s] of the low pass on contact forces; 0 takes them as they are.
         feed_forward: what the caller of `update` shall pass for this controller.
         compat: order of the PID integration.
@@ -88,9 +89,9 @@ class GripperController:
         fingers: tuple[tuple[int, ...], ...] = (),
         speed: float = 1.0,
         max_effort: npt.ArrayLike | None = None,
-        stall_velocity: float = 0.02,
+        stall_velocity: npt.ArrayLike = 0.02,
         stall_time: float = 0.2,
-        goal_tolerance: float = 0.05,
+        goal_tolerance: npt.ArrayLike = 0.05,
         contact_time: float = 0.02,
         feed_forward: FeedForward = "none",
         compat: Compat = "ros2",
@@ -106,8 +107,9 @@ class GripperController:
         self._speed = speed
         unlimited = np.full(n, math.inf)
         self._default_effort = unlimited if max_effort is None else np.broadcast_to(max_effort, (n,)).astype(np.float64)
-        self._stall_velocity, self._stall_time, self._goal_tolerance = stall_velocity, stall_time, goal_tolerance
-        self._contact_time = contact_time
+        self._stall_velocity: list[float] = np.broadcast_to(stall_velocity, (n,)).tolist()
+        self._goal_tolerance: list[float] = np.broadcast_to(goal_tolerance, (n,)).tolist()
+        self._stall_time, self._contact_time = stall_time, contact_time
 
         self._reference, self._velocity, self._acceleration, self._command = np.zeros((4, n))
         self._error, self._error_rate, self._step, self._measured = np.zeros((4, n))
@@ -264,9 +266,9 @@ class GripperController:
                     continue
             far = still = False
             for j in finger:
-                if abs(self._targets[j] - position[j]) > tolerance:
+                if abs(self._targets[j] - position[j]) > tolerance[j]:
                     far = True
-                    if -slow <= velocity[j] <= slow:
+                    if -slow[j] <= velocity[j] <= slow[j]:
                         still = True
                     else:
                         still = False

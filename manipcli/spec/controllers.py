@@ -68,13 +68,13 @@ class GripperSpec(Model):
     max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
         None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
     )
-    stall_velocity: Annotated[
-        JointVelocity, Field(gt=0, description="Slower counts as stalled, above 0. Default 0.02 rad/s.")
-    ] = 0.02
+    stall_velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Slower counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
+    )
     stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
-    goal_tolerance: Annotated[
-        JointValue, Field(gt=0, description="Distance that counts as arrived, above 0. Default 0.05 rad.")
-    ] = 0.05
+    goal_tolerance: Annotated[JointValue, Field(gt=0)] | None = Field(
+        None, description="Distance that counts as arrived, above 0. Default 0.05 rad or 2 mm."
+    )
     default_force: Annotated[Force, Field(gt=0, description="Of a finger where no step says one. Default 5 N.")] = 5.0
 
 

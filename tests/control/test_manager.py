@@ -1,5 +1,7 @@
 """Claims, index maps and the factory: who commands which joint, and what is said when nobody or two do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,6 +118,21 @@ def test_contact_reaches_the_finger_that_it_belongs_to():
     for k in range(150, 300):
         manager.update(k * 0.001, world, contact_force=np.array([9, 9, 0.0, 0.0, 1.4, 9.0]))
     assert handle.result.fingers == ("contact", "contact")
+
+
+def test_a_sliding_finger_that_a_thing_stops_two_centimetres_before_its_target_has_not_arrived():
+    sliding = ("left_1", "left_2", "right_1")
+    model = robot()
+    model = replace(model, joints=tuple(replace(j, type="prismatic") if j.name in sliding else j for j in model.joints))
+    manager = build_controllers(spec(hand={"speed": 0.05}), model, 0.001)
+    hand = manager["hand"]
+    assert isinstance(hand, GripperController)
+    world = World()
+    world.position = np.full(6, 0.02)
+    handle = hand.send_goal(GripperGoal(target=np.zeros(3), force=10.0))
+    for k in range(1000):
+        manager.update(k * 0.001, world, contact_force=np.full(6, 4.0))
+    assert handle.result.fingers == ("stalled", "stalled")
 
 
 def test_effort_is_limited_by_the_gripper_and_by_the_joint():
