@@ -82,7 +82,8 @@ class Session:
         self._gravity = [manager.index(each.name) for each in manager.controllers if each.feed_forward == "gravity"]
         n = len(robot.joint_names)
         self._position, self._velocity, self._acceleration = np.zeros((3, n))
-        self._addition = np.zeros(n)
+        self._damping = np.array([joint.damping for joint in robot.moving_joints])
+        self._rate = np.zeros(n)
         self._contact_force = np.zeros(n)
         self._joint_of_part = _joint_of_part(robot)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
@@ -126,6 +127,7 @@ class Session:
                 self._velocity[index] = output.velocity
             if accelerates:
                 self._acceleration[index] = output.acceleration
+                self._rate[index] = output.velocity
         command = self._limiter.apply(command, state.position, state.velocity, self.period)
         self.engine.write(command, self._position, self._velocity)
         self.observer.tick(self.ticks, state, outputs)
@@ -134,10 +136,17 @@ class Session:
         return state
 
     def _wanted(self, state: WorldState) -> Array | None:
-        """Feed-forward efforts (n): gravity at the measured position, or inverse dynamics along the reference."""
+        """Feed-forward efforts (n): gravity at the measured position, or inverse dynamics along the reference,
+
+            M(q) a_r + C(q, v) v + g(q) + D v_r,
+
+        with the viscous damping D of the joints at the reference velocity: at the measured one it would undo a damping
+        that the loop is glad of.
+        """
         if not self._dynamics:
             return self._kinematics.gravity(state.position) if self._gravity else None
         efforts = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+        efforts += self._damping * self._rate
         if self._gravity:
             gravity = self._kinematics.gravity(state.position)
             for index in self._gravity:
