@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.model.mesh import read_mesh
+from manipcli.model.mesh_fault import UnusableMesh
 from manipcli.model.robot import Box, Cylinder, Mesh, Shape, Sphere
 
 if TYPE_CHECKING:
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def coal_shape(shape: Shape) -> coal.CollisionGeometry:
-    """Coal's own shape; a mesh becomes the convex hull of its vertices.
+    """Coal's own shape; a mesh becomes the convex hull of the vertices of its triangles.
 
     Raises:
         ValueError: the mesh cannot be read, or its points span no volume.
@@ -28,17 +30,21 @@ def coal_shape(shape: Shape) -> coal.CollisionGeometry:
             return coal.Sphere(radius)
         case Cylinder(radius=radius, length=length):
             return coal.Cylinder(radius, length)
-        case Mesh(path=path, scale=scale):
-            mesh = coal.MeshLoader().load(str(path), np.array(scale))
-            _refuse_flat(np.array(mesh.vertices()))
-            mesh.buildConvexHull(True, "Qt")
-            return mesh.convex
+        case Mesh(uri=uri, path=path, scale=scale):
+            try:
+                mesh = read_mesh(path)
+            except UnusableMesh as error:
+                raise ValueError(f"mesh '{uri}' {error.reason}") from error
+            if mesh.flat:  # qhull inside coal ends the process on points without a volume
+                raise ValueError(f"mesh '{uri}' is flat")
+            return _hull(mesh.vertices[np.unique(mesh.faces)] * np.array(scale))
 
 
-def _refuse_flat(points: Array) -> None:
-    """qhull inside coal ends the process on points without a volume, so they must not get there."""
-    if len(points) < 4 or not np.all(np.isfinite(points)):
-        raise ValueError("the mesh has fewer than four points, or one that is not finite")
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if spread[2] <= 1e-9 * spread[0]:
-        raise ValueError("the mesh is flat")
+def _hull(points: Array) -> coal.CollisionGeometry:
+    import coal
+
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(0, len(points))
+    model.addVertices(points)
+    model.buildConvexHull(True, "Qt")
+    return model.convex

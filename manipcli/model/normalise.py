@@ -6,14 +6,19 @@ a mass of 1 kg; a text of ours holds none of that.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform
+from manipcli.model.mesh import read_mesh
+from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.robot import (
     Box,
     Cylinder,
@@ -40,7 +45,7 @@ def portable_urdf(
     """The whole description as text with `package://` meshes; reading it again gives the same links and joints."""
     lines = _head(name)
     for link in links:
-        lines += _link(link, link.inertial, visuals=True, absolute=False)
+        lines += _link(link, link.inertial, link.visuals, lambda mesh: mesh.uri)
     for joint in joints:
         lines += _joint(joint)
     for tag in transmissions:
@@ -48,18 +53,19 @@ def portable_urdf(
     return _text(lines)
 
 
-def engine_urdf(robot: RobotModel, *, visuals: bool = False) -> str:
-    """What a physics engine reads: inertials, collision shapes, joints; meshes by absolute path.
+def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> str:
+    """What a physics engine reads: inertials, collision shapes, joints; meshes as files of ours, never those of users.
 
     A link without an inertial is written with mass 0. Limits are those of the model, robot file included; a mimic joint
     is an ordinary joint here.
 
     Args:
         robot: the robot.
-        visuals: also write what is drawn.
+        folder: takes the files of its meshes; to be kept until the engine has read them.
+        visuals: also write what is drawn; a mesh of it that cannot be read is left out.
 
     Raises:
-        InvalidInput: a joint moves nothing that has mass, or a line would be too long.
+        InvalidInput: a joint moves nothing that has mass, a line would be too long, or a collision mesh is damaged.
     """
     massless = massless_joints(robot)
     if massless:
@@ -75,13 +81,23 @@ def engine_urdf(robot: RobotModel, *, visuals: bool = False) -> str:
         )
     lines = _head(robot.name)
     for link in robot.links:
-        lines += _link(link, link.inertial or MASSLESS, visuals=visuals, absolute=True)
+        drawn = tuple(filter(_readable, link.visuals)) if visuals else ()
+        inertial = link.inertial or MASSLESS
+        inertial = dataclasses.replace(inertial, inertia=inside_triangle(inertial.inertia))
+        lines += _link(link, inertial, drawn, lambda mesh: str(clean_mesh(mesh, folder)))
     for joint in robot.joints:
         lines += _joint(joint)
     return _text(lines)
 
 
 MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)))
+
+
+def _readable(geometry: Geometry) -> bool:
+    try:
+        return not isinstance(geometry.shape, Mesh) or bool(read_mesh(geometry.shape.path))
+    except UnusableMesh:
+        return False
 
 
 def massless_joints(robot: RobotModel) -> tuple[str, ...]:
@@ -123,18 +139,22 @@ def _origin(X: Transform, indent: str) -> list[str]:
     return [f'{indent}<origin xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"/>']
 
 
-def _link(link: Link, inertial: Inertial | None, *, visuals: bool, absolute: bool) -> list[str]:
+FileOf = Callable[[Mesh], str]
+"""What stands in the description for the file of a mesh."""
+
+
+def _link(link: Link, inertial: Inertial | None, visuals: Sequence[Geometry], file_of: FileOf) -> list[str]:
     lines = [f"  <link name={quoteattr(link.name)}>"]
     if inertial is not None:
-        I = inside_triangle(inertial.inertia) if absolute else inertial.inertia  # noqa: E741
+        I = inertial.inertia  # noqa: E741
         lines += ["    <inertial>", *_origin(inertial.X_LI, "      ")]
         lines.append(f'      <mass value="{number(inertial.mass)}"/>')
         moments = {"ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2]}
         pairs = " ".join(f'{key}="{number(float(value))}"' for key, value in moments.items())
         lines += [f"      <inertia {pairs}/>", "    </inertial>"]
-    for tag, geometries in (("visual", link.visuals if visuals else ()), ("collision", link.collisions)):
+    for tag, geometries in (("visual", visuals), ("collision", link.collisions)):
         for geometry in geometries:
-            lines += _geometry(tag, geometry, absolute=absolute)
+            lines += _geometry(tag, geometry, file_of)
     return [*lines, "  </link>"]
 
 
@@ -151,9 +171,9 @@ def inside_triangle(inertia: Array) -> Array:
     return np.asarray(R @ np.diag(principal) @ R.T)
 
 
-def _geometry(tag: str, geometry: Geometry, *, absolute: bool) -> list[str]:
+def _geometry(tag: str, geometry: Geometry, file_of: FileOf) -> list[str]:
     lines = [f"    <{tag}>", *_origin(geometry.X_LS, "      ")]
-    lines.append(f"      <geometry>{_shape(geometry.shape, absolute)}</geometry>")
+    lines.append(f"      <geometry>{_shape(geometry.shape, file_of)}</geometry>")
     if geometry.rgba is not None:
         # PyBullet gives every material of one name the first one's colour, so the name says the colour.
         name = "rgba_" + "_".join(number(value) for value in geometry.rgba)
@@ -161,7 +181,7 @@ def _geometry(tag: str, geometry: Geometry, *, absolute: bool) -> list[str]:
     return [*lines, f"    </{tag}>"]
 
 
-def _shape(shape: Shape, absolute: bool) -> str:
+def _shape(shape: Shape, file_of: FileOf) -> str:
     match shape:
         case Box(size):
             return f'<box size="{_numbers(size)}"/>'
@@ -169,8 +189,8 @@ def _shape(shape: Shape, absolute: bool) -> str:
             return f'<sphere radius="{number(radius)}"/>'
         case Cylinder(radius, length):
             return f'<cylinder radius="{number(radius)}" length="{number(length)}"/>'
-        case Mesh(uri, path, scale):
-            return f'<mesh filename={quoteattr(str(path) if absolute else uri)} scale="{_numbers(scale)}"/>'
+        case Mesh(scale=scale):
+            return f'<mesh filename={quoteattr(file_of(shape))} scale="{_numbers(scale)}"/>'
 
 
 def _joint(joint: Joint) -> list[str]:

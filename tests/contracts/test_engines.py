@@ -503,7 +503,7 @@ def test_what_bullet_holds_is_read_back(tmp_path: Path) -> None:
     ball = (Geometry(Transform.identity(), Sphere(0.1)),)
     model = replace(model, links=(*model.links[:2], replace(model.links[2], collisions=ball)))
     file = tmp_path / "robot.urdf"
-    file.write_text(engine_urdf(model))
+    file.write_text(engine_urdf(model, tmp_path))
     client = p.connect(p.DIRECT)
     try:
         loaded = p.loadURDF(str(file), useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)

@@ -249,7 +249,7 @@ DESCRIPTIONS = {
 def test_what_we_write_reads_as_the_same_robot(path: Path, tmp_path: Path) -> None:
     content = RobotSpec(robot=path.parent.name, description=DESCRIPTIONS[path.parent.name])
     robot, _ = build_robot(content, file=path)
-    for text in (robot.urdf, engine_urdf(robot, visuals=True)):
+    for text in (robot.urdf, engine_urdf(robot, tmp_path, visuals=True)):
         assert max(len(line.encode()) for line in text.splitlines()) < 4096
     assert str(Path.cwd()) not in robot.urdf
     assert "file://" not in robot.urdf
@@ -273,5 +273,5 @@ def test_a_joint_that_moves_no_mass_is_no_matter_for_physics(file: Path) -> None
     robot = build(file)
     assert massless_joints(robot) == ("slide",)
     with pytest.raises(InvalidInput, match="'slide' moves nothing that has mass"):
-        engine_urdf(robot)
+        engine_urdf(robot, file.parent)
     assert massless_joints(build(file, **HANDED)) == ()  # the hand is fixed to it

@@ -164,7 +164,7 @@ class World:
         self.p = p
         self.client = p.connect(p.DIRECT)
         file = folder / "r.urdf"
-        file.write_text(engine_urdf(robot))
+        file.write_text(engine_urdf(robot, folder))
         self.body = p.loadURDF(
             str(file),
             list(robot.X_WB.p),

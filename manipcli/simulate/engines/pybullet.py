@@ -13,6 +13,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
+from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
 from manipcli.model.scene import Body, Scene
@@ -69,11 +70,12 @@ class PybulletEngine:
         )
         self._names: dict[int, str] = {}
         self._parts_of: dict[Pair, tuple[str, str]] = {}
-        self._bodies = [self._add_body(body) for body in scene.bodies]
+        with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
+            self._bodies = [self._add_body(body, Path(folder)) for body in scene.bodies]
+            self._load_robot(robot, Path(folder))
         self._movable = [
             (k, *_centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
-        self._load_robot(robot)
         self._start(robot, settings)
         n, m = len(self._joints), len(self._movable)
         self._state = WorldState(
@@ -88,7 +90,7 @@ class PybulletEngine:
         )
         self._substeps = settings.substeps
 
-    def _add_body(self, body: Body) -> int:
+    def _add_body(self, body: Body, folder: Path) -> int:
         p, client = self._p, self._client
         kinds, half, radii, lengths, positions, quats = [], [], [], [], [], []
         files, scales = [], []
@@ -99,7 +101,7 @@ class PybulletEngine:
             half.append([s / 2 for s in shape.size] if isinstance(shape, Box) else [0.0, 0.0, 0.0])
             radii.append(shape.radius if isinstance(shape, Sphere | Cylinder) else 0.0)
             lengths.append(shape.length if isinstance(shape, Cylinder) else 0.0)
-            files.append(str(shape.path) if isinstance(shape, Mesh) else "")
+            files.append(str(clean_mesh(shape, folder)) if isinstance(shape, Mesh) else "")
             scales.append(list(shape.scale) if isinstance(shape, Mesh) else [1.0, 1.0, 1.0])
             positions.append(list(X_IS.p))
             quats.append(list(X_IS.quat_xyzw))
@@ -138,19 +140,18 @@ class PybulletEngine:
         self._names[k] = body.name
         return cast(int, k)
 
-    def _load_robot(self, robot: RobotModel) -> None:
+    def _load_robot(self, robot: RobotModel, folder: Path) -> None:
         p, client = self._p, self._client
-        with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
-            file = Path(folder) / "robot.urdf"
-            file.write_text(engine_urdf(robot), encoding="utf-8")
-            self._robot: int = p.loadURDF(
-                str(file),
-                basePosition=list(robot.X_WB.p),
-                baseOrientation=list(robot.X_WB.quat_xyzw),
-                useFixedBase=True,
-                flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_IGNORE_VISUAL_SHAPES,
-                physicsClientId=client,
-            )
+        file = folder / "robot.urdf"
+        file.write_text(engine_urdf(robot, folder), encoding="utf-8")
+        self._robot: int = p.loadURDF(
+            str(file),
+            basePosition=list(robot.X_WB.p),
+            baseOrientation=list(robot.X_WB.quat_xyzw),
+            useFixedBase=True,
+            flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_IGNORE_VISUAL_SHAPES,
+            physicsClientId=client,
+        )
         count = p.getNumJoints(self._robot, physicsClientId=client)
         infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
