@@ -85,6 +85,19 @@ def rotate_inverse(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:
     return rotate(q, vector)
 
 
+def quat_product(a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
+    """Hamilton's product `a b` of quaternions (..., 4) xyzw, broadcast: R(a b) = R(a) R(b)."""
+    left, right = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    ax, ay, az, aw = left[..., 0], left[..., 1], left[..., 2], left[..., 3]
+    bx, by, bz, bw = right[..., 0], right[..., 1], right[..., 2], right[..., 3]
+    out = np.empty(np.broadcast_shapes(left.shape, right.shape))
+    out[..., 0] = aw * bx + ax * bw + ay * bz - az * by
+    out[..., 1] = aw * by - ax * bz + ay * bw + az * bx
+    out[..., 2] = aw * bz + ax * by - ay * bx + az * bw
+    out[..., 3] = aw * bw - ax * bx - ay * by - az * bz
+    return out
+
+
 def matrix_from_axis_angle(axis: npt.ArrayLike, angle: float) -> Array:
     """Rotation by `angle` [rad] about a unit `axis` (3,): Rodrigues' formula."""
     x, y, z = np.asarray(axis, dtype=np.float64)

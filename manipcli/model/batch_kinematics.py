@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform, frozen, rotate
+from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
 from manipcli.model.robot import Joint, RobotModel
 
 
@@ -42,7 +42,7 @@ def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
     for k, before in enumerate(terms.before):
         if before >= 0:
             p[:, k] = p[:, before] + rotate(quat[:, before], p[:, k])
-            quat[:, k] = _product(quat[:, before], quat[:, k])
+            quat[:, k] = quat_product(quat[:, before], quat[:, k])
     return p, quat
 
 
@@ -90,21 +90,9 @@ def _halves(joints: tuple[Joint, ...], placements: list[Transform]) -> tuple[Arr
     p, u, v, slide = np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 3))
     for k, (joint, X) in enumerate(zip(joints, placements, strict=True)):
         p[k], v[k] = X.p, X.quat_xyzw
-        u[k] = _product(v[k], np.array([*joint.axis, 0.0]))
+        u[k] = quat_product(v[k], np.array([*joint.axis, 0.0]))
         slide[k] = X.R @ joint.axis
     return frozen(p), frozen(u), frozen(v), frozen(slide)
-
-
-def _product(a: Array, b: Array) -> Array:
-    """Hamilton's product of quaternions (..., 4) xyzw."""
-    ax, ay, az, aw = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
-    bx, by, bz, bw = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    out[..., 0] = aw * bx + ax * bw + ay * bz - az * by
-    out[..., 1] = aw * by - ax * bz + ay * bw + az * bx
-    out[..., 2] = aw * bz + ax * by - ay * bx + az * bw
-    out[..., 3] = aw * bw - ax * bx - ay * by - az * bz
-    return out
 
 
 class _ByIdentity:

@@ -1,0 +1,196 @@
+"""What is drawn of a robot and a scene: named surfaces in named frames. Knows no viewer and no renderer.
+
+A `Drawing` says what there is, once; `Placing` says where its frames are, for one state or for thousands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manipcli.core.geometry import Transform
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, RobotModel, Shape, Sphere
+from manipcli.model.scene import Body, Scene
+from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
+from manipcli.replay.surface import Rgba, Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+
+Layer = Literal["visual", "collision", "inertia"]
+LAYERS: tuple[Layer, ...] = ("visual", "collision", "inertia")
+
+PLAIN: Rgba = (0.72, 0.74, 0.77, 1.0)
+"""Where neither the description nor the mesh says a colour."""
+COLLISION: Rgba = (0.98, 0.60, 0.10, 0.45)
+INERTIA: Rgba = (0.20, 0.45, 0.90, 0.45)
+THINNEST = 1e-3
+"""Least length of an edge of an inertia box [m]: a rod or a plate would not be seen."""
+WORLD = "world"
+
+
+@dataclass(frozen=True, slots=True)
+class Drawable:
+    """One surface.
+
+    Attributes:
+        name: unique in its drawing, `robot/link_1/visual_0`.
+        layer: what it shows.
+        frame: the frame it is fixed in.
+        surface: triangles in that frame.
+        rgba: 0 to 1.
+    """
+
+    name: str
+    layer: Layer
+    frame: str
+    surface: Surface
+    rgba: Rgba
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A named frame that is shown as three axes: the tool, a frame of the task."""
+
+    name: str
+    frame: str
+    X_FM: Transform
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Everything that can be drawn.
+
+    Attributes:
+        frames: `world`, then `robot/<link>` for each link, then the bodies by name: the order of all pose arrays.
+        drawables: each fixed in one of them.
+        marks: further frames.
+        missing: what could not be drawn, one line each.
+    """
+
+    frames: tuple[str, ...]
+    drawables: tuple[Drawable, ...]
+    marks: tuple[Mark, ...] = ()
+    missing: tuple[str, ...] = ()
+
+    def layer(self, layer: Layer) -> tuple[Drawable, ...]:
+        """The drawables of one layer."""
+        return tuple(drawable for drawable in self.drawables if drawable.layer == layer)
+
+
+def link_frame(link: str) -> str:
+    """The name of a link's frame: as in contacts, so that no body can have it."""
+    return f"robot/{link}"
+
+
+def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
+    """The drawing of a robot, a scene, or both.
+
+    Collision meshes are drawn as their convex hulls, which is what planner and physics take them for.
+    """
+    missing: list[str] = []
+    frames: list[str] = [WORLD]
+    drawables: list[Drawable] = []
+    marks: list[Mark] = []
+    if robot is not None:
+        for link in robot.links:
+            frames.append(link_frame(link.name))
+            drawables += _link(link, missing)
+        if robot.tool is not None:
+            marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
+    if scene is not None:
+        for body in scene.bodies:
+            frames.append(body.name)
+            drawables += _body(body, missing)
+        marks += [Mark(frame.name, frame.parent, frame.X_PF) for frame in scene.frames]
+    return Drawing(tuple(frames), tuple(drawables), tuple(marks), tuple(dict.fromkeys(missing)))
+
+
+def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
+    frame = link_frame(link.name)
+    yield from _shapes("visual", frame, link.visuals, None, missing)
+    yield from _shapes("collision", frame, link.collisions, COLLISION, missing)
+    if link.inertial is not None:
+        yield from _inertia(frame, link.inertial)
+
+
+def _body(body: Body, missing: list[str]) -> Iterator[Drawable]:
+    yield from _shapes("visual", body.name, body.geometries, None, missing)
+    yield from _shapes("collision", body.name, body.geometries, COLLISION, missing)
+    if not body.fixed:
+        yield from _inertia(body.name, Inertial(body.mass, body.X_OI, body.inertia))
+
+
+def _shapes(
+    layer: Layer, frame: str, geometries: tuple[Geometry, ...], rgba: Rgba | None, missing: list[str]
+) -> Iterator[Drawable]:
+    for k, geometry in enumerate(geometries):
+        try:
+            surfaces = shape_surfaces(geometry.shape, hull=layer == "collision")
+        except UnreadableMesh as error:
+            missing.append(f"{layer} shape of '{frame}': {error}")
+            continue
+        for n, one in enumerate(surfaces):
+            name = f"{frame}/{layer}_{k}" + (f"_{n}" if len(surfaces) > 1 else "")
+            yield Drawable(name, layer, frame, one.moved(geometry.X_LS), rgba or geometry.rgba or one.rgba or PLAIN)
+
+
+def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
+    """The surfaces of a shape in its own frame, scaled; several where a mesh file has several colours.
+
+    Args:
+        shape: the shape.
+        hull: the convex hull of a mesh instead of its triangles.
+
+    Raises:
+        UnreadableMesh: a mesh cannot be drawn.
+    """
+    match shape:
+        case Box():
+            return (box_surface(shape),)
+        case Sphere():
+            return (sphere_surface(shape),)
+        case Cylinder():
+            return (cylinder_surface(shape),)
+        case Mesh():
+            whole = tuple(one.scaled(shape.scale) for one in mesh_surfaces(shape.path))
+            return (_hull(whole),) if hull else whole
+
+
+def _hull(surfaces: tuple[Surface, ...]) -> Surface:
+    """The convex hull of all vertices; where they span no volume, the surfaces themselves."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.concatenate([one.vertices for one in surfaces])
+    try:
+        found = ConvexHull(points)
+    except QhullError:
+        first = np.cumsum([0, *(len(one.vertices) for one in surfaces[:-1])])
+        return smoothed(points, np.concatenate([one.faces + k for one, k in zip(surfaces, first, strict=True)]))
+    faces = np.array(found.simplices)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward, ::-1]
+    return smoothed(points, faces)
+
+
+def inertia_box(inertial: Inertial) -> tuple[Box, Transform]:
+    """The uniform box with the mass and inertia of a body, and X_LB, where it stands in the body's frame.
+
+    With principal moments I1, I2, I3 its edges are a_i = sqrt(6 (I_j + I_k - I_i) / m), from I_i = m (a_j^2 + a_k^2)
+    / 12; a negative radicand (no body has such moments) gives an edge of length 0.
+    """
+    moments, axes = np.linalg.eigh(inertial.inertia)
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    squares = 6.0 * (float(moments.sum()) - 2.0 * moments) / inertial.mass
+    a, b, c = (math.sqrt(max(float(square), 0.0)) for square in squares)
+    return Box((a, b, c)), inertial.X_LI @ Transform.of(R=axes)
+
+
+def _inertia(frame: str, inertial: Inertial) -> Iterator[Drawable]:
+    if inertial.mass <= 0.0 or not np.isfinite(inertial.inertia).all():
+        return
+    box, X = inertia_box(inertial)
+    a, b, c = (max(edge, THINNEST) for edge in box.size)
+    yield Drawable(f"{frame}/inertia", "inertia", frame, box_surface(Box((a, b, c))).moved(X), INERTIA)

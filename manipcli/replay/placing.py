@@ -1,0 +1,77 @@
+"""Where the frames of a drawing are, for one state or for thousands at once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, quat_product, rotate
+from manipcli.model.batch_kinematics import forward_batch
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Where the frames of a drawing are: `position` (..., F, 3) [m], `quat_xyzw` (..., F, 4), in the world."""
+
+    position: Array
+    quat_xyzw: Array
+
+    def X_WF(self, k: int) -> Transform:
+        """The pose of frame number k, where there is one instant only."""
+        return Transform.of(xyz=self.position[k], quat_xyzw=self.quat_xyzw[k])
+
+
+class Placing:
+    """Joint positions and poses of bodies to the poses of all frames of `draw(robot, scene)`."""
+
+    def __init__(self, robot: RobotModel | None, scene: Scene | None = None) -> None:
+        self._robot = robot
+        self._scene = scene
+        # Each link stands still in the child link of the last moving joint above it, or in the world.
+        self._links: list[tuple[int, Transform]] = []
+        if robot is not None:
+            where: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
+            for joint in robot.joints:
+                last, X = where[joint.parent]
+                if joint.moves:
+                    where[joint.child] = (robot.joint_names.index(joint.name), Transform.identity())
+                else:
+                    where[joint.child] = (last, X @ joint.X_PJ)
+            self._links = [where[link.name] for link in robot.links]
+
+    def start(self, q: Array | None = None) -> Poses:
+        """Joints at `q` (n,), bodies where the scene starts."""
+        movable = self._scene.movable if self._scene is not None else ()
+        p = np.array([body.X_WO.p for body in movable]).reshape(-1, 3)
+        quat = np.array([body.X_WO.quat_xyzw for body in movable]).reshape(-1, 4)
+        return self.at(np.zeros(0) if q is None else q, p, quat)
+
+    def at(self, q: Array, body_position: Array, body_quat_xyzw: Array) -> Poses:
+        """Poses at states as in `WorldState`: `q` (..., n), bodies (..., m, 3) and (..., m, 4)."""
+        axes = q.shape[:-1]
+        count = math.prod(axes)
+        bodies = self._scene.bodies if self._scene is not None else ()
+        frames = 1 + len(self._links) + len(bodies)
+        position, quat = np.zeros((count, frames, 3)), np.zeros((count, frames, 4))
+        quat[:, 0, 3] = 1.0
+        if self._robot is not None:
+            p, r = forward_batch(self._robot, q.reshape(count, -1))
+            for k, (last, X) in enumerate(self._links, start=1):
+                if last < 0:
+                    position[:, k], quat[:, k] = X.p, X.quat_xyzw
+                else:
+                    position[:, k] = p[:, last] + rotate(r[:, last], X.p)
+                    quat[:, k] = quat_product(r[:, last], X.quat_xyzw)
+        moved = 0
+        for k, body in enumerate(bodies, start=1 + len(self._links)):
+            if body.fixed:
+                position[:, k], quat[:, k] = body.X_WO.p, body.X_WO.quat_xyzw
+            else:
+                position[:, k] = body_position.reshape(count, -1, 3)[:, moved]
+                quat[:, k] = body_quat_xyzw.reshape(count, -1, 4)[:, moved]
+                moved += 1
+        return Poses(position.reshape(*axes, frames, 3), quat.reshape(*axes, frames, 4))

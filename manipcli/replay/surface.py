@@ -1,0 +1,170 @@
+"""Triangles with one colour: all that a viewer or renderer has to know about a shape."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.robot import Box, Cylinder, Sphere
+
+Rgba = tuple[float, float, float, float]
+Faces = npt.NDArray[np.int32]
+
+SEGMENTS = 48
+"""Around a cylinder or a sphere: no corner is seen at the size of a screen."""
+CREASE = math.radians(35.0)
+"""Two triangles that meet at more than this [rad] have an edge between them; below it they are one round surface."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Triangles in a frame of their own.
+
+    Attributes:
+        vertices: (v, 3) [m]; triangles that share one are shaded as one round surface.
+        faces: (f, 3) indices of vertices, counter-clockwise seen from outside.
+        rgba: 0 to 1, or None where nothing says a colour.
+    """
+
+    vertices: Array
+    faces: Faces
+    rgba: Rgba | None = None
+
+    def moved(self, X: Transform) -> Surface:
+        """The same in the frame that X leads to."""
+        return replace(self, vertices=frozen(X.apply(self.vertices)))
+
+    @property
+    def normals(self) -> Array:
+        """(v, 3) unit, outwards: the mean over the triangles of a vertex, weighted by their areas."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        weighted = np.cross(b - a, c - a)
+        found = np.zeros_like(self.vertices)
+        for k in range(3):
+            np.add.at(found, self.faces[:, k], weighted)
+        length = np.linalg.norm(found, axis=1, keepdims=True)
+        return np.where(length > 0.0, found / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
+
+    def scaled(self, scale: tuple[float, float, float]) -> Surface:
+        """Scaled along each axis; a mirrored surface is turned so that its outside stays outside."""
+        faces = self.faces if math.prod(scale) >= 0.0 else self.faces[:, ::-1]
+        return replace(self, vertices=frozen(self.vertices * np.asarray(scale)), faces=_indices(faces))
+
+
+def _indices(faces: npt.ArrayLike) -> Faces:
+    array = np.array(faces, dtype=np.int32)
+    array.flags.writeable = False
+    return array
+
+
+def surface(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:
+    """A surface from anything like arrays; vertices stay shared as they are."""
+    return Surface(frozen(np.reshape(vertices, (-1, 3))), _indices(np.reshape(faces, (-1, 3))), rgba)
+
+
+def box_surface(box: Box) -> Surface:
+    """Twelve triangles, four vertices a side."""
+    corners: list[Array] = []
+    faces: list[list[int]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            first = len(corners)
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                corner = np.zeros(3)
+                corner[axis], corner[u], corner[v] = sign, a, b
+                corners.append(corner)
+            side = [(0, 1, 2), (0, 2, 3)] if sign > 0 else [(0, 2, 1), (0, 3, 2)]
+            faces += [[first + k for k in triangle] for triangle in side]
+    return surface(np.array(corners) * np.asarray(box.size) / 2.0, faces)
+
+
+def sphere_surface(sphere: Sphere) -> Surface:
+    """Circles of latitude between two poles."""
+    rings = SEGMENTS // 2
+    polar = np.linspace(0.0, math.pi, rings + 1)[1:-1]
+    around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
+    theta, phi = np.meshgrid(polar, around, indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    top, bottom = len(polar) * SEGMENTS, len(polar) * SEGMENTS + 1
+    k, after = np.arange(SEGMENTS), (np.arange(SEGMENTS) + 1) % SEGMENTS
+    faces = [np.stack([np.full(SEGMENTS, top), k, after], axis=1)]
+    for ring in range(len(polar) - 1):
+        upper, lower = ring * SEGMENTS, (ring + 1) * SEGMENTS
+        faces.append(np.stack([upper + k, lower + k, lower + after], axis=1))
+        faces.append(np.stack([upper + k, lower + after, upper + after], axis=1))
+    last = (len(polar) - 1) * SEGMENTS
+    faces.append(np.stack([np.full(SEGMENTS, bottom), last + after, last + k], axis=1))
+    vertices = np.vstack([points.reshape(-1, 3), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    return surface(sphere.radius * vertices, np.concatenate(faces))
+
+
+def cylinder_surface(cylinder: Cylinder) -> Surface:
+    """A round side and two flat ends, with vertices of their own so that the rims stay sharp."""
+    around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
+    circle = cylinder.radius * np.stack([np.cos(around), np.sin(around), np.zeros(SEGMENTS)], axis=1)
+    half = np.array([0.0, 0.0, cylinder.length / 2.0])
+    vertices = np.vstack([circle - half, circle + half, circle - half, circle + half, [-half, half]])
+    k, after = np.arange(SEGMENTS), (np.arange(SEGMENTS) + 1) % SEGMENTS
+    low, high = 2 * SEGMENTS, 3 * SEGMENTS
+    faces = [
+        np.stack([k, after, SEGMENTS + after], axis=1),
+        np.stack([k, SEGMENTS + after, SEGMENTS + k], axis=1),
+        np.stack([np.full(SEGMENTS, 4 * SEGMENTS), low + after, low + k], axis=1),
+        np.stack([np.full(SEGMENTS, 4 * SEGMENTS + 1), high + k, high + after], axis=1),
+    ]
+    return surface(vertices, np.concatenate(faces))
+
+
+def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:
+    """A surface whose triangles share a vertex exactly where no crease runs between them.
+
+    Mesh files share all vertices, or none (STL); shaded as they are, edges look melted or round parts faceted. Corners
+    of triangles at one point are joined across each edge between them that is no crease.
+
+    Args:
+        vertices: (v, 3) [m].
+        faces: (f, 3); triangles without an area are left out.
+        rgba: colour.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    points = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+    corners = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+    if not len(corners):
+        return surface(np.zeros((0, 3)), np.zeros((0, 3)), rgba)
+    # One index a place: points closer than a millionth of the size are the same.
+    grain = max(float(np.ptp(points, axis=0).max()), 1e-12) * 1e-6
+    _, place = np.unique(np.round(points / grain), axis=0, return_inverse=True)
+    place = place.reshape(-1)[corners]
+    a, b, c = (points[corners[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    area = np.linalg.norm(normals, axis=1)
+    kept = area > grain * grain
+    corners, place, normals = corners[kept], place[kept], normals[kept] / area[kept, None]
+    count = len(corners)
+    if not count:
+        return surface(np.zeros((0, 3)), np.zeros((0, 3)), rgba)
+
+    # Every edge twice, once for each of its triangles: (low place, high place, corner at low, corner at high).
+    tail, head = place.reshape(-1), place[:, [1, 2, 0]].reshape(-1)
+    at_tail, at_head = np.arange(3 * count), np.arange(3 * count).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
+    turned = tail > head
+    low, high = np.where(turned, head, tail), np.where(turned, tail, head)
+    at_low, at_high = np.where(turned, at_head, at_tail), np.where(turned, at_tail, at_head)
+    order = np.lexsort((high, low))
+    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+    one, other = order[:-1][same], order[1:][same]
+    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > math.cos(CREASE)
+    one, other = one[smooth], other[smooth]
+    ends = np.concatenate([at_low[one], at_high[one]]), np.concatenate([at_low[other], at_high[other]])
+    graph = coo_matrix((np.ones(len(ends[0]), dtype=np.int8), ends), shape=(3 * count, 3 * count))
+    number, vertex = connected_components(graph, directed=False)
+    placed = np.empty((number, 3))
+    placed[vertex] = points[corners.reshape(-1)]
+    return surface(placed, vertex.reshape(-1, 3), rgba)
