@@ -20,12 +20,15 @@ from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.plan.steps import STEPS
 from manipcli.record.channels import ControllerChannel
+from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
 from manipcli.record.recording import Recording
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
 
 RUNS = Path("runs")
 """Where logs go that nobody asked elsewhere, below the working directory."""
@@ -51,11 +54,11 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
         path,
         robot=task.robot,
         scene=task.scene,
-        controllers=[ControllerChannel(name=c.name, joints=c.joints) for c in manager.controllers],
+        controllers=[ControllerChannel(c.name, c.joints, c.interface) for c in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
-            (TASK, YAML, resolved(task.spec).encode()),
-            (ROBOT, YAML, resolved(task.robot_file.spec).encode()),
+            (TASK, YAML, resolved(_portable_task(task.spec)).encode()),
+            (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
             (CONTROLLERS, YAML, resolved(task.controllers).encode()),
             (URDF, XML, task.robot.urdf.encode()),
             (SCENE, JSON, scene_to_json(task.scene)),
@@ -77,11 +80,29 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
 
 
 def mesh_hashes(task: Task) -> dict[str, str]:
-    """SHA-256 of every mesh file of the robot and of the scene, by the URI or path as written."""
+    """SHA-256 of every mesh file of the robot and of the scene, by its URI."""
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
     geometries += [g for body in task.scene.bodies for g in body.geometries]
     meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
     return {uri: hashlib.sha256(meshes[uri].read_bytes()).hexdigest() for uri in sorted(meshes)}
+
+
+def _portable_task(spec: TaskSpec) -> TaskSpec:
+    """The task without folders of this machine in the names of its files."""
+    scene = dict(spec.scene)
+    for name, body in scene.items():
+        for key, shape in (("mesh", body.mesh), ("urdf", body.urdf)):
+            if shape is not None:
+                portable = shape.model_copy(update={"file": portable_name(shape.file)})
+                scene[name] = body.model_copy(update={key: portable})
+    files = {"robot": portable_name(spec.robot), "controllers": portable_name(spec.controllers)}
+    return spec.model_copy(update={"scene": scene, **files})
+
+
+def _portable_robot(spec: RobotSpec) -> RobotSpec:
+    """The robot file without folders of this machine in the names of its descriptions."""
+    attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
+    return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
 
 
 def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
@@ -92,25 +113,40 @@ def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
         being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
 
     Raises:
-        InvalidInput: the file is no log of ours, or is damaged.
+        InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
     """
     recording = open_recording(path, being_written=being_written)
     task = load_task_text(
-        recording.attachments[TASK],
+        _attached(recording, path, TASK),
         f"{path.name}/{TASK}",
         steps=STEPS,
         conditions=CONDITIONS,
         expectations=EXPECTATIONS,
     ).spec
     expect = [(expected.name, expected.body) for expected in task.expect]
-    scene = scene_from_json(recording.attachments[SCENE])
-    return judge(recording, expect=expect, robot=_recorded_robot(recording), scene=scene)
+    try:
+        scene = scene_from_json(_attached(recording, path, SCENE))
+    except ValueError as error:
+        message = f"{path.name}/{SCENE}: this is not the scene of a log"
+        raise InvalidInput([Finding("LOG103", message)]) from error
+    return judge(recording, expect=expect, robot=_recorded_robot(recording, path), scene=scene)
 
 
-def _recorded_robot(recording: Recording) -> RobotModel:
+def _recorded_robot(recording: Recording, path: Path) -> RobotModel:
     """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
-    spec = load_robot_text(recording.attachments[ROBOT], ROBOT).spec
-    return rebuild_robot(spec, recording.attachments[URDF])
+    spec = load_robot_text(_attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
+    return rebuild_robot(spec, _attached(recording, path, URDF))
+
+
+def _attached(recording: Recording, path: Path, name: str) -> bytes:
+    """
+    Raises:
+        InvalidInput: the log has no such attachment.
+    """
+    if name not in recording.attachments:
+        message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
+        raise InvalidInput([Finding("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")])
+    return recording.attachments[name]
 
 
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:

@@ -34,7 +34,9 @@ def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
         raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(MESH_SUFFIXES)}")
     if not path.is_file():
         raise ValueError(f"there is no file '{spec.file}'")
-    shape = Mesh(uri=spec.file, path=path, scale=(spec.scale, spec.scale, spec.scale))
+    # As it is written; but a path that begins at the root says where things are on this machine.
+    uri = Packages(None).portable(path) if spec.file.startswith(("/", "file:")) else spec.file
+    shape = Mesh(uri=uri, path=path, scale=(spec.scale, spec.scale, spec.scale))
     try:
         hull = coal_shape(shape)
     except (ValueError, RuntimeError) as error:

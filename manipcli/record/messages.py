@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from pathlib import PurePosixPath
+from pathlib import PurePath
 
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import Box, Cylinder, Geometry, Mesh, RobotModel, Sphere
@@ -93,9 +93,13 @@ def _shape(geometry: Geometry) -> tuple[int, tuple[float, float, float], str]:
         case Cylinder(radius=radius, length=length):
             return CYLINDER, (2 * radius, 2 * radius, length), ""
         case Mesh(uri=uri, scale=scale):
-            # An absolute path would tie the file to one machine; its last part still says which mesh it was.
-            portable = PurePosixPath(uri).name if uri.startswith(("/", "file:")) else uri
-            return MESH_RESOURCE, scale, portable
+            return MESH_RESOURCE, scale, portable_name(uri)
+
+
+def portable_name(file: str) -> str:
+    """How a log calls a file: as it is written, but for an absolute path, which would tie the log to one machine; the
+    last part of that still says which file it was."""
+    return PurePath(file).name if PurePath(file).is_absolute() or file.startswith("file:") else file
 
 
 def event_message(ns: int, event: TaskEvent) -> bytes:
