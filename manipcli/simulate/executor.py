@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
+import numpy as np
+
 from manipcli.control.action import GoalHandle
 from manipcli.control.gripper import GripperController, GripperGoal
 from manipcli.control.joint_trajectory_controller import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
-from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
-from manipcli.plan.hand import fingers
 from manipcli.plan.step import Grip, Motion
 from manipcli.simulate.session import Session
 
@@ -21,6 +21,8 @@ Until = Callable[[WorldState], bool]
 
 UNTIL_TICKS: Final = 10
 """Control ticks between two looks at an `until`."""
+PATIENCE: Final = 30.0
+"""A motion without a deadline that takes so much longer [s] than planned is given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +54,10 @@ class Executor:
         Args:
             motion: what to do.
             until: waited for in addition, where the motion awaits it.
-            deadline: simulated time [s] at which the step's time is over.
+            deadline: simulated time [s] at which the step's time is over; None: `PATIENCE` after the planned end.
         """
         session = self._session
+        given_up = session.time + motion.duration + PATIENCE
         handles = self._send(motion)
         last_tick = session.ticks + round(motion.duration / session.period)
         awaited = until if motion.awaits else None
@@ -69,8 +72,13 @@ class Executor:
             if not busy and awaited is None:
                 return _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
+                why = _late(motion, handles)
                 self._cancel(handles)
-                return MotionEnd("timeout", _late(motion, handles))
+                return MotionEnd("timeout", why)
+            if deadline is None and session.time >= given_up:
+                late = f"'{motion.label}' is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
+                self._cancel(handles)
+                return MotionEnd("timeout", late)
 
     def wait(self, until: Until, *, deadline: float) -> MotionEnd:
         """Hold still until the condition holds."""
@@ -97,7 +105,7 @@ class Executor:
             gripper = manager.serving(motion.grip.joints)
             if not isinstance(gripper, GripperController):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
-            handles.append(gripper.send_goal(_gripper_goal(self._session.robot, gripper, motion.grip)))
+            handles.append(gripper.send_goal(_gripper_goal(gripper, motion.grip)))
         return tuple(handles)
 
     def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
@@ -121,9 +129,11 @@ def _late(motion: Motion, handles: tuple[GoalHandle, ...]) -> str:
     return f"the step's timeout came at '{motion.label}': the condition under `until` did not come to hold"
 
 
-def _gripper_goal(robot: RobotModel, gripper: GripperController, grip: Grip) -> GripperGoal:
-    return GripperGoal(
-        target=grip.target[[grip.joints.index(name) for name in gripper.joints]],
-        force=grip.force,
-        fingers=fingers(robot, gripper.joints),
-    )
+def _unreached(handles: tuple[GoalHandle, ...]) -> str:
+    """How far what is still active is from what it wants."""
+    far = max((float(np.abs(handle.feedback().error).max()) for handle in handles if handle.active), default=0.0)
+    return f"the joint that is furthest from its reference misses it by {far:.3g}"
+
+
+def _gripper_goal(gripper: GripperController, grip: Grip) -> GripperGoal:
+    return GripperGoal(target=grip.target[[grip.joints.index(name) for name in gripper.joints]], force=grip.force)

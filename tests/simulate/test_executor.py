@@ -1,0 +1,167 @@
+"""Motions to goals: when a motion is done, what fails it, what `until` and the timeout mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import InvalidArgument
+from manipcli.model.state import Contact
+from manipcli.plan.step import Grip, Motion
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.simulate import executor as executor_module
+from manipcli.simulate.executor import UNTIL_TICKS, Executor
+from manipcli.simulate.session import Session
+
+SessionOf = Callable[..., Session]
+
+
+def move(to: float = 0.5, duration: float = 0.5, **changes: Any) -> Motion:
+    """The slide from 0 to `to` [m]: one cubic, at rest at both ends."""
+    trajectory = JointTrajectory(("slide",), np.array([duration]), np.array([[to]]), np.array([[0.0]]), None)
+    return Motion("go", trajectory, None, duration, **changes)
+
+
+def close(target: float = 0.4, *, force: float | None = 5.0, must_hold: bool = True) -> Motion:
+    return Motion("close", None, Grip(("knuckle", "tip"), np.full(2, target), force, must_hold), 0.2)
+
+
+def wait(duration: float, *, awaits: bool = True) -> Motion:
+    return Motion("wait", None, None, duration, awaits=awaits)
+
+
+def test_a_motion_is_done_when_its_trajectory_is_and_not_before(session_of: SessionOf) -> None:
+    session = session_of()
+    end = Executor(session).run(move(), until=None, deadline=None)
+    assert end.outcome == "done"
+    assert session.time == pytest.approx(0.5, abs=0.002)
+    assert session.engine.read().position[0] == pytest.approx(0.5)
+
+
+def test_a_motion_that_commands_nothing_lasts_its_duration(session_of: SessionOf) -> None:
+    session = session_of()
+    assert Executor(session).run(wait(0.25), until=None, deadline=None).outcome == "done"
+    assert session.ticks == 250
+
+
+def test_until_is_waited_for_after_the_motion_and_looked_at_every_tenth_tick(session_of: SessionOf) -> None:
+    session = session_of()
+    asked: list[float] = []
+
+    def until(state: Any) -> bool:
+        asked.append(session.time)
+        return session.ticks >= 400
+
+    assert Executor(session).run(wait(0.25), until=until, deadline=None).outcome == "done"
+    assert session.ticks == 400
+    assert asked[0] == pytest.approx(0.25)
+    assert len(asked) == (400 - 250) // UNTIL_TICKS + 1
+
+
+def test_a_motion_that_does_not_await_is_not_asked_until(session_of: SessionOf) -> None:
+    def until(state: Any) -> bool:
+        raise AssertionError
+
+    assert Executor(session_of()).run(wait(0.1, awaits=False), until=until, deadline=None).outcome == "done"
+
+
+def test_the_timeout_comes_at_its_time_and_says_what_was_on(session_of: SessionOf) -> None:
+    session = session_of()
+    end = Executor(session).run(wait(0.1), until=lambda _: False, deadline=0.3)
+    assert (end.outcome, session.ticks) == ("timeout", 300)
+    assert "'wait'" in end.text
+    assert "until" in end.text
+
+    session = session_of()
+    end = Executor(session).run(move(), until=None, deadline=0.3)
+    assert (end.outcome, session.ticks) == ("timeout", 300)
+    assert end.text == "the step's timeout came during 'go'"
+
+
+def test_after_a_timeout_the_joints_stop_where_they_are(session_of: SessionOf) -> None:
+    session = session_of()
+    executor = Executor(session)
+    executor.run(move(), until=None, deadline=0.25)
+    executor.hold(0.5)
+    state = session.engine.read()
+    assert state.velocity[0] == 0.0
+    assert 0.2 < state.position[0] < 0.4
+
+
+def test_wait_holds_until_the_condition_or_the_deadline(session_of: SessionOf) -> None:
+    session = session_of()
+    assert Executor(session).wait(lambda _: session.ticks >= 70, deadline=1.0).outcome == "done"
+    assert session.ticks == 70
+    end = Executor(session).wait(lambda _: False, deadline=0.2)
+    assert (end.outcome, session.ticks) == ("timeout", 200)
+    assert "did not come to hold" in end.text
+
+
+def test_a_joint_that_does_not_follow_fails_the_motion_with_joint_value_limit_and_time(
+    session_of: SessionOf, scripted: Any
+) -> None:
+    """The engine stands still: the reference is 0.1 m away, the tolerance on the way, after a while."""
+    session = session_of(scripted())
+    end = Executor(session).run(move(), until=None, deadline=None)
+    assert end.outcome == "failed"
+    # s(t) = 0.5 (3 u^2 - 2 u^3) with u = t / 0.5 passes 0.1 at u = 0.287.
+    assert session.time == pytest.approx(0.287 * 0.5, abs=0.003)
+    for word in ("'slide'", "0.1 m", f"{session.time - session.period:.3f} s"):
+        assert word in end.text, end.text
+
+
+def test_a_goal_that_is_not_reached_in_its_grace_fails_the_motion(session_of: SessionOf, scripted: Any) -> None:
+    """0.05 m stay: within the tolerance on the way (0.1 m), not within that at the end (0.01 m)."""
+    session = session_of(scripted())
+    end = Executor(session).run(move(0.05), until=None, deadline=None)
+    assert end.outcome == "failed"
+    assert session.time == pytest.approx(0.5 + 0.2, abs=0.01)
+    assert "'slide'" in end.text
+
+
+def test_a_hand_that_closes_on_nothing_fails_where_it_must_hold(session_of: SessionOf) -> None:
+    end = Executor(session_of()).run(close(), until=None, deadline=None)
+    assert end.outcome == "failed"
+    assert end.text.startswith("the hand closed on nothing: finger of 'knuckle': reached its target")
+    assert Executor(session_of()).run(close(must_hold=False), until=None, deadline=None).outcome == "done"
+    assert Executor(session_of(), touch=False).run(close(), until=None, deadline=None).outcome == "done"
+
+
+def test_a_hand_that_meets_something_holds(session_of: SessionOf, scripted: Any) -> None:
+    def touch(engine: Any) -> None:
+        engine.state.position[1:] = min(0.002 * engine.tick, 0.2)
+        engine.state.velocity[1:] = 2.0 if engine.tick < 100 else 0.0
+        engine.touching = (Contact("block", "robot/pad", 8.0, 0.0),) if engine.tick >= 100 else ()
+
+    end = Executor(session_of(scripted(touch))).run(close(), until=None, deadline=None)
+    assert end.outcome == "done"
+    assert "contact at" in end.text
+
+
+def test_a_hand_that_never_comes_to_an_end_is_given_up(
+    session_of: SessionOf, scripted: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It swings for ever: neither there, nor still, nor in contact."""
+    monkeypatch.setattr(executor_module, "PATIENCE", 2.0)
+
+    def swing(engine: Any) -> None:
+        engine.state.position[1:] = -0.5
+        engine.state.velocity[1:] = 1.0 if engine.tick % 40 < 20 else -1.0
+
+    session = session_of(scripted(swing))
+    end = Executor(session).run(close(), until=None, deadline=None)
+    assert end.outcome == "timeout"
+    assert session.time == pytest.approx(0.2 + 2.0, abs=0.002)
+    assert "misses it by 0.9" in end.text
+
+
+def test_a_motion_for_which_there_is_no_controller_is_refused(session_of: SessionOf) -> None:
+    both = Motion("both", None, Grip(("slide",), np.zeros(1), None, False), 0.1)
+    with pytest.raises(InvalidArgument, match="'arm' is no gripper"):
+        Executor(session_of()).run(both, until=None, deadline=None)
+    trajectory = JointTrajectory(("tip",), np.array([1.0]), np.zeros((1, 1)), None, None)
+    with pytest.raises(InvalidArgument, match="'hand' does not follow trajectories"):
+        Executor(session_of()).run(Motion("x", trajectory, None, 1.0), until=None, deadline=None)

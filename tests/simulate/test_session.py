@@ -1,0 +1,181 @@
+"""One tick: its order, its clock, who feels which contact, and the states that stop a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import SimulationFailed
+from manipcli.model.state import Contact
+from manipcli.simulate.session import BODY_SPEED, FALLEN, RUNAWAY_SPEED, SLOW, Session
+
+SessionOf = Callable[..., Session]
+
+
+class Seen:
+    """Keeps what an observer is told."""
+
+    def __init__(self) -> None:
+        self.ticks: list[tuple[int, float, list[float]]] = []
+        self.touching: list[tuple[int, tuple[Contact, ...]]] = []
+
+    def tick(self, tick: int, state: Any, outputs: Any) -> None:
+        self.ticks.append((tick, float(state.time), [float(output.position[0]) for output in outputs]))
+
+    def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
+        self.touching.append((tick, contacts))
+
+
+def ticks(session: Session, count: int) -> None:
+    for _ in range(count):
+        session.tick()
+
+
+def test_the_clock_is_tick_times_period_and_starts_again(session_of: SessionOf) -> None:
+    session, seen = session_of(), Seen()
+    ticks(session, 700)
+    assert session.time == 700 * session.period
+    session.restart_clock(seen)
+    ticks(session, 3001)
+    assert [tick for tick, _, _ in seen.ticks] == list(range(3001))
+    assert [time for _, time, _ in seen.ticks] == [k * session.period for k in range(3001)]
+
+
+def test_a_tick_reads_commands_tells_and_advances_in_this_order(session_of: SessionOf, scripted: Any) -> None:
+    order: list[str] = []
+
+    class Engine(scripted):  # type: ignore[misc]
+        def read(self) -> Any:
+            order.append("read")
+            return super().read()
+
+        def write(self, *command: Any) -> None:
+            order.append("write")
+
+        def advance(self) -> None:
+            order.append("advance")
+
+    class Observer(Seen):
+        def tick(self, *seen: Any) -> None:
+            order.append("observe")
+
+    session = session_of(Engine())
+    session.restart_clock(Observer())
+    order.clear()
+    ticks(session, 2)
+    assert order == ["read", "write", "observe", "advance"] * 2
+
+
+def test_commands_are_cut_at_the_limits_and_counted(session_of: SessionOf, scripted: Any) -> None:
+    """100 N/m times 1.5 m of error ask 150 N of a joint that has 100 N."""
+
+    def pull_away(engine: Any) -> None:
+        engine.state.position[0] = -1.5 if engine.tick > 0 else 0.0
+
+    engine = scripted(pull_away)
+    session = session_of(engine)
+    ticks(session, 10)
+    assert engine.written[-1][0] == 100.0
+    assert session.saturations[0] == 9
+
+
+@pytest.mark.parametrize(
+    ("joint", "name", "limit"), [(0, "slide", 6.0), (1, "knuckle", 9.0), (2, "tip", RUNAWAY_SPEED)]
+)
+def test_a_runaway_is_named_with_its_speed_and_time(
+    session_of: SessionOf, scripted: Any, joint: int, name: str, limit: float
+) -> None:
+    """Three times the velocity limit; where there is none, what Bullet lets through at most."""
+
+    def run_away(engine: Any) -> None:
+        engine.state.velocity[joint] = -(0.99 if engine.tick < 50 else 1.01) * limit
+
+    session = session_of(scripted(run_away))
+    with pytest.raises(SimulationFailed, match=rf"joint '{name}' runs away at -{1.01 * limit:.3g}") as caught:
+        ticks(session, 100)
+    assert 0.050 <= caught.value.time < 0.050 + SLOW * session.period
+    assert f"t = {caught.value.time:.3f} s" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_joint_that_is_not_finite_stops_the_run(session_of: SessionOf, scripted: Any, value: float) -> None:
+    def spoil(engine: Any) -> None:
+        engine.state.velocity[1] = value
+
+    with pytest.raises(SimulationFailed, match="'knuckle'"):
+        ticks(session_of(scripted(spoil)), SLOW)
+
+
+def change(attribute: str, value: float) -> Callable[[Any], None]:
+    def script(engine: Any) -> None:
+        if engine.tick >= 20:
+            getattr(engine.state, attribute)[0, 2] = value
+
+    return script
+
+
+@pytest.mark.parametrize(
+    ("script", "told"),
+    [
+        (change("body_linear", BODY_SPEED * 1.01), "'block' flies off at 50.5 m/s"),
+        (change("body_linear", math.nan), "'block' flies off at nan m/s"),
+        (change("body_position", FALLEN - 0.01), "'block' has fallen out of the scene"),
+        (change("body_position", math.nan), "'block' has fallen out of the scene"),
+    ],
+)
+def test_a_body_that_leaves_the_plausible_is_named(
+    session_of: SessionOf, scripted: Any, script: Callable[[Any], None], told: str
+) -> None:
+    with pytest.raises(SimulationFailed, match=told) as caught:
+        ticks(session_of(scripted(script)), 100)
+    assert caught.value.time == pytest.approx(0.02)
+
+
+def test_a_joint_feels_what_touches_the_links_that_it_moves_last(session_of: SessionOf, scripted: Any) -> None:
+    """A fixed link counts for the joint before it; a touch between two links of the robot is no touch."""
+    engine = scripted()
+    engine.touching = (
+        Contact("block", "robot/pad", 2.0, 0.0),
+        Contact("block", "robot/far", 1.0, 0.0),
+        Contact("block", "robot/near", 0.5, 0.0),
+        Contact("robot/carriage", "robot/pad", 9.0, 0.0),
+        Contact("block", "robot/base", 4.0, 0.0),
+        Contact("block", "floor", 7.0, 0.0),
+    )
+    felt: list[list[float]] = []
+    session = session_of(engine)
+    update = session.manager.update
+
+    def listening(time: float, state: Any, feed_forward: Any, contact_force: Any) -> Any:
+        felt.append(contact_force.tolist())
+        return update(time, state, feed_forward, contact_force)
+
+    session.manager.update = listening  # type: ignore[method-assign]
+    ticks(session, 3)
+    assert felt == [[0.0, 0.5, 3.0]] * 3
+    engine.touching = ()
+    ticks(session, 1)
+    assert felt[-1] == [0.0, 0.0, 0.0]
+
+
+def test_a_short_touch_of_the_robot_is_told_with_its_end(session_of: SessionOf, scripted: Any) -> None:
+    touch = (Contact("block", "robot/pad", 2.0, 0.0),)
+
+    def script(engine: Any) -> None:
+        engine.touching = touch if engine.tick in (13, 14) else ()
+
+    session, seen = session_of(scripted(script)), Seen()
+    session.restart_clock(seen)
+    ticks(session, 20)
+    assert [(tick, told) for tick, told in seen.touching if tick % SLOW] == [(13, touch), (14, touch), (15, ())]
+
+
+def test_nothing_moves_without_goals(session_of: SessionOf) -> None:
+    session = session_of()
+    ticks(session, 500)
+    state = session.engine.read()
+    np.testing.assert_array_equal(state.position, np.zeros(3))
