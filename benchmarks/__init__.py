@@ -1,0 +1,1 @@
+"""What manipcli costs, as ratios measured in one run: `python -m benchmarks`."""
