@@ -1,3 +1,85 @@
-"""manipcli: manipulation tasks as files."""
+"""manipcli: manipulation tasks as files.
+
+    from pathlib import Path
+    import manipcli
+
+    report = manipcli.run_task(Path("tasks/pour.yaml"))
+    recording = manipcli.read_recording(Path(report.log))
+
+The public names are those of `__all__`. Each is imported when it is first used (PEP 562), so that `import manipcli`
+costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, SimulationFailed
+    from manipcli.judge.verdict import Verdict
+    from manipcli.model.state import WorldState
+    from manipcli.pipeline import Plan, Task, check_files, judge_log, load_task, plan_task, run_task
+    from manipcli.record.reading import open_recording, read_recording
+    from manipcli.record.recording import Recording
+    from manipcli.report.run_report import RunReport
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Finding",
+    "InvalidInput",
+    "ManipcliError",
+    "NotPlannable",
+    "Plan",
+    "Recording",
+    "RunReport",
+    "SimulationFailed",
+    "Task",
+    "Verdict",
+    "WorldState",
+    "check_files",
+    "judge_log",
+    "load_task",
+    "open_recording",
+    "plan_task",
+    "read_recording",
+    "run_task",
+]
+
+_HOMES = {
+    "Finding": "core.errors",
+    "InvalidInput": "core.errors",
+    "ManipcliError": "core.errors",
+    "NotPlannable": "core.errors",
+    "SimulationFailed": "core.errors",
+    "Verdict": "judge.verdict",
+    "WorldState": "model.state",
+    "Plan": "pipeline",
+    "Task": "pipeline",
+    "check_files": "pipeline",
+    "judge_log": "pipeline",
+    "load_task": "pipeline",
+    "plan_task": "pipeline",
+    "run_task": "pipeline",
+    "open_recording": "record.reading",
+    "read_recording": "record.reading",
+    "Recording": "record.recording",
+    "RunReport": "report.run_report",
+}
+"""The module in which each public name is defined, or which offers it."""
+
+
+def __getattr__(name: str) -> object:
+    """A public name, from its module; from then on an ordinary attribute."""
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    found: object = getattr(import_module(f"{__name__}.{home}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """What is there, and what can be."""
+    return sorted({*globals(), *__all__})
