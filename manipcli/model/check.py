@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,6 +43,7 @@ class Check:
         reason: why it matters: what a simulator or planner does with it. For `--explain`.
         bad: a whole description (URDF or xacro text) that has exactly this defect.
         find: every occurrence in a subject.
+        files: what `bad` names besides, by path relative to it, made when it is asked for.
     """
 
     code: str
@@ -53,6 +54,7 @@ class Check:
     reason: str
     bad: str
     find: Callable[[Subject], Iterable[Finding]]
+    files: Callable[[], Mapping[str, bytes]] = dict[str, bytes]
 
 
 def found_while_reading(code: str) -> Callable[[Subject], Iterable[Finding]]:

@@ -21,16 +21,18 @@ WRITTEN_LATER = {"URDF040", "URDF041"}
 """Told when a description is written for an engine, not when it is read."""
 
 
-def examined(folder: Path, text: str) -> Examination:
-    kind = "xacro" if "xmlns:xacro" in text else "urdf"
+def examined(folder: Path, check: Check) -> Examination:
+    kind = "xacro" if "xmlns:xacro" in check.bad else "urdf"
     path = folder / f"bad.{kind}"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(check.bad, encoding="utf-8")
+    for name, data in check.files().items():
+        (folder / name).write_bytes(data)
     return examine(path, packages=Packages(path))
 
 
 @pytest.mark.parametrize("check", CHECKS.members, ids=lambda check: check.code)
 def test_a_check_fires_on_its_bad_example_and_nothing_else_is_an_error(tmp_path: Path, check: Check) -> None:
-    found = examined(tmp_path, check.bad)
+    found = examined(tmp_path, check)
     told = [str(finding) for finding in found.findings]
     own = [finding for finding in found.findings if finding.code == check.code]
     assert own, told
