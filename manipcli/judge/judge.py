@@ -18,7 +18,7 @@ from manipcli.record.recording import Recording
 from manipcli.spec.base import Model
 
 RUN = "run"
-"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status."""
+"""Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
 _JUDGED = ("complete", "failed")
 """Values of `status` of a run that came to its own end, whether it went well or not."""
@@ -51,7 +51,8 @@ def judge(
     examined = examine(
         recording, expect, robot=robot, scene=scene, seam=seam, physics=run.get("physics", "") == "full", steps=steps
     )
-    word, text = _verdict(errors, steps, examined.outcomes)
+    cause = run.get("cause", "") if status == "failed" else ""
+    word, text = _verdict(errors, cause, steps, examined.outcomes)
     return Verdict(
         task=run.get("task", ""),
         verdict=word,
@@ -81,11 +82,16 @@ def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
 
 
 def _verdict(
-    errors: tuple[Finding, ...], steps: tuple[StepOutcome, ...], expectations: tuple[ExpectationOutcome, ...]
+    errors: tuple[Finding, ...],
+    cause: str,
+    steps: tuple[StepOutcome, ...],
+    expectations: tuple[ExpectationOutcome, ...],
 ) -> tuple[VerdictWord, str]:
-    """The word, and in one line why."""
+    """The word, and in one line why. `cause`: what ended the simulation, in a step, before the first or after all."""
     if errors:
         return "error", errors[0].message
+    if cause and all(step.outcome in ("done", "not_run") for step in steps):
+        return "failed", cause
     undone = next((step for step in steps if step.outcome != "done"), None)
     if undone is not None:
         why = f": {undone.text}" if undone.text else ""

@@ -80,6 +80,10 @@ def _causes(verdict: Verdict) -> list[str]:
     if verdict.verdict == "passed":
         return []
     causes = [describe(finding) for finding in verdict.errors]
+    if not causes and all(step.outcome in ("done", "not_run") for step in verdict.steps):
+        undone = any(step.outcome == "not_run" for step in verdict.steps)
+        if undone or all(expectation.outcome == "passed" for expectation in verdict.expectations):
+            return [f"{FAIL} {verdict.text}"]  # it ended before the first step, or after the last
     causes += [
         f"{FAIL} step '{step.id}' {_STEP_WORDS[step.outcome]}{f': {step.text}' if step.text else ''}"
         for step in verdict.steps

@@ -72,11 +72,11 @@ class Executor:
             if not busy and awaited is None:
                 return _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
-                why = _late(motion, handles)
+                why = _late(handles)
                 self._cancel(handles)
                 return MotionEnd("timeout", why)
             if deadline is None and session.time >= given_up:
-                late = f"'{motion.label}' is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
+                late = f"it is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
                 self._cancel(handles)
                 return MotionEnd("timeout", late)
 
@@ -123,10 +123,10 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
     return MotionEnd("done", text)
 
 
-def _late(motion: Motion, handles: tuple[GoalHandle, ...]) -> str:
+def _late(handles: tuple[GoalHandle, ...]) -> str:
     if any(handle.active for handle in handles):
-        return f"the step's timeout came during '{motion.label}'"
-    return f"the step's timeout came at '{motion.label}': the condition under `until` did not come to hold"
+        return "the time of the step was over before this motion was"
+    return "the time of the step was over before the condition under `until` held"
 
 
 def _unreached(handles: tuple[GoalHandle, ...]) -> str:

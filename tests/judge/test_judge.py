@@ -332,6 +332,15 @@ def test_a_run_that_physics_ended_is_failed_and_not_an_error() -> None:
     assert (verdict.verdict, verdict.errors) == ("failed", ())
 
 
+def test_what_ended_a_run_before_its_first_step_or_after_its_last_is_the_reason() -> None:
+    ended = run(status="failed", cause="'ball' moved by 90 mm before the start")
+    before = judged(recording(events=(), metadata=ended))
+    assert (before.verdict, before.text) == ("failed", "'ball' moved by 90 mm before the start")
+    after = judged(recording(metadata=ended))
+    assert {one.outcome for one in after.steps} == {"done"}
+    assert (after.verdict, after.text) == ("failed", "'ball' moved by 90 mm before the start")
+
+
 @pytest.mark.parametrize("length", [1, 7, 50, 51, 200])
 def test_a_recording_is_judged_the_same_in_spans_of_any_length(length: int) -> None:
     """Bodies move all the time, and every kind of expectation has its worst moment somewhere else."""

@@ -67,6 +67,13 @@ def test_a_failure_begins_with_its_first_cause() -> None:
     assert lines[1] == "✗ expectation 'upright' fails by 12.0 deg (worst at 19.00 s)"
 
 
+def test_a_run_that_never_began_says_why_and_nothing_else_first() -> None:
+    steps = (replace(PASSED.steps[0], outcome="not_run", started=None, ended=None),)
+    unmet = (replace(PASSED.expectations[0], outcome="not_evaluated", margin=None, at=None),)
+    verdict = replace(PASSED, verdict="failed", steps=steps, expectations=unmet, text="'ball' moved by 90 mm")
+    assert render_verdict(verdict, "x").splitlines()[:2] == ["✗ 'ball' moved by 90 mm", ""]
+
+
 def test_an_expectation_that_was_never_evaluated_says_why() -> None:
     outcome = ExpectationOutcome("inside", "not_evaluated", None, "m", None, "the kinematic engine moves no ball")
     text = render_verdict(replace(PASSED, verdict="failed", expectations=(outcome,)), "x")
