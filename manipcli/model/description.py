@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.text import did_you_mean, shorten
 from manipcli.model.located_xml import Element, element_of, invalid, read_document
 from manipcli.model.packages import Packages
 
@@ -56,8 +57,30 @@ def read_description(
     assert document.documentElement is not None  # a document without a root element is not well-formed
     root = element_of(document.documentElement)
     if root.tag != "robot":
-        raise invalid("URDF002", f"the root element is <{root.tag}>; a description begins with <robot>", root.place)
+        raise _other_format(root)
     return Description(path=path, root=root, packages=packages, findings=findings)
+
+
+_FORMATS = {
+    "sdf": "SDF",
+    "world": "SDF",
+    "model": "SDF",
+    "mujoco": "MJCF",
+    "mujocoinclude": "MJCF",
+    "COLLADA": "a Collada mesh",
+    "package": "the manifest of a ROS package",
+    "launch": "a launch file",
+}
+"""What is given in place of a URDF, by its root element."""
+
+
+def _other_format(root: Element) -> InvalidInput:
+    known = _FORMATS.get(root.tag)
+    if known is None:
+        message = f"the root element is <{shorten(root.tag)}>; a description begins with <robot>"
+        return invalid("URDF002", message, root.place, did_you_mean(root.tag, ["robot"]))
+    hint = "convert it to URDF first: its elements mean other things" if known in {"SDF", "MJCF"} else None
+    return invalid("URDF002", f"this is {known}, not URDF: the root element is <{shorten(root.tag)}>", root.place, hint)
 
 
 def argument_text(value: str | int | float | bool) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +27,7 @@ class Examination:
 
     Attributes:
         findings: in the order of files and lines; at most `MOST_OF_A_CODE` of a code and `MOST` in all.
-        left_out: how many more there are of each code, ((code, number), ...).
+        left_out: how many more there are of each code, ((code, number), ...); no check tells more than `MOST`.
         description: the expanded tree; None where there is no such tree: not XML, not a description, not expandable.
         parts: links, joints and transmissions as far as they could be read; None where there is no tree.
     """
@@ -74,7 +75,7 @@ def _made(check: Check, subject: Subject) -> list[Finding]:
     """What a check finds. One that fails on what it is given has not let it pass."""
     found: list[Finding] = []
     try:
-        found.extend(check.find(subject))
+        found.extend(islice(check.find(subject), MOST))
     except InvalidInput as error:
         found += error.findings
     except Exception as error:  # noqa: BLE001 (the door stays shut whatever happens behind it)

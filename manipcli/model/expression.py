@@ -13,9 +13,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
-MAX_OPERATIONS: Final = 1_000_000
-MAX_SIZE: Final = 65_536
-"""Characters and items of one result, counted through nesting."""
+from manipcli.model.bounds import BoundName, bounds, raised
+
 MAX_EXPRESSION: Final = 10_000
 MAX_INTEGER: Final = 2**1024
 MAX_EXPONENT: Final = 64
@@ -60,8 +59,17 @@ class Refused(Exception):
     """An expression asks for something that descriptions may not do."""
 
 
-def size_of(value: Value, limit: int = MAX_SIZE) -> int:
-    """Characters and items in `value` through nesting, counted no further than `limit` + 1."""
+class Beyond(Refused):
+    """A bound is met; `hint` says which and how it is raised."""
+
+    def __init__(self, message: str, bound: BoundName) -> None:
+        self.hint = raised(bound)
+        super().__init__(message)
+
+
+def size_of(value: Value) -> int:
+    """Characters and items in `value` through nesting, counted no further than the bound + 1."""
+    limit = bounds().value_size
     total = 0
     stack = [value]
     while stack and total <= limit:
@@ -88,9 +96,13 @@ def bounded(value: Value) -> Value:
     if isinstance(value, int):
         if not -MAX_INTEGER < value < MAX_INTEGER:
             raise Refused("an integer of this size is not allowed")
-    elif size_of(value) > MAX_SIZE:
-        raise Refused(f"a value of more than {MAX_SIZE} characters is not allowed")
+    elif size_of(value) > bounds().value_size:
+        raise too_large("a value")
     return value
+
+
+def too_large(what: str) -> Beyond:
+    return Beyond(f"{what} of more than {bounds().value_size} characters or items is not allowed", "value_size")
 
 
 def math_symbols() -> dict[str, Value]:
@@ -102,10 +114,10 @@ def math_symbols() -> dict[str, Value]:
 def python_symbols() -> dict[str, Value]:
     """The built-in functions that expressions may call."""
 
-    def bounded_range(*bounds: int) -> list[int]:
-        steps = range(*bounds)
-        if len(steps) > MAX_SIZE:
-            raise Refused(f"a range of {len(steps)} steps is not allowed")
+    def bounded_range(*ends: int) -> list[int]:
+        steps = range(*ends)
+        if len(steps) > bounds().value_size:
+            raise too_large("a range")
         return list(steps)
 
     def bounded_list(function: Callable[..., Value]) -> Callable[..., Value]:
@@ -128,7 +140,7 @@ class Evaluator:
     """Computes expressions; one object serves one expansion and counts its operations."""
 
     def __init__(self) -> None:
-        self._left = MAX_OPERATIONS
+        self._left = bounds().operations
 
     def __call__(self, text: str, symbols: Mapping[str, Value]) -> Value:
         """The value of `text`.
@@ -147,7 +159,7 @@ class Evaluator:
     def _value(self, node: ast.expr, names: Mapping[str, Value]) -> Value:
         self._left -= 1
         if self._left < 0:
-            raise Refused("the description computes too much")
+            raise Beyond("the expressions of the description compute too much", "operations")
         compute = getattr(self, "_" + type(node).__name__.lower(), None)
         if compute is None:
             raise Refused(f"'{ast.unparse(node)[:80]}': {type(node).__name__} is not allowed in an expression")
@@ -176,9 +188,10 @@ class Evaluator:
         if isinstance(node.op, ast.Pow) and isinstance(right, int | float) and abs(right) > MAX_EXPONENT:
             raise Refused(f"an exponent beyond {MAX_EXPONENT} is not allowed")
         if isinstance(node.op, ast.Mult):
+            most = bounds().value_size
             for one, other in ((left, right), (right, left)):
-                if isinstance(one, int) and not isinstance(other, int | float) and size_of(other) * one > MAX_SIZE:
-                    raise Refused(f"a value of more than {MAX_SIZE} characters is not allowed")
+                if isinstance(one, int) and not isinstance(other, int | float) and size_of(other) * one > most:
+                    raise too_large("a value")
         return _BINARY[type(node.op)](left, right)
 
     def _unaryop(self, node: ast.UnaryOp, names: Mapping[str, Value]) -> Value:
@@ -249,12 +262,12 @@ class Evaluator:
         def call(*arguments: Value) -> Value:
             if name == "replace":
                 grown = (size_of(owner) + 1) * size_of(arguments[1] if len(arguments) > 1 else "")
-                if grown > MAX_SIZE * 64:
-                    raise Refused("a replacement of this size is not allowed")
+                if grown > bounds().value_size * 64:
+                    raise too_large("a replacement")
             if name == "join":
                 bounded(list(arguments))
-                if size_of(owner) * size_of(list(arguments)) > MAX_SIZE * 64:
-                    raise Refused("a text of this size is not allowed")
+                if size_of(owner) * size_of(list(arguments)) > bounds().value_size * 64:
+                    raise too_large("a text")
             result = method(owner, *arguments)
             return list(result) if name in {"keys", "values", "items"} else result  # type: ignore[call-overload]
 
@@ -274,8 +287,8 @@ class Evaluator:
         found: list[Value] = []
         for scope in self._scopes(node.generators, _Scope(names, {})):
             found.append(self._value(node.elt, scope))
-            if len(found) > MAX_SIZE:
-                raise Refused(f"a list of more than {MAX_SIZE} items is not allowed")
+            if len(found) > bounds().value_size:
+                raise too_large("a list")
         return found
 
     def _generatorexp(self, node: ast.GeneratorExp, names: Mapping[str, Value]) -> Value:

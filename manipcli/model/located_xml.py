@@ -8,15 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.model.bounds import bounds, raised
 
 if TYPE_CHECKING:
     from xml.dom.minidom import Document, Node
     from xml.dom.minidom import Element as DomElement
 
-MAX_BYTES = 20_000_000
-MAX_ELEMENTS = 50_000
-MAX_DEPTH = 100
-MAX_ATTRIBUTE = 65_536
 _PLACE = "manipcli.place"
 
 
@@ -59,9 +56,11 @@ def read_document(path: Path) -> Document:
     try:
         if not path.is_file():
             raise invalid("URDF001", f"'{file}' is not a regular file")
-        if path.stat().st_size > MAX_BYTES:
-            raise invalid("URDF001", f"'{file}' is larger than {MAX_BYTES // 1_000_000} MB")
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            data = stream.read(bounds().file_bytes + 1)
+        if len(data) > bounds().file_bytes:
+            message = f"the file is larger than {bounds().file_bytes / 1e6:g} MB"
+            raise invalid("URDF052", message, Place(file, 1, 1), raised("file_bytes"))
     except OSError as error:
         raise invalid("URDF001", f"cannot read '{file}': {error.strerror}") from error
     return parse_document(data, file)
@@ -79,6 +78,7 @@ def parse_document(data: bytes, file: str) -> Document:
 
         depth = 0
         count = 0
+        bound = bounds()
 
         def place(self) -> Place:
             parser = self.getParser()
@@ -87,10 +87,15 @@ def parse_document(data: bytes, file: str) -> Document:
         def start_element_handler(self, name: str, attributes: list[str]) -> None:
             self.depth += 1
             self.count += 1
-            if self.depth > MAX_DEPTH or self.count > MAX_ELEMENTS:
-                raise invalid("URDF001", f"more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} nested", self.place())
-            if any(len(text) > MAX_ATTRIBUTE for text in attributes):
-                raise invalid("URDF001", f"an attribute is longer than {MAX_ATTRIBUTE} characters", self.place())
+            if self.depth > self.bound.depth:
+                message = f"elements are nested more than {self.bound.depth} deep"
+                raise invalid("URDF052", message, self.place(), raised("depth"))
+            if self.count > self.bound.elements:
+                message = f"the file has more than {self.bound.elements} elements"
+                raise invalid("URDF052", message, self.place(), raised("elements"))
+            if any(len(text) > self.bound.attribute for text in attributes):
+                message = f"an attribute is longer than {self.bound.attribute} characters"
+                raise invalid("URDF052", message, self.place(), raised("attribute"))
             super().start_element_handler(name, attributes)
             self.curNode.setUserData(_PLACE, self.place(), copy_place)
 
@@ -99,7 +104,7 @@ def parse_document(data: bytes, file: str) -> Document:
             super().end_element_handler(name)
 
         def start_doctype_decl_handler(self, *declaration: object) -> None:
-            raise invalid("URDF001", "a DOCTYPE is not allowed in a description", self.place(), "delete it")
+            raise invalid("URDF051", "a DOCTYPE is not allowed in a description", self.place(), "delete it")
 
     try:
         document: Document = Builder().parseString(data)
@@ -129,8 +134,9 @@ def element_of(node: DomElement, _depth: int = 0) -> Element:
     Raises:
         InvalidInput: nested deeper than the bound.
     """
-    if _depth > MAX_DEPTH:
-        raise invalid("URDF001", f"elements are nested deeper than {MAX_DEPTH}", place_of(node))
+    if _depth > bounds().depth:
+        message = f"elements are nested more than {bounds().depth} deep"
+        raise invalid("URDF052", message, place_of(node), raised("depth"))
     children: list[Element] = []
     text: list[str] = []
     for child in node.childNodes:

@@ -2,72 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from manipcli.core.errors import Place
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import listed
+from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint
 from manipcli.model.urdf_numbers import Reader
 
 
 def check_tree(
-    reader: Reader,
-    links: Sequence[str],
-    joints: Mapping[str, Joint | None],
-    places: Mapping[tuple[str, str], Place],
+    reader: Reader, links: Mapping[str, Element], joints: Mapping[str, Joint | None], elements: Mapping[str, Element]
 ) -> str:
     """Name of the root link, or '' with findings: undefined links, two parents, loops, several roots.
 
     Args:
         reader: takes the findings.
-        links: names of all links.
+        links: <link> by name.
         joints: by name; None for one that could not be read, whose links are unknown.
-        places: where they are written.
+        elements: <joint> by name.
     """
     before = len(reader.findings)
     parent_joint: dict[str, Joint] = {}
     for name, joint in joints.items():
         if joint is None:
             continue
-        place = places.get(("joint", name))
+        element = elements[name]
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
                 message = f"joint '{name}': {role} link '{link}' is not in the description"
-                reader.report("URDF006", message, place, hint=did_you_mean(link, links))
+                reader.report("URDF006", message, (element.first(role) or element).place, hint=reader.near(link, links))
         if joint.parent == joint.child:
-            reader.report("URDF007", f"joint '{name}' joins link '{joint.parent}' to itself", place)
+            reader.report("URDF083", f"joint '{name}' joins link '{joint.parent}' to itself", element.place)
         elif joint.child in parent_joint:
             other = parent_joint[joint.child].name
             message = f"link '{joint.child}' is the child of two joints, '{other}' and '{name}'"
-            reader.report("URDF007", message, place)
+            hint = f"the first is at {elements[other].place}"
+            reader.report("URDF082", message, (element.first("child") or element).place, hint=hint)
         else:
             parent_joint[joint.child] = joint
+    loops = _loops(links, parent_joint)
+    for loop in loops:
+        message = f"links form a loop: {_way(loop)}"
+        # The joint that was written last most likely closed it.
+        closing = max((elements[parent_joint[link].name] for link in loop), key=_line)
+        hint = "a URDF is a tree: leave one joint out"
+        reader.report("URDF081", message, closing.place, hint=hint)
     if len(reader.findings) > before or any(joint is None for joint in joints.values()):
         return ""
     roots = [link for link in links if link not in parent_joint]
-    loops = _loops(links, parent_joint)
-    for loop in loops:
-        message = "links form a loop: " + " -> ".join([*loop, loop[0]])
-        reader.report("URDF007", message, places.get(("link", loop[0])))
     if len(roots) > 1:
-        names = ", ".join(f"'{root}'" for root in roots)
-        message = f"the description has {len(roots)} root links: {names}; expected one tree"
-        reader.report("URDF007", message, places.get(("link", roots[1])), hint="join them with a fixed joint")
-    return roots[0] if len(roots) == 1 and not loops else ""
+        _report_roots(reader, roots, links, parent_joint)
+        return ""
+    return roots[0]
 
 
-def _loops(links: Sequence[str], parent_joint: Mapping[str, Joint]) -> list[list[str]]:
-    """Every circle once, each as the links on it."""
+def _report_roots(
+    reader: Reader, roots: list[str], links: Mapping[str, Element], parent_joint: Mapping[str, Joint]
+) -> None:
+    """Says which links cannot be reached from the root of the largest tree, at the first that cannot."""
+    root_of: dict[str, str] = {}
+    for link in links:
+        way = []
+        at = link
+        while at not in root_of and at in parent_joint:
+            way.append(at)
+            at = parent_joint[at].parent
+        root = root_of.setdefault(at, at)
+        root_of |= dict.fromkeys(way, root)
+    size = {root: sum(top == root for top in root_of.values()) for root in roots[:50]}
+    largest = max(size, key=lambda root: size[root])
+    others = [root for root in roots if root != largest]
+    unreached = [link for link, root in root_of.items() if root != largest]
+    message = (
+        f"the description has {len(roots)} root links: {listed(map(repr, roots))}; expected one tree; "
+        f"not reached from '{largest}': {listed(unreached)}"
+    )
+    hint = f"join '{others[0]}' to '{largest}' with a fixed joint, or delete it"
+    reader.report("URDF007", message, links[others[0]].place, hint=hint)
+
+
+def _way(loop: list[str]) -> str:
+    shown = loop if len(loop) <= 12 else [*loop[:11], "..."]
+    return " -> ".join([*shown, loop[0]])
+
+
+def _line(element: Element) -> tuple[int, int]:
+    return (element.place.line, element.place.column) if element.place is not None else (0, 0)
+
+
+def _loops(links: Mapping[str, Element], parent_joint: Mapping[str, Joint]) -> list[list[str]]:
+    """Every circle once, each as the links on it, parents first."""
     done: set[str] = set()
     loops = []
     for link in links:
-        way: list[str] = []
+        way: dict[str, None] = {}
         at: str | None = link
         while at is not None and at not in done and at not in way:
-            way.append(at)
+            way[at] = None
             at = parent_joint[at].parent if at in parent_joint else None
         if at is not None and at in way:
-            loops.append(way[way.index(at) :][::-1])
+            names = list(way)
+            loops.append(names[names.index(at) :][::-1])
         done.update(way)
     return loops
 

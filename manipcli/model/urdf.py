@@ -51,14 +51,14 @@ def read_parts(description: Description) -> Parts:
     links_by_name = _named(reader, root, "link", places)
     joints_by_name = _named(reader, root, "joint", places)
     if not links_by_name:
-        reader.report("URDF007", "the description has no link", root.place)
+        reader.report("URDF080", "the description has no link", root.place)
     materials = read_materials(reader, root)
     links = {key: read_link(reader, each, key, description.packages, materials) for key, each in links_by_name.items()}
     joints = {key: read_joint(reader, element, key) for key, element in joints_by_name.items()}
     known = {key: joint for key, joint in joints.items() if joint is not None}
-    top = check_tree(reader, tuple(links), joints, places) if links else ""
-    known = resolve_mimics(reader, known, tuple(joints), places)
-    transmissions = read_transmissions(reader, root, tuple(joints))
+    top = check_tree(reader, links_by_name, joints, joints_by_name) if links else ""
+    known = resolve_mimics(reader, known, joints_by_name)
+    transmissions = read_transmissions(reader, root, joints_by_name)
     _check_point_masses(reader, links, known, places)
     ordered = depth_first(top, known) if top else tuple(known.values())
     order = [top, *(joint.child for joint in ordered)] if top else list(links)

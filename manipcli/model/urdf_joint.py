@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Array, frozen
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import shorten
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, TransmissionTag
 from manipcli.model.urdf_numbers import Reader
@@ -19,21 +19,29 @@ _TYPES: dict[str, JointType] = {
     "continuous": "continuous",
     "prismatic": "prismatic",
     "fixed": "fixed",
+    "floating": "fixed",
+    "planar": "fixed",
 }
+_HELD = frozenset({"floating", "planar"})
+"""Types of several degrees of freedom: where such a joint stands, the link is held."""
 UNIT_TOLERANCE = 1e-3
 """How far the length of an axis may be from 1 without a word."""
 
 
 def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
-    """The joint that `element` describes, or None with findings. Its links and its mimic are not looked up here."""
+    """The joint that `element` describes; None, with findings, where it does not say which links it joins.
+
+    Its links and its mimic are not looked up here.
+    """
     text = element.attributes.get("type")
     kind = _TYPES.get(text or "")
     if kind is None:
-        what = f"unknown type '{text}'" if text else "no attribute 'type'"
-        hint = did_you_mean(text or "", _TYPES)
-        if text in {"floating", "planar"}:
-            what, hint = f"type '{text}', which is not supported", "use several joints of one degree of freedom"
-        reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=hint)
+        what = f"the unknown type '{shorten(text)}'" if text else "no attribute 'type'"
+        reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=reader.near(text or "", _TYPES))
+    if text in _HELD:
+        message = f"joint '{name}' is {text}, which is not supported: its link is held where it is"
+        hint = "use joints of one degree of freedom, or place the robot with `mount:` in the robot file"
+        reader.report("URDF065", message, element.place, hint=hint, severity="warning")
     ends = [_end(reader, element, name, tag) for tag in ("parent", "child")]
     X_PJ = reader.origin(element)
     dynamics = element.first("dynamics")
@@ -41,21 +49,18 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
     if dynamics is not None:
         damping = _not_negative(reader, dynamics, "damping", name) or 0.0
         friction = _not_negative(reader, dynamics, "friction", name) or 0.0
-    if kind is None or ends[0] is None or ends[1] is None:
+    if ends[0] is None or ends[1] is None:
         return None
     moves = kind != "fixed"
-    axis = _axis(reader, element, name) if moves else frozen([1.0, 0.0, 0.0])
-    limits = _limits(reader, element, name, kind) if moves else JointLimits()
-    if axis is None or limits is None:
-        return None
+    # What is wrong is told; what stands in for it lets the rest of the description be looked at.
     return Joint(
         name=name,
-        type=kind,
+        type=kind or "continuous",
         parent=ends[0],
         child=ends[1],
         X_PJ=X_PJ,
-        axis=axis,
-        limits=limits,
+        axis=_axis(reader, element, name) if moves else frozen([1.0, 0.0, 0.0]),
+        limits=_limits(reader, element, name, kind) if moves and kind is not None else JointLimits(),
         mimic=_mimic(reader, element) if moves else None,
         damping=damping if moves else 0.0,
         friction=friction if moves else 0.0,
@@ -65,23 +70,24 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
 def _end(reader: Reader, element: Element, name: str, tag: Literal["parent", "child"]) -> str | None:
     end = element.first(tag)
     if end is None:
-        reader.report("URDF006", f"joint '{name}' has no <{tag} link=\"...\"/>", element.place)
+        reader.report("URDF060", f"joint '{name}' has no <{tag} link=\"...\"/>", element.place)
         return None
     return reader.name(end, "link")
 
 
-def _axis(reader: Reader, element: Element, name: str) -> Array | None:
-    """Unit axis; x where none is written."""
+def _axis(reader: Reader, element: Element, name: str) -> Array:
+    """Unit axis; x where none, or none that can be used, is written."""
     axis = element.first("axis")
     if axis is None or "xyz" not in axis.attributes:
         return frozen([1.0, 0.0, 0.0])
     values = reader.numbers(axis, "xyz", 3)
     if values is None:
-        return None
+        return frozen([1.0, 0.0, 0.0])
     length = math.hypot(*values)
-    if length < 1e-9:
-        reader.report("URDF009", f"joint '{name}' has the axis 0 0 0; expected a direction", axis.place)
-        return None
+    if not 1e-9 < length < 1e9:
+        what = "the axis 0 0 0" if length < 1e-9 else f"an axis of length {length:g}"
+        reader.report("URDF009", f"joint '{name}' has {what}; expected a direction", axis.place)
+        return frozen([1.0, 0.0, 0.0])
     if abs(length - 1.0) > UNIT_TOLERANCE:
         message = f"joint '{name}': the axis has length {length:g}; its direction is used"
         reader.report("URDF034", message, axis.place, severity="warning")
@@ -99,14 +105,14 @@ def _not_negative(reader: Reader, element: Element, attribute: str, joint: str) 
     return value
 
 
-def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits | None:
+def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
     limit = element.first("limit")
     if limit is None:
         if kind == "continuous":
             return JointLimits()
         hint = '<limit lower="..." upper="..." velocity="..." effort="..."/>'
         reader.report("URDF010", f"joint '{name}' is {kind} and has no <limit>", element.place, hint=hint)
-        return None
+        return JointLimits()
     lower = reader.number(limit, "lower", 0.0)
     upper = reader.number(limit, "upper", 0.0)
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
@@ -115,7 +121,7 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
     if lower is not None and upper is not None and lower > upper:
         message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"
         reader.report("URDF010", message, limit.place)
-        return None
+        return JointLimits(velocity=velocity, effort=effort)
     if lower == upper:
         message = f"joint '{name}' cannot move: lower and upper are both {lower:g}"
         reader.report("URDF035", message, limit.place, severity="warning")
@@ -170,7 +176,7 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
     for joint, joint_name in zip(joint_elements, joint_names, strict=True):
         if joint_name is not None and joint_name not in joints:
             message = f"transmission '{name}' names joint '{joint_name}', which is not in the description"
-            reader.report("URDF015", message, joint.place, hint=did_you_mean(joint_name, joints))
+            reader.report("URDF015", message, joint.place, hint=reader.near(joint_name, joints))
     if not joint_elements:
         reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
     reductions = [_reduction(reader, each, name) for each in (*joint_elements, *actuator_elements)]

@@ -6,17 +6,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from manipcli.core.geometry import Array, frozen
-from manipcli.core.text import did_you_mean
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.located_xml import Element
-from manipcli.model.packages import NotFound, Packages
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, Shape, Sphere
+from manipcli.model.packages import Packages
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Shape, Sphere
+from manipcli.model.urdf_mesh import read_mesh_element
 from manipcli.model.urdf_numbers import Reader
+from manipcli.model.urdf_schema import is_foreign
 
 Rgba = tuple[float, float, float, float]
 TRIANGLE_TOLERANCE = 1e-2
 """By which share one principal moment may exceed the sum of the others: descriptions are written with 2-3 digits."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
+_ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
+"""Shapes of other formats and of other programs' URDF."""
 
 
 def read_link(reader: Reader, element: Element, name: str, packages: Packages, materials: Mapping[str, Rgba]) -> Link:
@@ -67,13 +70,21 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
         reader.report("URDF011", f"link '{name}': <inertial> has no <inertia>", element.place)
         return None
     xx, yy, zz = (reader.required(moments, key) for key in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (reader.number(moments, key, 0.0) or 0.0 for key in ("ixy", "ixz", "iyz"))
+    xy, xz, yz = (_product(reader, moments, key) for key in ("ixy", "ixz", "iyz"))
     if xx is None or yy is None or zz is None:
         return None
     I = frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # noqa: E741  (the inertia matrix)
     if not _plausible(reader, I, name, moments):
         return None
     return Inertial(mass=mass, X_LI=X_LI, inertia=I)
+
+
+def _product(reader: Reader, moments: Element, key: str) -> float:
+    """A product of inertia; 0 where it is not written, which other programs refuse."""
+    if key not in moments.attributes:
+        message = f"<inertia> has no attribute '{key}'; it counts as 0"
+        reader.report("URDF059", message, moments.place, severity="warning")
+    return reader.number(moments, key, 0.0) or 0.0
 
 
 def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741
@@ -98,16 +109,39 @@ def _geometries(
     found = []
     for element in link.all(tag):
         X_LS = reader.origin(element)
+        rgba = _colour(reader, element, materials)
         holder = element.first("geometry")
-        if holder is None or len(holder.children) != 1:
+        shapes = [child for child in holder.children if not is_foreign(child.tag)] if holder is not None else []
+        if not shapes:
             expected = " or ".join(f"<{shape}>" for shape in _SHAPES)
-            message = f"<{tag}> needs one <geometry> with one shape: {expected}"
+            message = f"<{tag}> needs a <geometry> with one shape: {expected}"
             reader.report("URDF012", message, (holder or element).place)
             continue
-        shape = _shape(reader, holder.children[0], tag, packages)
+        if len(shapes) > 1:
+            message = f"<geometry> holds {len(shapes)} shapes; only the first, <{shapes[0].tag}>, is used"
+            hint = f"give each shape a <{tag}> of its own"
+            reader.report("URDF061", message, shapes[1].place, hint=hint, severity="warning")
+        if shapes[0].tag == "capsule":
+            found += _capsule(reader, shapes[0], X_LS, rgba)
+            continue
+        shape = _shape(reader, shapes[0], tag, packages)
         if shape is not None:
-            found.append(Geometry(X_LS=X_LS, shape=shape, rgba=_colour(reader, element, materials)))
+            found.append(Geometry(X_LS=X_LS, shape=shape, rgba=rgba))
     return found
+
+
+def _capsule(reader: Reader, element: Element, X_LS: Transform, rgba: Rgba | None) -> list[Geometry]:
+    """A cylinder of the capsule's `length` along z and a sphere at each of its ends: the same set of points."""
+    radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
+    if radius is None or length is None:
+        return []
+    message = "<capsule> is not understood by most programs; it is read as a cylinder and two spheres"
+    reader.report("URDF062", message, element.place, severity="warning")
+    ends = [X_LS @ Transform.of(xyz=(0.0, 0.0, side * length[0] / 2.0)) for side in (-1.0, 1.0)]
+    return [
+        Geometry(X_LS=X_LS, shape=Cylinder(radius=radius[0], length=length[0]), rgba=rgba),
+        *(Geometry(X_LS=X_LE, shape=Sphere(radius=radius[0]), rgba=rgba) for X_LE in ends),
+    ]
 
 
 def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Shape | None:
@@ -121,14 +155,20 @@ def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Sh
         radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
         return Cylinder(radius=radius[0], length=length[0]) if radius and length else None
     if element.tag == "mesh":
-        return _mesh(reader, element, tag, packages)
-    reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=did_you_mean(element.tag, _SHAPES))
+        return read_mesh_element(reader, element, tag, packages)
+    if element.tag in _ELSEWHERE:
+        left_out = tag == "visual"
+        message = f"<{element.tag}> is no shape of URDF" + ("; it is left out" if left_out else "")
+        hint = "use " + " or ".join(f"<{shape}>" for shape in _SHAPES)
+        reader.report("URDF062", message, element.place, hint=hint, severity="warning" if left_out else "error")
+        return None
+    reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=reader.near(element.tag, _SHAPES))
     return None
 
 
 def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tuple[float, ...] | None:
     if attribute not in element.attributes:
-        reader.report("URDF012", f"<{element.tag}> has no attribute '{attribute}'", element.place)
+        reader.missing(element, attribute)
         return None
     values = reader.numbers(element, attribute, count)
     if values is not None and min(values) <= 0.0:
@@ -136,26 +176,6 @@ def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tupl
         reader.report("URDF012", message, element.place)
         return None
     return values
-
-
-def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mesh | None:
-    uri = reader.name(element, "filename")
-    scale = reader.numbers(element, "scale", 3) if "scale" in element.attributes else (1.0, 1.0, 1.0)
-    if uri is None or scale is None:
-        return None
-    if 0.0 in scale:
-        reader.report("URDF012", "a mesh is scaled by 0", element.place)
-        return None
-    try:
-        path = packages.resolve(uri)
-    except NotFound as error:
-        if tag == "collision":
-            reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=error.hint)
-        else:
-            message = f"visual mesh, left out: {error.message}"
-            reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")
-        return None
-    return Mesh(uri=packages.portable(path), path=path, scale=(scale[0], scale[1], scale[2]))
 
 
 def _colour(reader: Reader, element: Element, materials: Mapping[str, Rgba]) -> Rgba | None:

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
+from typing import Final
 
 from manipcli.core.errors import Finding, Place, Severity
 from manipcli.core.geometry import Transform
+from manipcli.core.text import did_you_mean, shorten
 from manipcli.model.located_xml import Element
+
+MOST_HINTS: Final = 50
+MOST_NAMES: Final = 2000
+"""The nearest name is looked for this often and among this many: a file of errors may not cost minutes."""
+
+
+def finite(word: str) -> float | None:
+    """The finite number that a word is: digits as C reads them, no `1_000`, no other script's digits; else None."""
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and word.isascii() and "_" not in word else None
 
 
 class Reader:
@@ -14,6 +30,7 @@ class Reader:
 
     def __init__(self) -> None:
         self.findings: list[Finding] = []
+        self._hints = 0
 
     def report(
         self,
@@ -26,11 +43,19 @@ class Reader:
     ) -> None:
         self.findings.append(Finding(code=code, message=message, place=place, hint=hint, severity=severity))
 
+    def near(self, name: str, known: Collection[str]) -> str | None:
+        """The hint for an unknown name."""
+        self._hints += 1
+        if self._hints > MOST_HINTS or len(known) > MOST_NAMES or len(name) > 200:
+            return None
+        return did_you_mean(name, known)
+
     def name(self, element: Element, attribute: str = "name") -> str | None:
         """A name that is there and can be printed; else a finding and None."""
         value = element.attributes.get(attribute, "").strip()
         if not value:
-            self.report("URDF003", f"<{element.tag}> has no attribute '{attribute}'", element.place)
+            how = "an empty" if attribute in element.attributes else "no"
+            self.report("URDF003", f"<{element.tag}> has {how} attribute '{attribute}'", element.place)
             return None
         if not value.isprintable() or len(value) > 200:
             self.report("URDF003", f"<{element.tag}>: {value[:40]!r} is no usable name", element.place)
@@ -42,17 +67,18 @@ class Reader:
         text = element.attributes.get(attribute)
         if text is None:
             return None
-        words = text.split()
+        words = text.split() if len(text) < 10_000 else [text]
         expected = "a number" if count == 1 else f"{count} numbers"
-        try:
-            values = tuple(float(word) for word in words)
-        except ValueError:
-            values = ()
-        if len(values) != count or "_" in text or not all(math.isfinite(value) for value in values):
-            message = f"<{element.tag} {attribute}=\"{text[:60]}\">: expected {expected}, finite"
-            self.report("URDF004", message, element.place)
+        written = f"<{element.tag} {attribute}=\"{shorten(text)}\">"
+        wrong = next((word for word in words if finite(word) is None), None)
+        if wrong is not None:
+            what = f"'{shorten(wrong)}' is no finite number" if len(words) > 1 else "not a finite number"
+            self.report("URDF004", f"{written}: expected {expected}; {what}", element.place)
             return None
-        return values
+        if len(words) != count:
+            self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
+            return None
+        return tuple(float(word) for word in words)
 
     def number(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """One number; `default` where it is missing or (with a finding) wrong."""
@@ -62,20 +88,21 @@ class Reader:
     def required(self, element: Element, attribute: str) -> float | None:
         """One number that must be there; None with a finding otherwise."""
         if attribute not in element.attributes:
-            self.report("URDF004", f"<{element.tag}> has no attribute '{attribute}'", element.place)
+            self.missing(element, attribute)
             return None
         return self.number(element, attribute)
+
+    def missing(self, element: Element, attribute: str) -> None:
+        self.report("URDF059", f"<{element.tag}> has no attribute '{attribute}'", element.place)
 
     def text_number(self, element: Element | None, default: float) -> float:
         """A number that stands as the text of an element."""
         if element is None:
             return default
-        try:
-            value = float(element.text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            self.report("URDF004", f"<{element.tag}>{element.text[:60]}: expected a finite number", element.place)
+        value = finite(element.text)
+        if value is None:
+            message = f"<{element.tag}>{shorten(element.text)}</{element.tag}>: expected a finite number"
+            self.report("URDF004", message, element.place)
             return default
         return value
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import threading
+import time
 import xml.dom.minidom
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
@@ -18,15 +19,23 @@ from xml.dom.minidom import Document
 from xml.dom.minidom import Element as DomElement
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.model.expression import Evaluator, Refused, bounded, math_symbols, python_symbols
+from manipcli.core.text import did_you_mean
+from manipcli.model.bounds import bounds
+from manipcli.model.expression import Beyond, Evaluator, Refused, bounded, math_symbols, python_symbols
 from manipcli.model.located_xml import invalid, place_of, read_document
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.xacro_yaml import load_yaml
 
-MAX_EXPANSIONS = 50_000
-MAX_MACRO_DEPTH = 64
-MAX_INCLUDE_DEPTH = 32
 _loading = threading.Lock()
+_DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
+
+
+class UnknownArgument(NameError):
+    """`$(arg NAME)` of an argument that has neither a value nor a default."""
+
+    def __init__(self, name: str, known: Collection[str]) -> None:
+        self.hint = did_you_mean(name, known) or f"pass it: {name}:=VALUE"
+        super().__init__(f"argument '{name}' is not given and has no default")
 
 
 def expand(
@@ -73,6 +82,8 @@ class _Expansion:
         self._allow_env = allow_env
         self._module = _private_module()
         self._evaluate = Evaluator()
+        self._bounds = bounds()
+        self._until = time.process_time() + self._bounds.seconds
         self._findings: list[Finding] = []
         self._current: DomElement | None = None
         self._calls: list[DomElement] = []
@@ -114,9 +125,10 @@ class _Expansion:
         except InvalidInput:
             raise
         except RecursionError as error:
-            raise invalid("XACRO001", "macros, properties or elements are nested too deep", self._place()) from error
+            message = "macros, properties or elements are nested too deep for the stack; this cannot be raised"
+            raise invalid("XACRO004", message, self._place()) from error
         except MemoryError as error:
-            raise invalid("XACRO001", "the description needs too much memory", self._place()) from error
+            raise invalid("XACRO004", "the description needs more memory than there is", self._place()) from error
         except Exception as error:
             raise self._failed(error) from error
         unknown = [name for name in arguments if name not in self._known_arguments]
@@ -134,16 +146,19 @@ class _Expansion:
 
     def _failed(self, error: Exception) -> InvalidInput:
         cause: BaseException | None = error
-        refused = False
+        code, own_hint = "XACRO001", None
         while cause is not None:
-            refused = refused or isinstance(cause, Refused)
+            if isinstance(cause, Beyond):
+                code, own_hint = "XACRO004", cause.hint
+            elif isinstance(cause, Refused):
+                code, own_hint = "XACRO002", _DATA
+            elif isinstance(cause, UnknownArgument):
+                code, own_hint = "XACRO003", cause.hint
             cause = getattr(cause, "exc", None) or cause.__cause__
         message = "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(error)
         around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
         hint = "expanded from " + ", from ".join(around[:8]) if around else None
-        if refused:
-            hint = "descriptions are data: expressions compute numbers and text and cannot run code"
-        return invalid("XACRO002" if refused else "XACRO001", message, self._place(), hint)
+        return invalid(code, message, self._place(), own_hint or hint)
 
     def _warn(self, *words: object, **options: object) -> str:
         message = " ".join(str(word) for word in words)
@@ -153,11 +168,13 @@ class _Expansion:
     # --- the doors, in the library's signatures ---
 
     def _door_parse(self, inp: object, filename: str | None = None) -> Document:
-        if len(self._module.filestack) > MAX_INCLUDE_DEPTH:
-            raise Refused(f"files include each other more than {MAX_INCLUDE_DEPTH} deep")
+        if len(self._module.filestack) > self._bounds.include_depth:
+            most = self._bounds.include_depth
+            raise Beyond(f"files include each other more than {most} deep", "include_depth")
         return read_document(Path(str(filename)))
 
     def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
+        self._check_time()
         return self._evaluate(expr, globals)
 
     def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
@@ -175,8 +192,8 @@ class _Expansion:
         if node.tagName == "xacro:call":
             return bool(self._macro_call(node, macros, symbols))
         self._count()
-        if len(self._calls) >= MAX_MACRO_DEPTH:
-            raise Refused(f"macros call each other more than {MAX_MACRO_DEPTH} deep")
+        if len(self._calls) >= self._bounds.macro_depth:
+            raise Beyond(f"macros call each other more than {self._bounds.macro_depth} deep", "macro_depth")
         self._calls.append(node)
         done = bool(self._macro_call(node, macros, symbols))
         self._calls.pop()
@@ -184,8 +201,13 @@ class _Expansion:
 
     def _count(self) -> None:
         self._expansions += 1
-        if self._expansions > MAX_EXPANSIONS:
-            raise Refused(f"more than {MAX_EXPANSIONS} elements are expanded")
+        if self._expansions > self._bounds.expansions:
+            raise Beyond(f"more than {self._bounds.expansions} elements are expanded", "expansions")
+        self._check_time()
+
+    def _check_time(self) -> None:
+        if time.process_time() > self._until:
+            raise Beyond(f"the expansion takes more than {self._bounds.seconds} s", "seconds")
 
     def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
         self._current = tag
@@ -264,7 +286,7 @@ class _Expansion:
         try:
             return self._arguments()[name]
         except KeyError:
-            raise NameError(f"argument '{name}' is not given and has no default") from None
+            raise UnknownArgument(name, self._arguments()) from None
 
     def _load_yaml(self, name: str) -> object:
         path = self._packages.resolve(name, relative_to=self._folder())

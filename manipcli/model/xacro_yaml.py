@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from manipcli.model.expression import Refused
+from manipcli.model.bounds import bounds
+from manipcli.model.expression import Beyond, Refused
 
-MAX_BYTES = 1_000_000
 UNITS = {
     "!radians": 1.0,
     "!degrees": math.pi / 180.0,
@@ -45,9 +45,12 @@ def load_yaml(path: Path, evaluate: Callable[[str], object]) -> object:
 
     for tag, factor in UNITS.items():
         Loader.add_constructor(tag, construct(factor))
-    if path.stat().st_size > MAX_BYTES:
-        raise Refused(f"{path.name} is larger than {MAX_BYTES} bytes")
+    most = bounds().yaml_bytes
+    with path.open("rb") as stream:
+        data = stream.read(most + 1)
+    if len(data) > most:
+        raise Beyond(f"{path.name} is larger than {most} bytes", "yaml_bytes")
     try:
-        return yaml.load(path.read_bytes(), Loader=Loader)
+        return yaml.load(data, Loader=Loader)
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise Refused(f"{path.name}: {error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.model.description import read_description
 from manipcli.model.packages import Packages
-from manipcli.model.robot import Box, Mesh, Mimic
+from manipcli.model.robot import Box, Cylinder, Mesh, Mimic, Sphere
 from manipcli.model.urdf import Parts, read_parts
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -63,7 +64,6 @@ BAD = {
     "no link": ('<robot name="r"/>', "has no link"),
     "joint without type": (GOOD.replace(' type="revolute"', ""), "no attribute 'type'"),
     "unknown type": (joint(ENDS + LIMIT, "revolut"), "unknown type 'revolut'"),
-    "floating": (joint(ENDS, "floating"), "not supported"),
     "joint without child": (joint('<parent link="a"/>' + LIMIT), "has no <child"),
     "child without link": (joint('<parent link="a"/><child/>' + LIMIT), "no attribute 'link'"),
     "undefined parent": (GOOD.replace('parent link="a"', 'parent link="aa"'), "parent link 'aa' is not"),
@@ -109,7 +109,8 @@ BAD = {
     "triangle": (inertia(izz="0.06"), "no body has the principal moments"),
     "moved point mass": (inertia(ixx="0", iyy="0", izz="0"), "no moments of inertia"),
     "unknown shape": (link_b("<collision><geometry><boxx/></geometry></collision>"), "unknown shape <boxx>"),
-    "two shapes": (link_b("<collision><geometry><box/><box/></geometry></collision>"), "one shape"),
+    "no shape": (link_b("<collision><geometry/></collision>"), "with one shape"),
+    "cone": (link_b("<collision><geometry><cone/></geometry></collision>"), "no shape of URDF"),
     "negative size": (
         link_b('<collision><geometry><box size="1 -1 1"/></geometry></collision>'),
         "expected positive lengths",
@@ -164,6 +165,52 @@ def test_what_can_be_lived_with_is_a_warning(tmp_path: Path) -> None:
     assert parts.joints[0].limits.velocity is None
     np.testing.assert_array_equal(parts.joints[0].axis, [0.0, 0.0, 1.0])
     assert parts.links[1].visuals == ()
+
+
+def test_of_two_shapes_the_first_counts(tmp_path: Path) -> None:
+    shapes = '<collision><geometry><box size="1 1 1"/><sphere radius="1"/></geometry></collision>'
+    parts = read(tmp_path, link_b(INERTIAL + shapes))
+    assert [finding.code for finding in parts.findings] == ["URDF061"]
+    assert [each.shape for each in parts.links[1].collisions] == [Box((1.0, 1.0, 1.0))]
+
+
+def test_a_capsule_is_a_cylinder_and_two_spheres(tmp_path: Path) -> None:
+    capsule = '<origin xyz="1 0 0" rpy="1.5707963267948966 0 0"/>'
+    capsule += '<geometry><capsule radius="0.1" length="2"/></geometry>'
+    parts = read(tmp_path, link_b(f"{INERTIAL}<collision>{capsule}</collision>"))
+    middle, *ends = parts.links[1].collisions
+    assert (middle.shape, {each.shape for each in ends}) == (Cylinder(0.1, 2.0), {Sphere(0.1)})
+    # The axis z of the capsule lies along -y of the link.
+    for end, expected in zip(ends, ([1.0, 1.0, 0.0], [1.0, -1.0, 0.0]), strict=True):
+        np.testing.assert_allclose(end.X_LS.p, expected, atol=1e-15)
+
+
+def test_a_floating_joint_holds_its_link(tmp_path: Path) -> None:
+    parts = read(tmp_path, joint(ENDS, "floating"))
+    assert [(finding.code, finding.severity) for finding in parts.findings] == [("URDF065", "warning")]
+    assert parts.joints[0].type == "fixed"
+
+
+def test_a_bad_number_hides_no_error_of_the_tree(tmp_path: Path) -> None:
+    text = GOOD.replace('"0 0 1"', '"0 0 0"').replace("</robot>", '<link name="c"/></robot>')
+    assert {finding.code for finding in errors(tmp_path, text)} == {"URDF009", "URDF007"}
+
+
+def test_thousands_of_links_and_of_mimics_are_read_in_no_time(tmp_path: Path) -> None:
+    count = 5000
+    links = "".join(f'<link name="l{k}"/>' for k in range(count))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        f'<mimic joint="j{(k + 1) % (count - 1)}"/></joint>'
+        for k in range(count - 1)
+    )
+    began = time.process_time()
+    found = errors(tmp_path, f'<robot name="r">{links}{joints}</robot>')
+    assert [finding.code for finding in found] == ["URDF084"]
+    elsewhere = joints.replace('<child link="', '<child link="x')
+    undefined = errors(tmp_path, f'<robot name="r">{links}{elsewhere}</robot>')
+    assert len(undefined) >= count - 1
+    assert time.process_time() - began < 5.0
 
 
 def test_joints_come_depth_first_whatever_the_order_of_the_file(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ import pytest
 import yaml
 
 from manipcli.core.errors import InvalidInput
-from manipcli.model import xacro
 from manipcli.model.description import Description, read_description
 from manipcli.model.packages import Packages
 
@@ -140,7 +139,7 @@ def test_a_hostile_description_is_refused_with_its_place(
     folder = tmp_path / "one" / "two"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(xacro, "MAX_EXPANSIONS", 2000)
+    monkeypatch.setenv("MANIPCLI_BOUNDS", "expansions=2000")
     error = refused(folder, ATTACKS[attack])
     assert os.environ["HOME"] not in error.findings[0].message
     assert not list(tmp_path.rglob("CANARY"))

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.model import expression
 from manipcli.model.expression import Evaluator, Refused, math_symbols, python_symbols
 
 OWN = {"x": 3, "text": "a b", "data": {"joint": {"lower": -1.5}}, "_y": 2.0}
@@ -92,7 +91,7 @@ def test_other_built_in_names_do_not_exist(name: str) -> None:
 
 
 def test_many_small_operations_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(expression, "MAX_OPERATIONS", 1000)
+    monkeypatch.setenv("MANIPCLI_BOUNDS", "operations=1000")
     evaluate = Evaluator()
     with pytest.raises(Refused, match="too much"):
         for _ in range(100):

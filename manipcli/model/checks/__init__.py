@@ -1,11 +1,90 @@
-"""What can be wrong with a description: one file a check, in the order of what they are about."""
+"""What can be wrong with a description: one file a check, in the order of tiers and codes."""
 
 from manipcli.core.registry import Seam
 from manipcli.model.check import Check
+from manipcli.model.checks.bad_number import CHECK as BAD_NUMBER
+from manipcli.model.checks.colour_range import CHECK as COLOUR_RANGE
+from manipcli.model.checks.doctype import CHECK as DOCTYPE
+from manipcli.model.checks.duplicate_name import CHECK as DUPLICATE_NAME
+from manipcli.model.checks.foreign_shape import CHECK as FOREIGN_SHAPE
+from manipcli.model.checks.joint_ends import CHECK as JOINT_ENDS
+from manipcli.model.checks.joint_type import CHECK as JOINT_TYPE
+from manipcli.model.checks.loop import CHECK as LOOP
+from manipcli.model.checks.mimic_circle import CHECK as MIMIC_CIRCLE
+from manipcli.model.checks.mimic_target import CHECK as MIMIC_TARGET
+from manipcli.model.checks.misplaced_element import CHECK as MISPLACED_ELEMENT
+from manipcli.model.checks.missing_attribute import CHECK as MISSING_ATTRIBUTE
+from manipcli.model.checks.missing_name import CHECK as MISSING_NAME
+from manipcli.model.checks.no_link import CHECK as NO_LINK
+from manipcli.model.checks.not_a_robot import CHECK as NOT_A_ROBOT
+from manipcli.model.checks.not_xml import CHECK as NOT_XML
+from manipcli.model.checks.number_count import CHECK as NUMBER_COUNT
+from manipcli.model.checks.redefined_material import CHECK as REDEFINED_MATERIAL
+from manipcli.model.checks.repeated_element import CHECK as REPEATED_ELEMENT
 from manipcli.model.checks.robot_name import CHECK as ROBOT_NAME
+from manipcli.model.checks.self_joint import CHECK as SELF_JOINT
+from manipcli.model.checks.several_roots import CHECK as SEVERAL_ROOTS
+from manipcli.model.checks.several_shapes import CHECK as SEVERAL_SHAPES
+from manipcli.model.checks.shape import CHECK as SHAPE
+from manipcli.model.checks.shared_name import CHECK as SHARED_NAME
+from manipcli.model.checks.stray_text import CHECK as STRAY_TEXT
+from manipcli.model.checks.too_large import CHECK as TOO_LARGE
+from manipcli.model.checks.two_parents import CHECK as TWO_PARENTS
+from manipcli.model.checks.undefined_link import CHECK as UNDEFINED_LINK
+from manipcli.model.checks.undefined_material import CHECK as UNDEFINED_MATERIAL
+from manipcli.model.checks.unknown_attribute import CHECK as UNKNOWN_ATTRIBUTE
+from manipcli.model.checks.unknown_element import CHECK as UNKNOWN_ELEMENT
+from manipcli.model.checks.unread_number import CHECK as UNREAD_NUMBER
+from manipcli.model.checks.unsupported_joint import CHECK as UNSUPPORTED_JOINT
+from manipcli.model.checks.xacro_argument import CHECK as XACRO_ARGUMENT
+from manipcli.model.checks.xacro_bound import CHECK as XACRO_BOUND
+from manipcli.model.checks.xacro_expansion import CHECK as XACRO_EXPANSION
+from manipcli.model.checks.xacro_refused import CHECK as XACRO_REFUSED
+from manipcli.model.checks.xacro_warning import CHECK as XACRO_WARNING
 
-_SCHEMA: tuple[Check, ...] = (ROBOT_NAME,)
-_TOPOLOGY: tuple[Check, ...] = ()
+_SCHEMA: tuple[Check, ...] = (
+    NOT_XML,
+    NOT_A_ROBOT,
+    MISSING_NAME,
+    BAD_NUMBER,
+    JOINT_TYPE,
+    SHAPE,
+    ROBOT_NAME,
+    DOCTYPE,
+    TOO_LARGE,
+    UNKNOWN_ELEMENT,
+    MISPLACED_ELEMENT,
+    UNKNOWN_ATTRIBUTE,
+    REPEATED_ELEMENT,
+    STRAY_TEXT,
+    NUMBER_COUNT,
+    MISSING_ATTRIBUTE,
+    JOINT_ENDS,
+    SEVERAL_SHAPES,
+    FOREIGN_SHAPE,
+    UNDEFINED_MATERIAL,
+    COLOUR_RANGE,
+    UNSUPPORTED_JOINT,
+    REDEFINED_MATERIAL,
+    UNREAD_NUMBER,
+    SHARED_NAME,
+    XACRO_EXPANSION,
+    XACRO_REFUSED,
+    XACRO_ARGUMENT,
+    XACRO_BOUND,
+    XACRO_WARNING,
+)
+_TOPOLOGY: tuple[Check, ...] = (
+    DUPLICATE_NAME,
+    UNDEFINED_LINK,
+    SEVERAL_ROOTS,
+    MIMIC_TARGET,
+    NO_LINK,
+    LOOP,
+    TWO_PARENTS,
+    SELF_JOINT,
+    MIMIC_CIRCLE,
+)
 _PHYSICS: tuple[Check, ...] = ()
 _ASSETS: tuple[Check, ...] = ()
 _READINESS: tuple[Check, ...] = ()
