@@ -13,7 +13,7 @@ import typer
 from typer.exceptions import TyperException
 
 from manipcli import __version__
-from manipcli.cli import check, console, judge, plan, run, schema
+from manipcli.cli import check, console, judge, plan, run, schema, view
 from manipcli.cli import list as list_
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 
@@ -36,6 +36,7 @@ app.command("run")(run.run)
 app.command("check")(check.check)
 app.command("plan")(plan.plan)
 app.command("judge")(judge.judge)
+app.command("view")(view.view)
 app.command("list")(list_.list_)
 app.command("schema")(schema.schema)
 

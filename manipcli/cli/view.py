@@ -1,0 +1,67 @@
+"""`manipcli view FILE`: a robot or the scene of a task in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.interrupts import Interrupts
+from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+
+
+def view(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="URDF, xacro, robot file or task.", show_default=False)],
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
+    ] = None,
+    *,
+    port: Annotated[
+        int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
+    ] = None,
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+) -> ExitCode:
+    """Show a robot, or a task's scene at its start, in the browser.
+
+    Joints by sliders, named poses, collision shapes, frames, inertia boxes. Ctrl-C ends it.
+    """
+    with Interrupts():
+        given = _arguments(arguments or [])
+        from manipcli.flow.look import load_sight
+        from manipcli.replay.view import View
+        from manipcli.report import text
+
+        sight = load_sight(file, arguments=given, package_path=tuple(package_path or ()), allow_outside=allow_outside)
+        for finding in sight.findings:
+            console.talk(text.describe(finding))
+        with View(sight.robot, sight.scene, q=sight.q, port=port) as page:
+            for line in page.missing:
+                console.talk(f"not drawn: {line}")
+            console.result(page.url)
+            console.talk("Ctrl-C ends it")
+            if open_:
+                import webbrowser
+
+                webbrowser.open(page.url)
+            try:
+                page.wait()
+            except KeyboardInterrupt:
+                console.talk("")
+    return ExitCode.PASSED
+
+
+def _arguments(words: list[str]) -> dict[str, str]:
+    found = {}
+    for word in words:
+        name, mark, value = word.partition(":=")
+        if not mark or not name:
+            message = f"'{word}' is no argument of a description; expected NAME:=VALUE"
+            raise InvalidInput([Finding("VIEW004", message)])
+        found[name] = value
+    return found

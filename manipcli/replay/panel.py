@@ -1,0 +1,140 @@
+"""What one can do in the view: joints by sliders, named poses by buttons, and which layers are shown."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.robot import Joint, RobotModel
+from manipcli.replay.placing import Placing
+from manipcli.replay.posture import following, posture, within, zero_posture
+from manipcli.replay.stage import Stage
+
+if TYPE_CHECKING:
+    import viser
+
+STEPS = 400
+"""A slider has about so many positions."""
+ZERO = "zero"
+WIDE = {"continuous": math.pi, "revolute": math.pi, "prismatic": 1.0}
+"""How far a slider reaches [rad or m] where a joint states no limit."""
+
+
+def slider_range(joint: Joint) -> tuple[float, float]:
+    """From where to where the slider of a joint goes [rad or m]."""
+    lower, upper, reach = joint.limits.lower, joint.limits.upper, WIDE[joint.type]
+    low = lower if lower is not None else min(-reach, upper if upper is not None else 0.0)
+    high = upper if upper is not None else max(reach, low)
+    return low, high
+
+
+def pose_text(robot: RobotModel, q: Array) -> str:
+    """A posture as `poses:` of a robot file has it: a list for each group; by joint name where there are no groups."""
+    value = {name: f"{number:.4g}" for name, number in zip(robot.joint_names, q, strict=True)}
+    if robot.groups:
+        parts = [f"{group.name}: [{', '.join(value[name] for name in group.joints)}]" for group in robot.groups]
+    else:
+        parts = [f"{joint.name}: {value[joint.name]}" for joint in robot.moving_joints if joint.independent]
+    return "\n".join(parts)
+
+
+class LayerSwitches:
+    """A checkbox for each thing that can be shown."""
+
+    def __init__(self, server: viser.ViserServer, stage: Stage) -> None:
+        with server.gui.add_folder("Show"):
+            visual = server.gui.add_checkbox("visual meshes", True)
+            collision = server.gui.add_checkbox(
+                "collision shapes", False, hint="A mesh as its convex hull, which is what planner and physics take."
+            )
+            inertia = server.gui.add_checkbox(
+                "inertia boxes", False, hint="For each link, the uniform box that has its mass and inertia."
+            )
+            frames = server.gui.add_checkbox("frames", False, hint="x red, y green, z blue.")
+            labels = server.gui.add_checkbox("names", False)
+        visual.on_update(lambda _: stage.show("visual", visual.value))
+        collision.on_update(lambda _: stage.show("collision", collision.value))
+        inertia.on_update(lambda _: stage.show("inertia", inertia.value))
+        frames.on_update(lambda _: stage.show_frames(frames.value))
+        labels.on_update(lambda _: stage.show_labels(labels.value))
+
+
+class JointPanel:
+    """A slider for each independent joint, a button for each named pose; the stage follows.
+
+    Args:
+        server: where.
+        robot: whose joints.
+        stage: shows it.
+        placing: joints to frames.
+        q: (n,) where it is at first.
+
+    The page calls back in threads of the server; one lock makes one movement out of each.
+    """
+
+    def __init__(self, server: viser.ViserServer, robot: RobotModel, stage: Stage, placing: Placing, q: Array) -> None:
+        self._robot, self._stage, self._placing = robot, stage, placing
+        self._lock = threading.Lock()
+        self._sliders: dict[int, viser.GuiSliderHandle[float]] = {}
+        self._q = q
+        with server.gui.add_folder("Poses"):
+            for name in (*(pose.name for pose in robot.poses), ZERO):
+                server.gui.add_button(name).on_click(self._goer(name))
+        with server.gui.add_folder("Joints [rad, m]"):
+            for k, joint in enumerate(robot.moving_joints):
+                if joint.independent:
+                    self._sliders[k] = self._slider(server, joint, k)
+        self._text = server.gui.add_text(
+            "as YAML", pose_text(robot, q), multiline=True, hint="For `poses:` of the robot file, or a step `move`."
+        )
+
+    def _slider(self, server: viser.ViserServer, joint: Joint, k: int) -> viser.GuiSliderHandle[float]:
+        low, high = slider_range(joint)
+        step = 10.0 ** math.floor(math.log10(max(high - low, 1e-6) / STEPS))
+        value = min(max(float(self._q[k]), low), high)
+        slider = server.gui.add_slider(joint.name, low, high, step, value, disabled=high <= low)
+        slider.on_update(lambda _: self._slid(k, slider.value))
+        return slider
+
+    @property
+    def position(self) -> Array:
+        """(n,) where the joints are shown."""
+        return self._q
+
+    def _goer(self, name: str) -> Callable[[object], None]:
+        return lambda _: self.go(self.named(name))
+
+    def named(self, name: str) -> Array:
+        """(n,) the posture behind a button."""
+        known = any(pose.name == name for pose in self._robot.poses)
+        return posture(self._robot, name) if known else zero_posture(self._robot)
+
+    def go(self, q: Array) -> None:
+        """Show a posture, and put the sliders there."""
+        self._move(q)
+        # Each assignment calls `_slid`, which finds the joint there already.
+        for k, slider in self._sliders.items():
+            slider.value = float(q[k])  # type: ignore[misc]  # viser's setter hides from mypy
+
+    def _slid(self, k: int, value: float) -> None:
+        """One slider was moved; the others' values are not asked for: they may be on their way elsewhere."""
+        with self._lock:
+            q = np.array(self._q)
+            if not math.isfinite(value) or value == q[k]:
+                return
+            q[k] = within(self._robot.moving_joints[k].limits, value)
+            self._place(following(self._robot, q))
+
+    def _move(self, q: Array) -> None:
+        with self._lock:
+            self._place(q)
+
+    def _place(self, q: Array) -> None:
+        self._q = q
+        self._stage.place(self._placing.start(q))
+        self._text.value = pose_text(self._robot, q)  # type: ignore[misc]

@@ -1,0 +1,159 @@
+"""A drawing in the browser: its frames as nodes that move, its surfaces as meshes below them.
+
+`view` moves it by sliders, a replay by the states of a log.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from manipcli.core.geometry import Transform
+from manipcli.replay.camera import Camera, framing
+from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
+from manipcli.replay.placing import Poses
+from manipcli.replay.surface import Rgba
+
+if TYPE_CHECKING:
+    import viser
+
+AXES = 0.08
+"""Length of the axes of a frame [m]."""
+GRID = 0.1
+"""Width of a cell of the grid on the ground [m]."""
+BELOW = 5e-4
+"""The grid lies this much above the floor of a scene [m], or the two would flicker."""
+
+
+class _Shown(Protocol):
+    visible: bool
+
+
+class Stage:
+    """Shows one drawing on one server.
+
+    Args:
+        server: where.
+        drawing: what.
+        poses: where its frames are at first; also what the camera looks at.
+        floors: frames of bodies that are floors: they need not be in view.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, drawing: Drawing, poses: Poses, *, floors: frozenset[str] = frozenset()
+    ) -> None:
+        self._server = server
+        self._nodes: list[viser.FrameHandle] = []
+        self._layers: dict[Layer, list[_Shown]] = {layer: [] for layer in LAYERS}
+        self._axes: list[_Shown] = []
+        self._labels: list[_Shown] = []
+        paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
+        with server.atomic():
+            for frame in drawing.frames:
+                self._nodes.append(server.scene.add_frame(paths[frame], show_axes=False))
+                if frame != WORLD:
+                    self._frame(f"{paths[frame]}/frame", frame.removeprefix("robot/"))
+            for k, mark in enumerate(drawing.marks):
+                self._frame(f"{paths[mark.frame]}/mark_{k}", mark.name, mark.X_FM)
+            for k, drawable in enumerate(drawing.drawables):
+                self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
+        self.place(poses)
+        self._ground(drawing, poses, floors)
+        self.look(framing(drawing, poses, leave_out=floors))
+
+    def _frame(self, path: str, label: str, X: Transform | None = None) -> None:
+        """Axes with a name beside them (not below: one is shown without the other), both hidden at first."""
+        X = X or Transform.identity()
+        axes = self._server.scene.add_frame(
+            path,
+            axes_length=AXES,
+            axes_radius=AXES / 24.0,
+            origin_radius=AXES / 14.0,
+            position=X.p,
+            wxyz=np.roll(X.quat_xyzw, 1),
+            visible=False,
+        )
+        name = self._server.scene.add_label(
+            f"{path}_name", label, position=X.p, visible=False, font_screen_scale=0.75, anchor="bottom-left"
+        )
+        self._axes.append(axes)
+        self._labels.append(name)
+
+    def _mesh(self, path: str, drawable: Drawable) -> None:
+        clear = drawable.rgba[3]
+        mesh = self._server.scene.add_mesh_simple(
+            path,
+            drawable.surface.vertices.astype(np.float32),
+            drawable.surface.faces.astype(np.uint32),
+            color=_rgb(drawable.rgba),
+            opacity=clear if clear < 1.0 else None,
+            side="double",
+            visible=drawable.layer == "visual",
+            cast_shadow=clear >= 1.0,
+        )
+        self._layers[drawable.layer].append(mesh)
+
+    def _ground(self, drawing: Drawing, poses: Poses, floors: frozenset[str]) -> None:
+        """A grid at z = 0, or under what stands lower."""
+        index = {name: k for k, name in enumerate(drawing.frames)}
+        lowest = min(
+            (
+                float(poses.X_WF(index[one.frame]).apply(one.surface.vertices)[:, 2].min())
+                for one in drawing.drawables
+                if one.layer == "visual" and one.frame not in floors and len(one.surface.vertices)
+            ),
+            default=0.0,
+        )
+        self._server.scene.add_grid(
+            "/ground",
+            width=6.0,
+            height=6.0,
+            cell_size=GRID,
+            section_size=10 * GRID,
+            cell_color=(205, 210, 216),
+            section_color=(165, 172, 180),
+            shadow_opacity=0.0 if floors else 0.25,
+            position=(0.0, 0.0, min(0.0, lowest) + BELOW),
+        )
+
+    def place(self, poses: Poses) -> None:
+        """Move every frame to where it is at one instant; the browser shows them all at once."""
+        with self._server.atomic():
+            for k, node in enumerate(self._nodes):
+                node.position = poses.position[k]
+                node.wxyz = np.roll(poses.quat_xyzw[k], 1)
+
+    def look(self, camera: Camera) -> None:
+        """Where browsers that open from now on look from."""
+        start = self._server.initial_camera
+        start.position, start.look_at, start.up = camera.eye, camera.target, (0.0, 0.0, 1.0)
+        start.fov = float(np.radians(camera.field))
+
+    def show(self, layer: Layer, shown: bool) -> None:
+        """Show or hide all surfaces of a layer."""
+        _set(self._layers[layer], shown)
+
+    def show_frames(self, shown: bool) -> None:
+        """Show or hide the axes of all frames and marks."""
+        _set(self._axes, shown)
+
+    def show_labels(self, shown: bool) -> None:
+        """Show or hide the names of all frames and marks."""
+        _set(self._labels, shown)
+
+
+def _set(nodes: list[_Shown], shown: bool) -> None:
+    for node in nodes:
+        node.visible = shown
+
+
+def _path(frame: str, k: int) -> str:
+    """viser reads a path where a name has slashes, so each frame gets a path of two parts, unlike all others."""
+    name = frame.removeprefix("robot/").replace("/", "|")
+    return "/world" if frame == WORLD else f"/{'robot' if frame.startswith('robot/') else 'scene'}/{k}_{name}"
+
+
+def _rgb(rgba: Rgba) -> tuple[int, int, int]:
+    r, g, b = (round(255 * min(max(value, 0.0), 1.0)) for value in rgba[:3])
+    return (r, g, b)
