@@ -39,8 +39,11 @@ class Engine(Protocol):
         """Whether it follows references instead of commands."""
         ...
 
-    def read(self) -> WorldState:
-        """The true state now; `time` is the session's to fill. The arrays are overwritten by the next read."""
+    def read(self, *, velocities: bool = True) -> WorldState:
+        """The true state now; `time` is the session's to fill. The arrays are overwritten by the next read.
+
+        Without `velocities` those of the bodies may stay as they were read last.
+        """
         ...
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:

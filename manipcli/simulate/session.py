@@ -23,7 +23,8 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import Engine
 
 SLOW: Final = 10
-"""Control ticks between two looks at all contacts and at the plausibility of the state."""
+"""Control ticks between two looks at what need not be seen at every one: the velocities of bodies (at the last tick
+before a multiple of it, where an `until` asks), all contacts, the plausibility of the state."""
 RUNAWAY_FACTOR: Final = 3.0
 """A joint this many times faster than its velocity limit has left its controller."""
 RUNAWAY_SPEED: Final = 90.0
@@ -79,7 +80,7 @@ class Session:
         self._limiter = manager.limiter([joint.limits for joint in robot.moving_joints])
         self._kinematics = kinematics
         self._dynamics = "inverse_dynamics" in manager.feed_forward
-        self._gravity = [manager.index(each.name) for each in manager.controllers if each.feed_forward == "gravity"]
+        self._gravity = "gravity" in manager.feed_forward
         n = len(robot.joint_names)
         self._position, self._velocity, self._acceleration = np.zeros((3, n))
         self._damping = np.array([joint.damping for joint in robot.moving_joints])
@@ -115,7 +116,7 @@ class Session:
         Raises:
             SimulationFailed: the state is not finite, a joint runs away, a body flies or falls for ever.
         """
-        state = self.state = self.engine.read()
+        state = self.state = self.engine.read(velocities=self.ticks % SLOW == SLOW - 1)
         time = self.ticks * self.period
         state.time[...] = time
         self._touch(state)
@@ -143,15 +144,9 @@ class Session:
         with the viscous damping D of the joints at the reference velocity: at the measured one it would undo a damping
         that the loop is glad of.
         """
-        if not self._dynamics:
-            return self._kinematics.gravity(state.position) if self._gravity else None
-        efforts = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
-        efforts += self._damping * self._rate
-        if self._gravity:
-            gravity = self._kinematics.gravity(state.position)
-            for index in self._gravity:
-                efforts[index] = gravity[index]
-        return efforts
+        if self._dynamics:
+            return self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+        return self._kinematics.gravity(state.position) if self._gravity else None
 
     def _touch(self, state: WorldState) -> None:
         """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""

@@ -37,7 +37,7 @@ class KinematicEngine:
             body_angular=np.zeros((m, 3)),
         )
 
-    def read(self) -> WorldState:
+    def read(self, *, velocities: bool = True) -> WorldState:
         return self._state
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:

@@ -220,7 +220,7 @@ class PybulletEngine:
             physicsClientId=client,
         )
 
-    def read(self) -> WorldState:
+    def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
         states = p.getJointStates(self._robot, self._joints, client)
         state.position[:] = [s[0] for s in states]
@@ -230,17 +230,15 @@ class PybulletEngine:
         state.effort[self._efforts_at] = self._applied
         for row, (k, offset, turned) in enumerate(self._movable):
             position, quat = p.getBasePositionAndOrientation(k, client)
-            linear, angular = p.getBaseVelocity(k, client)
             if turned is not None:
                 _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-            if offset is not None:
-                x, y, z = r = _rotated(quat, offset)
-                position = (position[0] - x, position[1] - y, position[2] - z)
-                linear = _minus_cross(linear, angular, r)
-            state.body_position[row] = position
+            arm = None if offset is None else _rotated(quat, offset)
+            state.body_position[row] = position if arm is None else _minus(position, arm)
             state.body_quat_xyzw[row] = quat
-            state.body_linear[row] = linear
-            state.body_angular[row] = angular
+            if velocities:
+                linear, angular = p.getBaseVelocity(k, client)
+                state.body_linear[row] = linear if arm is None else _minus(linear, _cross(angular, arm))
+                state.body_angular[row] = angular
         return state
 
     def write(self, command: Array, position: Array, velocity: Array) -> None:
@@ -353,11 +351,14 @@ def _rotated(quat: tuple[float, ...], v: Vector) -> Vector:
     return a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx
 
 
-def _minus_cross(v: Vector, a: Vector, b: Vector) -> Vector:
-    """v - a x b."""
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
     ax, ay, az = a
     bx, by, bz = b
-    return v[0] - (ay * bz - az * by), v[1] - (az * bx - ax * bz), v[2] - (ax * by - ay * bx)
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 def _version() -> str:
