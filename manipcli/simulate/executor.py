@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -12,8 +12,10 @@ from manipcli.control.action import GoalHandle
 from manipcli.control.gripper import GripperController, GripperGoal
 from manipcli.control.joint_trajectory_controller import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Grip, Motion
+from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import Session
 
 Until = Callable[[WorldState], bool]
@@ -100,13 +102,38 @@ class Executor:
             follower = manager.serving(motion.trajectory.names)
             if not isinstance(follower, JointTrajectoryController):
                 raise InvalidArgument("CTRL150", f"controller '{follower.name}' does not follow trajectories")
-            handles.append(follower.send_goal(motion.trajectory))
+            handles.append(follower.send_goal(self._completed(motion.trajectory, follower)))
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not isinstance(gripper, GripperController):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
             handles.append(gripper.send_goal(_gripper_goal(gripper, motion.grip)))
         return tuple(handles)
+
+    def _completed(self, trajectory: JointTrajectory, follower: JointTrajectoryController) -> JointTrajectory:
+        """The trajectory with the other joints of its controller, which stay where they are wanted now."""
+        others = tuple(name for name in follower.joints if name not in trajectory.names)
+        if not others:
+            return trajectory
+        manager = self._session.manager
+        if manager.outputs:
+            wanted = dict(
+                zip(follower.joints, manager.outputs[manager.controllers.index(follower)].position, strict=True)
+            )
+        else:  # nothing has been commanded yet
+            wanted = dict(zip(self._session.robot.joint_names, self._session.engine.read().position, strict=True))
+        stay = np.tile([wanted[name] for name in others], (len(trajectory.times), 1))
+
+        def widened(values: Array | None, more: Array) -> Array | None:
+            return None if values is None else np.hstack([values, more])
+
+        return replace(
+            trajectory,
+            names=(*trajectory.names, *others),
+            positions=np.hstack([trajectory.positions, stay]),
+            velocities=widened(trajectory.velocities, np.zeros_like(stay)),
+            accelerations=widened(trajectory.accelerations, np.zeros_like(stay)),
+        )
 
     def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
         for handle in handles:
