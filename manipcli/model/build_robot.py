@@ -9,7 +9,8 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
-from manipcli.model.description import Description, read_description
+from manipcli.model.description import Description
+from manipcli.model.examine import examine
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
 from manipcli.model.packages import NotFound, Packages, Unread
@@ -106,6 +107,21 @@ def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
     return _assembled(reporter, spec, parts.root, body)
 
 
+def bare_robot(parts: Parts) -> RobotModel:
+    """A sound description as a robot of which no file says more: no groups, no named poses, at the world's origin."""
+    return RobotModel(
+        name=parts.name,
+        root=parts.root,
+        links=parts.links,
+        joints=parts.joints,
+        groups=(),
+        poses=(),
+        transmissions=parts.transmissions,
+        X_WB=Transform.identity(),
+        urdf=portable_urdf(parts.name, parts.links, parts.joints, parts.transmissions),
+    )
+
+
 def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> RobotModel:
     """The robot of welded parts and of what the robot file says about them."""
     joints = _with_limits(reporter, spec, body.ordered())
@@ -159,13 +175,12 @@ class _Descriptions:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
         packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
-        try:
-            parts = read_parts(read_description(path, packages=packages, arguments=arguments))
-        except InvalidInput as error:
-            self._reporter.findings += error.findings
-            return None
-        self._reporter.findings += parts.findings
-        return parts
+        examination = examine(path, packages=packages, arguments=arguments)
+        self._reporter.findings += examination.errors
+        if examination.parts is not None:
+            read = [finding for finding in examination.parts.findings if finding.severity != "error"]
+            self._reporter.findings += list(dict.fromkeys(read))
+        return examination.parts
 
 
 class _Body:

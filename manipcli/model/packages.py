@@ -29,6 +29,14 @@ class NotFound(Exception):
         super().__init__(message)
 
 
+class Outside(NotFound):
+    """A file that is there and must not be read: it lies outside of the folders that belong to the description."""
+
+
+class RemoteFile(NotFound):
+    """An address that only a network could answer."""
+
+
 def own_root(description: Path) -> Path:
     """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder."""
     folder = description.resolve().parent
@@ -45,7 +53,12 @@ class Packages:
         description: the file that names things; None looks only at `package_path` and what is installed.
         package_path: folders that hold packages (or are one), looked at first.
         allow_outside: lets a file lie anywhere.
+
+    Attributes:
+        reads: whether the files that are named are there to be read.
     """
+
+    reads = True
 
     def __init__(
         self, description: Path | None, *, package_path: Sequence[Path] = (), allow_outside: bool = False
@@ -112,7 +125,10 @@ class Packages:
         elif separator and scheme == "file":
             path = Path("/" + unquote(rest.removeprefix("localhost")).lstrip("/"))
         elif separator:
-            raise NotFound(f"'{uri}': scheme '{scheme}' is not read", hint="use package://NAME/path or a relative path")
+            hint = "copy the file into the package; use package://NAME/path or a relative path"
+            raise RemoteFile(f"'{uri[:100]}': nothing is fetched, and scheme '{scheme[:20]}' is not read", hint=hint)
+        elif uri[:5].lower() == "data:":
+            raise RemoteFile(f"'{uri[:20]}...': data in an address is not read", hint="write it into a file")
         else:
             path = Path(uri)
         if "\0" in uri:
@@ -127,7 +143,7 @@ class Packages:
         except (OSError, RuntimeError) as error:
             raise NotFound(f"'{uri}' is not found; searched {shown_path(path)}") from error
         if not self._allow_outside and not any(real.is_relative_to(root) for root in roots):
-            raise NotFound(
+            raise Outside(
                 f"'{uri}' lies outside of the description's folder and packages",
                 hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside",
             )
@@ -154,6 +170,8 @@ class Packages:
 
 class Unread(Packages):
     """For a description whose files nobody will read, as that in a log: every name stands for itself."""
+
+    reads = False
 
     def __init__(self) -> None:
         super().__init__(None)

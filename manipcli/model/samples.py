@@ -1,0 +1,59 @@
+"""For the bad examples of checks: small descriptions without a fault, and a tetrahedron in every format of meshes."""
+
+from __future__ import annotations
+
+from manipcli.core.geometry import frozen
+
+_CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_FACES = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+
+TETRAHEDRON = frozen([[_CORNERS[k] for k in face] for face in _FACES])
+"""(4, 3, 3) [m]: the corners of its triangles."""
+
+
+LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+MOMENTS = '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/>'
+INERTIAL = f'<inertial><mass value="1"/>{MOMENTS}</inertial>'
+CUBE = '<collision><geometry><box size="0.35 0.35 0.35"/></geometry></collision>'
+"""Of 1 kg it has the moments of `INERTIAL`."""
+
+
+def one_joint(inside: str = LIMIT, *, kind: str = "revolute", tip: str = INERTIAL + CUBE, more: str = "") -> str:
+    """A description of links `base` and `tip` with joint `j` between them, and `more` beside them."""
+    ends = '<parent link="base"/><child link="tip"/>'
+    joint = f'<joint name="j" type="{kind}">{ends}{inside}</joint>'
+    return f'<robot name="r"><link name="base"/><link name="tip">{tip}</link>{joint}{more}</robot>'
+
+
+def one_link(mesh: str, *, role: str = "visual") -> str:
+    """A description of one link with a <mesh> of these attributes."""
+    return f'<robot name="r"><link name="base"><{role}><geometry><mesh {mesh}/></geometry></{role}></link></robot>'
+
+
+def ascii_tetrahedron() -> bytes:
+    """As STL of text."""
+    facets = []
+    for face in _FACES:
+        vertices = "".join("vertex {} {} {}\n".format(*_CORNERS[k]) for k in face)
+        facets.append(f"facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    return f"solid tetrahedron\n{''.join(facets)}endsolid tetrahedron\n".encode()
+
+
+def collada_tetrahedron(*, up_axis: str = "Z_UP", meter: float = 1.0) -> bytes:
+    """As Collada."""
+    numbers = " ".join(f"{value:g}" for corner in _CORNERS for value in corner)
+    indices = " ".join(str(k) for face in _FACES for k in face)
+    return f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="{meter!r}"/><up_axis>{up_axis}</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">{numbers}</float_array>
+<technique_common><accessor source="#pa" count="4" stride="3"/></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>{indices}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>
+""".encode()
