@@ -9,10 +9,7 @@ CHECK = Check(
     tier="physics",
     severity="warning",
     summary="The axis of a joint is not of unit length",
-    reason=(
-        "Only its direction is used here; programs that take it as it is scale velocities and positions with "
-        "it."
-    ),
+    reason=("Only its direction is used here; programs that take it as it is scale velocities and positions with it."),
     bad=one_joint('<axis xyz="0 0 2"/>' + LIMIT),
     find=found_while_reading("URDF034"),
 )

@@ -23,8 +23,8 @@ CHECK = Check(
     severity="note",
     summary="A Collada file states an up axis other than z",
     reason=(
-        "RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and three.js "
-        "turn the mesh. Only a file with z up looks the same everywhere."
+        "RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and "
+        "three.js turn the mesh. Only a file with z up looks the same everywhere."
     ),
     bad=one_link('filename="a.dae"'),
     find=_find,

@@ -13,7 +13,9 @@ def _find(subject: Subject) -> Iterator[Finding]:
         limit = joint.first("limit")
         if limit is None or joint.attributes.get("type") != "continuous":
             continue
-        stated = [key for key in ("lower", "upper") if finite(limit.attributes.get(key, "0").strip()) not in (0.0, None)]
+        stated = [
+            key for key in ("lower", "upper") if finite(limit.attributes.get(key, "0").strip()) not in (0.0, None)
+        ]
         if stated:
             shown = " and ".join(f"{key}={limit.attributes[key].strip()}" for key in stated)
             message = f"joint '{joint.attributes.get('name', '')}' is continuous; {shown} is ignored"

@@ -28,7 +28,9 @@ def _find(subject: Subject) -> Iterator[Finding]:
         if link.inertial is None or box is None or not link.inertial.inertia.any():
             continue
         low, high = box
-        reach = float(np.linalg.norm(np.maximum(np.abs(low - link.inertial.X_LI.p), np.abs(high - link.inertial.X_LI.p))))
+        reach = float(
+            np.linalg.norm(np.maximum(np.abs(low - link.inertial.X_LI.p), np.abs(high - link.inertial.X_LI.p)))
+        )
         gyration = sqrt(float(np.linalg.eigvalsh(link.inertial.inertia)[2]) / link.inertial.mass)
         if reach / TOO_NEAR <= gyration <= reach * TOO_FAR:
             continue

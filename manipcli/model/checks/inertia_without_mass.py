@@ -27,8 +27,7 @@ CHECK = Check(
     severity="warning",
     summary="A link has moments of inertia and mass 0",
     reason=(
-        "No body is like that; the inertia is left out, and the joint that moves the link may move nothing at "
-        "all."
+        "No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all."
     ),
     bad=one_joint(tip=CUBE + INERTIAL.replace('mass value="1"', 'mass value="0"'), kind="fixed", inside=""),
     find=_find,

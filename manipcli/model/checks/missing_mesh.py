@@ -10,8 +10,7 @@ CHECK = Check(
     severity="error",
     summary="A collision mesh is not found",
     reason=(
-        "A link without its collision shape passes through what it should hit. A missing visual is a warning, "
-        "URDF033."
+        "A link without its collision shape passes through what it should hit. A missing visual is a warning, URDF033."
     ),
     bad=one_link('filename="package://missing_package/a.stl"', role="collision"),
     find=found_while_reading("URDF013"),
