@@ -19,7 +19,15 @@ _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
 
 
 def prepare() -> None:
-    """Once at the start: no character may fail to print."""
+    """Once at the start: no character may fail to print, and no file may take the place of a closed stream.
+
+    Started with `>&-`, the next file that is opened would get descriptor 1, and what others print would go there.
+    """
+    for descriptor in (0, 1, 2):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest that is free: this one
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
