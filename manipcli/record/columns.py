@@ -32,39 +32,46 @@ class Places:
     lengths: Int
 
 
-def indexed(data: bytes, indexes: Mapping[int, bytes]) -> dict[int, Places] | None:
+def indexed(data: bytes, indexes: Mapping[int, bytes], *, whole: bool = True) -> dict[int, Places] | None:
     """Messages by channel from a chunk's message indexes (channel -> pairs of log time and offset).
 
-    None unless the indexes account for every byte of the chunk, message by message.
+    None when a message is not where they say or, with `whole`, unless they account for every byte of the chunk.
     """
-    size = len(data)
     found: dict[int, Places] = {}
-    offsets, ends = [], []
     for channel, raw in indexes.items():
-        entries = np.frombuffer(raw, dtype="<u8").reshape(-1, 2)
-        if len(entries) == 0:
-            continue
-        if entries[:, 1].max() > max(size - PAYLOAD, 0) or size < PAYLOAD:
+        places = _located(data, channel, raw)
+        if places is None:
             return None
-        at = entries[:, 1].astype(np.int64)
-        lengths = _every(data, "<u8")[at + 1]
-        fits = (
-            (np.frombuffer(data, dtype=np.uint8)[at] == _MESSAGE)
-            & (lengths >= PAYLOAD - 9)
-            & (lengths <= size)
-            & (_every(data, "<u2")[at + 9] == channel)
-            & (_every(data, "<u8")[at + 15] == entries[:, 0])
-        )
-        if not fits.all():
-            return None
-        length = lengths.astype(np.int64)
-        found[channel] = Places(entries[:, 0].astype(np.int64), at + PAYLOAD, length - (PAYLOAD - 9))
-        offsets.append(at)
-        ends.append(at + 9 + length)
-    if not offsets:
+        if len(places.times):
+            found[channel] = places
+    if not found:
         return None
-    begins, stops = np.sort(np.concatenate(offsets)), np.sort(np.concatenate(ends))
-    return found if begins[0] == 0 and stops[-1] == size and np.array_equal(begins[1:], stops[:-1]) else None
+    if not whole:
+        return found
+    begins = np.sort(np.concatenate([places.starts for places in found.values()])) - PAYLOAD
+    stops = np.sort(np.concatenate([places.starts + places.lengths for places in found.values()]))
+    covered = begins[0] == 0 and stops[-1] == len(data) and np.array_equal(begins[1:], stops[:-1])
+    return found if covered else None
+
+
+def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
+    """The messages of one channel from its message index; None when one of them is not there."""
+    size = len(data)
+    entries = np.frombuffer(raw, dtype="<u8").reshape(-1, 2)
+    if len(entries) and (size < PAYLOAD or entries[:, 1].max() > size - PAYLOAD):
+        return None
+    at = entries[:, 1].astype(np.int64)
+    lengths = _every(data, "<u8")[at + 1]
+    fits = (
+        (np.frombuffer(data, dtype=np.uint8)[at] == _MESSAGE)
+        & (lengths >= PAYLOAD - 9)
+        & (lengths <= size)
+        & (_every(data, "<u2")[at + 9] == channel)
+        & (_every(data, "<u8")[at + 15] == entries[:, 0])
+    )
+    if not fits.all():
+        return None
+    return Places(entries[:, 0].astype(np.int64), at + PAYLOAD, lengths.astype(np.int64) - (PAYLOAD - 9))
 
 
 def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:

@@ -165,19 +165,23 @@ class _Reader:
         """A chunk; its indexes, which end at `end`, say whether anything in it is needed yet."""
         self._known()
         self._chunks.append(ChunkPlace(record.offset, end))
-        topic = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
-        if not indexes or "" in topic.values() or topics.EVENTS in topic.values():
-            guarded(self._path, record, lambda record: self._opened(record, indexes))
+        of = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
+        if not indexes or "" in of.values():
+            guarded(self._path, record, lambda record: self._opened(record, {}))
             return
+        needed = {channel: raw for channel, raw in indexes.items() if of[channel] == topics.EVENTS}
+        if needed:
+            guarded(self._path, record, lambda record: self._opened(record, needed))
         for channel, entries in indexes.items():
-            if topic[channel] == topics.JOINT_STATES and entries:
+            if of[channel] == topics.JOINT_STATES and entries:
                 self._newest = int.from_bytes(entries[-16:-8], "little")
 
-    def _opened(self, record: Record, indexes: Mapping[int, bytes]) -> None:
+    def _opened(self, record: Record, needed: Mapping[int, bytes]) -> None:
+        """What the indexes `needed` point at; where there are none, all that is needed."""
         data = open_chunk(self._path, record)
-        places = indexed(data, indexes)
+        places = indexed(data, needed, whole=False)
         if places is None:
-            # The indexes were cut off, or another tool wrote the file: every message is looked at.
+            # The indexes were cut off, or another tool wrote the file.
             places, others = walked(data)
             for opcode, body in others:
                 self.declaration(Record(opcode, record.offset, body))

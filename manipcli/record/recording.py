@@ -91,6 +91,7 @@ class Recording:
         lost: why the end is missing, or None.
         period: [s] of a tick.
 
+    `states`, `controllers` and `contacts` are those of all spans together: ask them of a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
     """
 
