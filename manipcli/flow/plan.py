@@ -97,7 +97,8 @@ def start_position(task: Task) -> Array:
     chosen = task.spec.start or ("home" if "home" in names else None)
     q = np.zeros(len(robot.joint_names))
     for k, joint in enumerate(robot.moving_joints):
-        q[k] = np.clip(0.0, joint.limits.lower, joint.limits.upper)
+        lower, upper = joint.limits.lower, joint.limits.upper
+        q[k] = min(max(0.0, -np.inf if lower is None else lower), np.inf if upper is None else upper)
     if chosen is not None:
         pose = robot.pose(chosen)
         q[robot.indices(pose.joints)] = pose.positions

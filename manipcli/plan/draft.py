@@ -16,7 +16,7 @@ from manipcli.model.robot import Cylinder
 from manipcli.plan.hand import closed_on, ramp, with_mimics
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, JointPath, follow_poses, joint_path, linear_path
-from manipcli.plan.planner import CLEARANCE, NOTHING, Pairs, Planner
+from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
@@ -85,15 +85,20 @@ class Draft:
             return refusal
         return None
 
-    def reach(self, label: str, X_WT: Transform, *, speed: float = 1.0, hand: str | None = None) -> None:
+    def reach(
+        self, label: str, X_WT: Transform, *, speed: float = 1.0, hand: str | None = None, free: bool = False
+    ) -> None:
         """The tool to a pose, straight in joint space; the hand goes to its pose `hand` meanwhile.
 
-        Of the arm's postures with the tool there, those that touch something are passed over.
+        Of the arm's postures with the tool there, those that touch something are passed over; if `free`, also those to
+        which the straight way does.
         """
+        if free:
+            self._planner.free_start(self._now)
         solver = self._planner.solver
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._told(label):
-            goal = self._solved(X_WT, grip)
+            goal = self._solved(X_WT, grip, free=free)
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
 
@@ -122,11 +127,9 @@ class Draft:
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         assert done.velocities is not None and done.accelerations is not None  # every drafted one but `follow` has both
-        accelerations = done.accelerations[::-1].copy()
-        accelerations[-1] = 0.0  # at rest
         trajectory = JointTrajectory(
             names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
-            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(accelerations),
+            velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
         )  # fmt: skip
         self._accept(label, trajectory, None, trajectory.duration)
 
@@ -227,11 +230,22 @@ class Draft:
                 raise
             raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint) from refusal
 
-    def _solved(self, X_WT: Transform, grip: Grip | None) -> Array:
+    def _solved(self, X_WT: Transform, grip: Grip | None, *, free: bool = False) -> Array:
         """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        return planner.solver.solve(X_WT, seed, planner.rng, refuse=planner.query(self._now).check)
+        query = planner.query(self._now)
+
+        def refuse(q: Array) -> object | None:
+            hit = query.check(q)
+            if hit is not None or not free:
+                return hit
+            count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
+            share = np.linspace(0.0, 1.0, count + 1)
+            on_way = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
+            return None if on_way is None else f"{on_way} on the way there"
+
+        return planner.solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _posture(self, name: str) -> dict[str, float]:
         pose = self._planner.robot.pose(name)
@@ -276,18 +290,9 @@ class Draft:
         query = self._planner.query(self._now, allowed)
         times, positions = self._swept(trajectory, grip)
         hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
-        if hit is None:
-            return
-        carried = self._now.carried
-        hint = "no way around is searched for: `move` to a pose from which the way is free"
-        if carried is not None and hit.time <= 0.0 and carried.body in (hit.a, hit.b):
-            hint = f"`lift` '{carried.body}' first"
-        near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
-        raise NotPlannable(
-            f"'{hit.a}' would come within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) "
-            f"at t = {hit.time:.2f} s of '{label}'",
-            hint=hint,
-        )
+        if hit is not None:
+            when = f"at t = {hit.time:.2f} s of '{label}'"
+            raise self._planner.refusal(self._now, hit, "would come", when)
 
     def _swept(self, trajectory: JointTrajectory | None, grip: Grip | None) -> tuple[Array, Array]:
         """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
-from manipcli.model.collision import Carried, CollisionChecker, CollisionQuery, Pair, pairs
+from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Interior, Scene
@@ -198,6 +198,26 @@ class Planner:
                 situation.bodies, carried=carried, ignore=allowed, margin=CLEARANCE, absent=gone
             )
         return self._queries[key]
+
+    def free_start(self, situation: Situation) -> None:
+        """Nothing, if nothing is too near already; else no search among ways from here can succeed.
+
+        Raises:
+            NotPlannable: names the pair.
+        """
+        hit = self.query(situation).check(situation.position)
+        if hit is not None:
+            raise self.refusal(situation, hit, "is", "before it moves")
+
+    def refusal(self, situation: Situation, hit: CollisionHit, verb: str, when: str) -> NotPlannable:
+        """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`."""
+        carried = situation.carried
+        hint = "no way around is searched for: `move` to a pose from which the way is free"
+        if carried is not None and hit.time <= 0.0 and carried.body in (hit.a, hit.b):
+            hint = f"`lift` '{carried.body}' first"
+        near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
+        clearance = f"{1000 * CLEARANCE:.0f} mm"
+        return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)
 
     def touching(self, situation: Situation, body: str) -> Pairs:
         """The pairs of a movable body with what it stands on or leans against."""

@@ -36,7 +36,9 @@ class MoveSpec(Model):
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
     frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
     path: Literal["free", "joint", "linear"] = Field(
-        "free", description="`linear`: the tool on a straight line; `joint`: straight in joint space; `free`: any way."
+        "free",
+        description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
+        "posture. `free`: the same, to another posture where the way to the nearest one is not free. Default `free`.",
     )
     speed: Speed = 1.0
 
@@ -67,7 +69,7 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         if spec.path == "linear":
             draft.straight("move", X_WT, speed=spec.speed)
         else:
-            draft.reach("move", X_WT, speed=spec.speed)
+            draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free")
     return draft.plan()
 
 

@@ -31,7 +31,7 @@ from manipcli.spec.quantity import Angle, Length
 
 YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 """Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
-SLOPES_DEG = (0.0, 30.0)
+SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 
 
@@ -69,6 +69,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         NotPlannable: the hand holds something already, or no candidate is possible.
     """
     planner.free_hand(situation, spec.object)
+    planner.free_start(situation)
     X_WO = planner.body_pose(situation, spec.object)
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2

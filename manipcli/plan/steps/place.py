@@ -51,6 +51,7 @@ class PlaceSpec(Model):
 def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`."""
     planner.held(situation, spec.object)
+    planner.free_start(situation)
     X_WG = _goal(spec, planner, situation)
     X_OT = planner.held_in_tool(situation).inverse()
     X_WT = X_WG @ X_OT
@@ -65,7 +66,7 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft.straight("withdraw", backed_off(X_WT, retreat, slope), speed=spec.speed)
         return draft.plan()
 
-    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), slopes()[::-1])
+    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), (slopes()[k] for k in (1, 2, 0)))
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 

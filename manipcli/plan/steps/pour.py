@@ -55,6 +55,7 @@ class PourSpec(Model):
 def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
     """The first of the candidate directions, senses and clearances that is reachable and free."""
     planner.held(situation, spec.object)
+    planner.free_start(situation)
     body = planner.scene.body(spec.object)
     X_TO = planner.held_in_tool(situation)
     R_WT = _righted(planner.body_pose(situation, spec.object).R) @ planner.tool_pose(situation).R

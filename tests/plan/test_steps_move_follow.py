@@ -1,0 +1,327 @@
+"""`move`, `follow`, `grasp`, `release` and `wait`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+
+from manipcli.plan.steps import STEPS
+
+Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
+Story = Any
+
+ARM = [f"joint_{k}" for k in range(1, 8)]
+AHEAD = {"rpy": [0, "90 deg", 0]}  # the tool's z along x
+
+
+def goes_to(arm: Any, spec: dict[str, Any]) -> np.ndarray:
+    """X_WT (4, 4) after a move."""
+    return arm.tool(arm.plan("move", spec).end.position)
+
+
+def test_a_named_pose_is_reached_with_arm_and_hand(bench: Make) -> None:
+    arm = bench()
+    plan = arm.do("move", {"to": "wrap"})
+    assert plan.motions[0].trajectory is None
+    assert plan.duration == pytest.approx(max(arm.robot.pose("wrap").positions) / arm.planner.gripper_speed)
+    plan = arm.do("move", {"to": "zero"})
+    np.testing.assert_allclose(plan.end.position, 0.0, atol=1e-12)
+    assert plan.motions[0].trajectory is not None
+    assert plan.motions[0].grip is not None
+
+
+def test_joints_by_name_move_and_the_others_stay(bench: Make) -> None:
+    arm = bench()
+    plan = arm.plan("move", {"to": {"joint_2": "20 deg", "joint_6": -0.5}})
+    expected = np.array(arm.now.position)
+    expected[arm.robot.indices(("joint_2", "joint_6"))] = np.radians(20), -0.5
+    np.testing.assert_allclose(plan.end.position, expected, atol=1e-12)
+
+
+def test_a_pose_is_meant_in_its_frame(bench: Make) -> None:
+    """World, a body that stands at (0.75, 0, 0.4), a frame fixed in that body, and the tool itself."""
+    arm = bench(more="frames: {above: {parent: cup, pose: {xyz: [0, 0, 0.3], rpy: [0, 0, 90 deg]}}}")
+    R = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    X = goes_to(arm, {"pose": {"xyz": [0.6, 0.1, 0.7], **AHEAD}})
+    np.testing.assert_allclose(X[:3, 3], [0.6, 0.1, 0.7], atol=2e-5)
+    np.testing.assert_allclose(X[:3, :3], R, atol=2e-4)
+    X = goes_to(arm, {"pose": {"xyz": [-0.1, 0, 0.35], **AHEAD}, "frame": "cup"})
+    np.testing.assert_allclose(X[:3, 3], [0.65, 0.0, 0.75], atol=2e-5)
+    X = goes_to(arm, {"pose": {"xyz": [0.05, 0.1, 0], "rpy": ["90 deg", 0, "-90 deg"]}, "frame": "above"})
+    np.testing.assert_allclose(X[:3, 3], [0.75 - 0.1, 0.05, 0.7], atol=2e-5)  # turned by 90 deg about z
+    turned = Rotation.from_euler("z", 90, degrees=True) * Rotation.from_euler("xyz", [90, 0, -90], degrees=True)
+    np.testing.assert_allclose(X[:3, :3], turned.as_matrix(), atol=2e-4)
+    here = arm.tool(arm.now.position)
+    X = goes_to(arm, {"pose": {"xyz": [0, 0, -0.05]}, "frame": "tool", "path": "linear"})
+    np.testing.assert_allclose(X[:3, 3], here[:3, 3] - 0.05 * here[:3, 2], atol=2e-5)
+
+
+def test_base_is_where_the_robot_is_mounted(bench: Make) -> None:
+    arm = bench()
+    X_base = goes_to(arm, {"pose": {"xyz": [0.6, 0.1, 0.7], **AHEAD}, "frame": "base"})
+    mounted = arm.robot.X_WB.matrix @ np.array([0.6, 0.1, 0.7, 1.0])
+    np.testing.assert_allclose(X_base[:3, 3], mounted[:3], atol=2e-5)
+
+
+def test_a_frame_goes_with_what_was_moved(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["lift"][1].end
+    assert arm.body("cup").p[2] == pytest.approx(0.54, abs=1e-4)
+    X_WT = arm.tool(arm.now.position)
+    X_OT = np.linalg.inv(arm.body("cup").matrix) @ X_WT
+    pose = {"xyz": (X_OT[:3, 3] + [0, 0, 0.05]).tolist(), "quat_xyzw": Rotation.from_matrix(X_OT[:3, :3]).as_quat()}
+    pose["quat_xyzw"] = pose["quat_xyzw"].tolist()
+    X = goes_to(arm, {"pose": pose, "frame": "cup", "path": "linear"})
+    np.testing.assert_allclose(X[:3, 3] - X_WT[:3, 3], [0, 0, 0.05], atol=3e-5)
+
+
+def test_linear_is_straight_in_space_and_joint_in_the_joints(bench: Make) -> None:
+    arm = bench()
+    pose = {"pose": {"xyz": [0, 0.15, -0.1], "rpy": [0, 0.2, 0]}, "frame": "tool"}
+    before = arm.now
+    linear = arm.plan("move", {**pose, "path": "linear"})
+    p = arm.tools(before, linear, "move")[:, :3, 3]
+    along = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
+    assert np.linalg.norm((p - p[0]) - np.outer((p - p[0]) @ along, along), axis=1).max() < 1e-4
+    joint = arm.plan("move", {**pose, "path": "joint"})
+    q = joint.motions[0].trajectory.positions
+    way = (q[-1] - q[0]) / np.linalg.norm(q[-1] - q[0])
+    assert np.linalg.norm((q - q[0]) - np.outer((q - q[0]) @ way, way), axis=1).max() < 1e-9
+    np.testing.assert_allclose(arm.tool(joint.end.position), arm.tool(linear.end.position), atol=3e-4)
+    p = arm.tools(before, joint, "move")[:, :3, 3]
+    assert np.linalg.norm((p - p[0]) - np.outer((p - p[0]) @ along, along), axis=1).max() > 1e-3
+
+
+def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:
+    arm = bench()
+    fast, slow = (arm.plan("move", {"to": "zero", "speed": s}).motions[0].trajectory for s in (1.0, 0.5))
+    assert np.abs(slow.velocities).max() <= 0.5 * max(arm.robot.joint(name).limits.velocity for name in ARM)
+    for name, a in zip(slow.names, np.abs(slow.accelerations).max(axis=0), strict=True):
+        assert a <= 0.5 * arm.robot.joint(name).limits.acceleration * 1.005
+    assert slow.duration > 1.2 * fast.duration
+
+
+def test_a_move_past_a_limit_names_joint_value_limit_and_time(bench: Make) -> None:
+    cause = bench().refused("move", {"to": {"joint_4": 3.0}}).cause
+    upper = bench().robot.joint("joint_4").limits.upper
+    assert cause.startswith("joint 'joint_4' goes to 3.0000 at t = ")
+    assert cause.endswith(f"s, beyond its upper limit {upper:.4f}")
+
+
+def test_a_pose_out_of_reach_says_how_far_off_it_stays(bench: Make) -> None:
+    refusal = bench().refused("move", {"pose": {"xyz": [2, 0, 0.5]}})
+    assert refusal.cause.startswith("no joint positions reach (2.000, 0.000, 0.500) m, 2.0")
+    assert refusal.hint is not None
+
+
+def test_a_move_into_the_desk_is_refused_with_pair_time_and_motion(bench: Make) -> None:
+    """Free moves end where nothing touches, or say that there is no such end; joints by name are taken as they are."""
+    arm = bench()
+    refusal = arm.refused("move", {"to": {"joint_2": 1.6, "joint_4": -0.2}})
+    assert "would come within 4 mm of" in refusal.cause
+    assert "'desk'" in refusal.cause or "'cup'" in refusal.cause
+    assert "s of 'move'" in refusal.cause
+    cause = arm.refused("move", {"pose": {"xyz": [0.7, -0.2, 0.43], **AHEAD}}).cause
+    assert cause.startswith("the arm reaches (0.700, -0.200, 0.430) m only where desk and robot/")
+
+
+def test_moving_while_holding_keeps_holding(bench: Make, story: Story) -> None:
+    """`home` says that the hand is open; the cup stays in it."""
+    arm = bench()
+    arm.now = story.steps["lift"][1].end
+    plan = arm.do("move", {"to": "home"})
+    assert [motion.grip for motion in plan.motions] == [None]
+    assert plan.end.carried is not None
+    hand = arm.robot.indices(arm.planner.gripper_joints)
+    np.testing.assert_array_equal(plan.end.position[hand], story.steps["lift"][1].end.position[hand])
+    X_TO = np.linalg.inv(arm.tool(arm.now.position)) @ arm.body("cup").matrix
+    lifted = story.steps["lift"][1].end
+    np.testing.assert_allclose(
+        X_TO, np.linalg.inv(arm.tool(lifted.position)) @ arm.body("cup", lifted).matrix, atol=1e-9
+    )
+
+
+def test_a_holding_hand_is_not_moved_by_name(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["lift"][1].end
+    for target in ("open", {"finger_1_proximal": 0.1}, {"joint_1": 0.1, "finger_1_proximal": 0.1}):
+        refusal = arm.refused("move", {"to": target})
+        assert refusal.cause == "joint 'finger_1_proximal' belongs to the hand, which holds 'cup'"
+        assert refusal.hint == "`release` or `place` opens the hand"
+
+
+def test_what_stands_must_be_lifted_before_it_is_moved(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["pick"][1].end
+    refusal = arm.refused("move", {"to": "home"})
+    assert refusal.cause.startswith("'cup' would come within 4 mm of 'desk'")
+    assert refusal.hint == "`lift` 'cup' first"
+
+
+def test_a_move_says_one_target(bench: Make) -> None:
+    spec = STEPS["move"].spec
+    home = {"to": "home"}
+    for wrong in ({}, {**home, "pose": {}}, {"to": {}}, {**home, "path": "linear"}, {**home, "speed": 0}):
+        with pytest.raises(ValidationError):
+            spec.model_validate(wrong)
+    arm = bench()
+    assert arm.problems("move", {"to": "hom"}) == [
+        (("to",), "robot 'arm7_hand3' has no pose 'hom'", "did you mean 'home'?")
+    ]
+    assert arm.problems("move", {"to": {"joint_9": 0}})[0][0] == ("to", "joint_9")
+    assert arm.problems("move", {"pose": {}, "frame": "trey"}) == [
+        (("frame",), "there is no frame 'trey'", "did you mean 'tray'?")
+    ]
+
+
+def follow(*points: dict[str, Any], joints: tuple[str, ...] = ("joint_1", "joint_2")) -> dict[str, Any]:
+    return {"joint_names": list(joints), "points": list(points)}
+
+
+def test_positions_alone_are_followed_on_straight_lines(bench: Make) -> None:
+    arm = bench()
+    spec = follow(
+        {"positions": [0.4, 0.1], "time_from_start": 1.0}, {"positions": [0.4, 0.3], "time_from_start": "1500 ms"}
+    )
+    trajectory = arm.plan("follow", spec).motions[0].trajectory
+    for t, q in ((0.25, [0.1, 0.1]), (1.0, [0.4, 0.1]), (1.25, [0.4, 0.2]), (1.5, [0.4, 0.3])):
+        np.testing.assert_allclose(trajectory.sample(t)[0], q, atol=1e-9)
+
+
+def test_velocities_make_cubics_and_accelerations_quintics(bench: Make) -> None:
+    """From rest to rest over D in T: 3 s^2 - 2 s^3, and 10 s^3 - 15 s^4 + 6 s^5."""
+    arm = bench()
+    s = np.linspace(0.0, 1.0, 11)
+    for extra, curve in (
+        ({"velocities": [0, 0]}, 3 * s**2 - 2 * s**3),
+        ({"velocities": [0, 0], "accelerations": [0, 0]}, 10 * s**3 - 15 * s**4 + 6 * s**5),
+    ):
+        spec = follow({"positions": [0.5, 0.1], **extra, "time_from_start": 2})
+        q = arm.plan("follow", spec).motions[0].trajectory.sample(2.0 * s)[0]
+        np.testing.assert_allclose(q[:, 0], 0.5 * curve, atol=1e-9)
+
+
+def test_each_segment_is_what_both_its_points_give(bench: Make) -> None:
+    """A point with a velocity, then one without: a cubic that leads to it, and a straight line after it."""
+    arm = bench()
+    spec = follow(
+        {"positions": [0.2, 0.1], "velocities": [0, 0], "time_from_start": 1},
+        {"positions": [0.4, 0.1], "time_from_start": 2},
+    )
+    q = arm.plan("follow", spec).motions[0].trajectory.sample(np.array([0.25, 1.5]))[0]
+    np.testing.assert_allclose(q[:, 0], [0.2 * (3 / 16 - 2 / 64), 0.3], atol=1e-9)
+
+
+def test_times_are_said_in_the_words_of_both_ros(bench: Make) -> None:
+    arm = bench()
+    for time in ({"secs": 1, "nsecs": 250000000}, {"sec": 1, "nanosec": 250000000}, 1.25, "1.25 s"):
+        spec = follow({"positions": [0.1, 0.1], "velocities": [0, 0], "time_from_start": time})
+        assert arm.plan("follow", spec).duration == pytest.approx(1.25)
+
+
+def test_a_time_between_two_ticks_ends_on_the_last_point(bench: Make) -> None:
+    spec = follow({"positions": [0.1, 0.2], "velocities": [0, 0], "time_from_start": 1.00037})
+    plan = bench().plan("follow", spec)
+    assert plan.duration == pytest.approx(1.00037)
+    np.testing.assert_allclose(plan.motions[0].trajectory.positions[-1], [0.1, 0.2], atol=1e-12)
+    np.testing.assert_allclose(plan.end.position[:2], [0.1, 0.2], atol=1e-12)
+
+
+def test_a_first_point_at_0_s_is_where_the_robot_is(bench: Make) -> None:
+    arm = bench()
+    end = {"positions": [0.2, 0.1], "velocities": [0, 0], "time_from_start": 2}
+    here = {"positions": [0.0, 0.1], "velocities": [0, 0], "time_from_start": 0}
+    plan = arm.plan("follow", follow(here, end))
+    np.testing.assert_array_equal(plan.motions[0].trajectory.positions[0], arm.now.position[:2])
+    refusal = arm.refused("follow", follow({**here, "positions": [0.3, 0.1]}, end))
+    assert refusal.cause == "the first point, at 0 s, has joint 'joint_1' at 0.3000; it is at 0.0000 then"
+
+
+def test_points_beyond_a_limit_name_joint_value_limit_and_time(bench: Make) -> None:
+    """A cubic over D in T has its greatest velocity 1.5 D / T in the middle, its acceleration 6 D / T^2 at the ends."""
+    arm = bench()
+    v, a = arm.robot.joint("joint_1").limits.velocity, arm.robot.joint("joint_1").limits.acceleration
+    still = {"velocities": [0, 0]}
+    way = v / 1.5 * 1.1
+    cause = arm.refused("follow", follow({"positions": [way, 0.1], **still, "time_from_start": 1})).cause
+    assert cause.startswith(f"joint 'joint_1' would need velocity {1.1 * v:.4g} at t = 0.")
+    assert cause.endswith(f"its limit is {v:.4g}")
+    way = a / 6 * 0.25 * 1.1
+    cause = arm.refused("follow", follow({"positions": [way, 0.1], **still, "time_from_start": 0.5})).cause
+    assert "joint 'joint_1' would need acceleration" in cause
+    cause = arm.refused("follow", follow({"positions": [0, 9.0], **still, "time_from_start": 60})).cause
+    assert "joint 'joint_2' goes to 9.0000 at t = 60.000 s, beyond its upper limit" in cause
+
+
+def test_points_that_make_no_trajectory_are_refused_where_they_are_read() -> None:
+    spec = STEPS["follow"].spec
+    good = {"positions": [0.1, 0.1], "time_from_start": 1}
+    for wrong, text in (
+        (follow({**good, "positions": [0.1]}), "1 positions for 2 joints"),
+        (follow({**good, "velocities": [0.1]}), "1 velocities for 2 joints"),
+        (follow({**good, "velocities": [0.0, 0.1]}), "must be at rest; its velocity of joint_2 is not 0"),
+        (follow({**good, "accelerations": [0, 0]}), "accelerations without velocities"),
+        (follow(good, good), "time_from_start 1 s is not after 1 s"),
+        (follow({**good, "time_from_start": 0}), "there is no time to move in"),
+        (follow(good, joints=("joint_1", "joint_1")), "stands twice"),
+    ):
+        with pytest.raises(ValidationError, match=text):
+            spec.model_validate(wrong)
+
+
+def test_a_joint_that_is_not_there_is_named_with_the_nearest(bench: Make) -> None:
+    spec = follow({"positions": [0, 0], "time_from_start": 1}, joints=("joint_1", "join_2"))
+    assert bench().problems("follow", spec) == [
+        (("joint_names", 1), "joint 'join_2' is not one that robot 'arm7_hand3' can move", "did you mean 'joint_2'?")
+    ]
+    mimic = follow({"positions": [0], "time_from_start": 1}, joints=("panda_finger_joint2",))
+    assert bench("panda").problems("follow", mimic)[0][2] == "did you mean 'panda_finger_joint1'?"
+
+
+def test_a_release_lets_go_and_leaves_the_object(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["pick"][1].end
+    plan = arm.do("release", {})
+    assert plan.end.carried is None
+    hand = arm.robot.indices(arm.planner.gripper_joints)
+    np.testing.assert_allclose(plan.end.position[hand], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(arm.body("cup").matrix, arm.body("cup", story.steps["pick"][1].end).matrix)
+    assert plan.duration > 0.05
+    assert arm.plan("release", {}).duration == 0.0
+
+
+def test_a_hand_closed_on_nothing_named_is_left_closed_by_moves(bench: Make) -> None:
+    arm = bench()
+    arm.do("grasp", {"posture": "wrap"})
+    assert arm.now.closed
+    assert arm.plan("move", {"to": "zero"}).motions[0].grip is None
+    assert arm.refused("move", {"to": "open"}).hint == "`release` opens the hand"
+    assert arm.refused("lift", {"object": "cup"}).cause == "'cup' is not held: the hand holds something else"
+    arm.do("release", {})
+    assert not arm.now.closed
+
+
+def test_wait_is_one_number_or_a_mapping(bench: Make) -> None:
+    arm = bench()
+    for spec in (1.5, "1.5 s", "1500 ms", {"duration": 1.5}):
+        plan = arm.plan("wait", spec)
+        assert plan.duration == 1.5
+        assert plan.end == arm.now
+        assert [(m.trajectory, m.grip, m.awaits) for m in plan.motions] == [(None, None, True)]
+    with pytest.raises(ValidationError):
+        STEPS["wait"].spec.model_validate(-1)
+
+
+def test_free_takes_another_posture_where_the_way_to_the_nearest_is_not_free(bench: Make) -> None:
+    """Down to 10 cm over the desk: straight in joint space the fingers would brush it on the way."""
+    arm = bench()
+    pose = {"xyz": [0.55, 0.05, 0.5], "rpy": ["180 deg", 0, 0]}
+    refusal = arm.refused("move", {"pose": pose, "path": "joint"})
+    assert "'desk' would come within 4 mm of 'robot/finger" in refusal.cause
+    X = goes_to(arm, {"pose": pose, "path": "free"})
+    np.testing.assert_allclose(X[:3, 3], [0.55, 0.05, 0.5], atol=2e-5)

@@ -1,0 +1,244 @@
+"""`pour` and `place`: where the cup goes, by plain trigonometry and the description's joints multiplied by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
+Story = Any
+
+RADIUS, HEIGHT = 0.036, 0.110
+TRAY = np.array([0.70, 0.32])
+RIM = 0.4 + 0.05
+FACETS = 8e-4  # the cup's wall is 16 boxes, whose corners reach up to r (1 / cos(pi / 16) - 1) beyond its circle
+
+
+def cups(story: Story, verb: str, label: str) -> np.ndarray:
+    """X_WO (k, 4, 4) of the cup along a motion: it keeps its place in the hand."""
+    before, plan = story.steps[verb]
+    X_WT = story.bench.tools(before, plan, label)
+    X_TO = np.linalg.inv(story.bench.tool(before.position)) @ story.bench.body("cup", before).matrix
+    return X_WT @ X_TO
+
+
+def tilts(X_WO: np.ndarray) -> np.ndarray:
+    return np.arccos(np.clip(X_WO[:, 2, 2], -1.0, 1.0))
+
+
+def lip(X_WO: np.ndarray) -> np.ndarray:
+    """The lowest of 3600 points on the rim."""
+    angle = np.linspace(0.0, 2 * np.pi, 3600, endpoint=False)
+    rim = np.column_stack((RADIUS * np.cos(angle), RADIUS * np.sin(angle), np.full(3600, HEIGHT)))
+    points = rim @ X_WO[:3, :3].T + X_WO[:3, 3]
+    return points[np.argmin(points[:, 2])]
+
+
+def test_the_cup_stays_upright_while_it_is_carried(story: Story) -> None:
+    """What is in it must stay in."""
+    for verb, label in (("lift", "lift"), ("pour", "carry"), ("place", "carry"), ("place", "lower")):
+        assert tilts(cups(story, verb, label)).max() < np.radians(0.1)
+
+
+def test_tilted_the_lip_is_over_the_middle_of_the_tray_at_the_clearance(story: Story) -> None:
+    low = lip(cups(story, "pour", "tilt")[-1])
+    np.testing.assert_allclose(low[:2], TRAY, atol=FACETS)
+    assert low[2] - RIM == pytest.approx(0.08, abs=FACETS)  # the middle of the default 4 to 12 cm
+
+
+def test_the_cup_tilts_as_far_as_asked_about_one_horizontal_axis_in_place(story: Story) -> None:
+    X = cups(story, "pour", "tilt")
+    tilt = tilts(X)
+    assert tilt[-1] == pytest.approx(np.radians(125.0), abs=2e-4)
+    assert (np.diff(tilt) >= -1e-5).all()
+    # In a turn about a horizontal axis the cup's own axis stays in one upright plane: its heading does not change.
+    heading = X[10:, :2, 2] / np.linalg.norm(X[10:, :2, 2], axis=1)[:, None]
+    np.testing.assert_allclose(heading, np.broadcast_to(heading[-1], heading.shape), atol=2e-3)
+    before, plan = story.steps["pour"]
+    p_WT = story.bench.tools(before, plan, "tilt")[:, :3, 3]
+    np.testing.assert_allclose(p_WT, np.broadcast_to(p_WT[0], p_WT.shape), atol=1e-4)
+
+
+def test_tilting_back_is_the_tilt_reversed(story: Story) -> None:
+    before, plan = story.steps["pour"]
+    forth = story.bench.at(before, plan, "tilt")[1].trajectory
+    back = story.bench.at(before, plan, "tilt back")[1].trajectory
+    np.testing.assert_array_equal(back.positions, forth.positions[::-1])
+    np.testing.assert_array_equal(back.velocities, -forth.velocities[::-1])
+    assert tilts(cups(story, "pour", "tilt back"))[-1] < np.radians(0.1)
+
+
+def test_only_the_dwell_waits_for_until(story: Story) -> None:
+    _, plan = story.steps["pour"]
+    assert [(m.label, m.awaits) for m in plan.motions] == [
+        ("carry", False), ("tilt", False), ("dwell", True), ("tilt back", False)
+    ]  # fmt: skip
+    assert plan.motions[2].duration == 1.0
+
+
+def test_after_a_pour_the_ball_is_predicted_on_the_floor_of_the_tray(story: Story) -> None:
+    """The tray's floor is as thick as its wall; a ball of 14 mm lies on it, and stays when the cup leaves."""
+    _, plan = story.steps["pour"]
+    p = story.bench.body("ball", plan.end).p
+    np.testing.assert_allclose(p[:2], TRAY, atol=1e-9)
+    assert 0.4 + 0.014 < p[2] < 0.4 + 0.014 + 0.01
+    np.testing.assert_array_equal(story.bench.body("ball", story.steps["place"][1].end).p, p)
+
+
+def test_half_a_tilt_spills_nothing(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["pour"][0]
+    plan = arm.plan("pour", {"object": "cup", "into": "tray", "tilt": "60 deg"})
+    apart = arm.body("ball", plan.end).p - arm.body("cup", plan.end).p
+    np.testing.assert_allclose(apart, arm.body("ball", arm.start).p - arm.body("cup", arm.start).p, atol=1e-6)
+
+
+def test_a_tilted_cup_is_put_upright_before_it_pours(bench: Make, story: Story) -> None:
+    """Carried 20 degrees askew, it still pours its lip over the middle of the tray."""
+    arm = bench()
+    arm.now = story.steps["pour"][0]
+    arm.do("move", {"pose": {"rpy": [0, 0, "20 deg"]}, "frame": "tool", "path": "linear"})
+    before = arm.now
+    assert tilts(arm.body("cup").matrix[None])[0] == pytest.approx(np.radians(20.0), abs=1e-3)
+    plan = arm.do("pour", {"object": "cup", "into": "tray"})
+    X_TO = np.linalg.inv(arm.tool(before.position)) @ arm.body("cup", before).matrix
+    X_WO = arm.tools(before, plan, "tilt") @ X_TO
+    assert tilts(X_WO[:1])[0] < np.radians(0.1)
+    np.testing.assert_allclose(lip(X_WO[-1])[:2], TRAY, atol=FACETS)
+
+
+def test_a_receiver_out_of_reach_is_refused_with_what_was_tried(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["pour"][0]
+    refusal = arm.refused("pour", {"object": "cup", "into": "floor", "clearance": "2 m"})
+    assert refusal.cause.startswith("no way to pour from 'cup' into 'floor', 18 ways tried: carry: the straight line")
+
+
+def test_a_cup_put_back_stands_where_it_stood(story: Story) -> None:
+    before, plan = story.steps["place"]
+    bench = story.bench
+    cup = bench.body("cup", plan.end)
+    np.testing.assert_allclose(cup.p, [0.75, 0.0, 0.4], atol=1e-4)
+    np.testing.assert_allclose(cup.R, np.eye(3), atol=1e-3)
+    assert plan.end.carried is None
+    assert not plan.end.closed
+    np.testing.assert_array_equal(bench.body("cup", before).p == cup.p, [False] * 3)
+
+
+def test_lowering_is_vertical_and_withdrawing_backs_off_and_rises(story: Story) -> None:
+    before, plan = story.steps["place"]
+    down = cups(story, "place", "lower")[:, :3, 3]
+    np.testing.assert_allclose(down[:, :2], np.broadcast_to([0.75, 0.0], (40, 2)), atol=1e-4)
+    assert 0.04 - 1e-4 <= down[0, 2] - down[-1, 2] <= 0.1 + 1e-4
+    X = story.bench.tools(before, plan, "withdraw")
+    way = X[-1, :3, 3] - X[0, :3, 3]
+    assert 0.12 - 1e-4 <= -(way @ X[0, :3, 2]) <= 0.18 + 1e-4  # against the direction of approach
+    assert way[2] > 0.0
+
+
+def test_opening_takes_as_long_as_the_closed_fingers_need(story: Story) -> None:
+    before, plan = story.steps["place"]
+    planner = story.bench.planner
+    motion = story.bench.at(before, plan, "open")[1]
+    columns = story.bench.robot.indices(planner.gripper_joints)
+    way = np.abs(before.position[columns] - plan.end.position[columns]).max()
+    assert way > 0.05
+    assert motion.duration == pytest.approx(way / planner.gripper_speed)
+
+
+def held_block(bench: Make, scene: str | None = None) -> Any:
+    panda = bench("panda", scene)
+    panda.do("pick", {"object": "block", "approach": {"from": "top"}})
+    panda.do("lift", {"object": "block"})
+    return panda
+
+
+def test_a_block_is_put_back_or_elsewhere_and_turned(bench: Make) -> None:
+    panda = held_block(bench)
+    lifted = panda.now
+    panda.do("place", {"object": "block"})
+    np.testing.assert_allclose(panda.body("block").matrix, panda.body("block", panda.start).matrix, atol=1e-4)
+    panda.now = lifted
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "table"})
+    np.testing.assert_allclose(panda.body("block").p, [0.5, 0.2, 0.225], atol=1e-4)
+    np.testing.assert_allclose(panda.body("block").R, np.eye(3), atol=1e-3)
+    panda.now = lifted
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "table", "yaw": "30 deg"})
+    assert panda.body("block").rpy[2] == pytest.approx(np.radians(30), abs=1e-3)
+
+
+def test_a_support_that_was_moved_is_where_it_was_moved_to(bench: Make) -> None:
+    table = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    block = "  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 0.1, rests_on: table, at: [0.5, -0.15]}\n"
+    foot = "  foot: {box: {size: [6 cm, 6 cm, 4 cm]}, mass: 0.1, rests_on: table, at: [0.5, 0.1]}\n"
+    panda = bench("panda", table + block + foot)
+    panda.do("pick", {"object": "foot", "approach": {"from": "top"}})
+    panda.do("lift", {"object": "foot"})
+    panda.do("place", {"object": "foot", "at": [0.6, 0.2], "on": "table"})
+    panda.do("pick", {"object": "block", "approach": {"from": "top"}})
+    panda.do("lift", {"object": "block"})
+    refusal = panda.refused("place", {"object": "block", "at": [0.5, 0.1], "on": "foot"})
+    assert refusal.cause == "[0.5, 0.1] m lies beside 'foot', whose middle is at [0.6, 0.2] m"
+    panda.do("place", {"object": "block", "at": [0.6, 0.2], "on": "foot"})
+    np.testing.assert_allclose(panda.body("block").p, [0.6, 0.2, 0.2 + 0.04 + 0.025], atol=2e-4)
+
+
+def test_a_block_goes_inside_a_tray(bench: Make) -> None:
+    scene = """
+  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}
+  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}
+  tray: {tray: {size: [0.3, 0.3, 0.02], wall: 5 mm}, rests_on: table, at: [0.55, 0.2], fixed: true}
+"""
+    panda = held_block(bench, scene)
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "tray"})
+    assert panda.body("block").p[2] == pytest.approx(0.2 + 0.005 + 0.025, abs=1e-4)
+
+
+def test_a_place_is_said_completely_and_consistently(bench: Make) -> None:
+    arm = bench()
+    assert arm.problems("place", {"object": "cup", "at": [0.7, 0]}) == [
+        (("at",), "[x, y] needs the body it is on", "add `on: BODY`")
+    ]
+    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "on": "deks"}) == [
+        (("on",), "'deks' is not in the scene", "did you mean 'desk'?")
+    ]
+    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "on": "cup"})[0][1] == (
+        "'cup' cannot be placed on itself"
+    )
+    assert [loc for loc, _, _ in arm.problems("place", {"object": "cup", "on": "desk", "yaw": 1.0})] == [
+        ("on",), ("yaw",)
+    ]  # fmt: skip
+    assert arm.problems("pour", {"object": "cup", "into": "cup"})[0][1] == "'cup' cannot be poured into itself"
+    assert arm.problems("pour", {"object": "cup", "into": "trey"})[0][2] == "did you mean 'tray'?"
+
+
+def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any) -> None:
+    """A cylinder, a mesh (an octahedron prism) and a URDF body: each goes 30 cm to the left."""
+    corners = [(0.02 * np.cos(a), 0.02 * np.sin(a)) for a in np.arange(8) * np.pi / 4]
+    lines = [f"v {x:.6f} {y:.6f} {z}" for z in (0.0, 0.06) for x, y in corners]
+    for k in range(8):
+        j = (k + 1) % 8
+        lines += [f"f {k + 1} {j + 1} {j + 9}", f"f {k + 1} {j + 9} {k + 9}"]
+    lines += [f"f 1 {k + 2} {k + 1}" for k in range(1, 7)] + [f"f 9 {k + 9} {k + 10}" for k in range(1, 7)]
+    mesh = tmp_path / "prism.obj"
+    mesh.write_text("\n".join(lines) + "\n")
+    urdf = tmp_path / "bar.urdf"
+    urdf.write_text(
+        '<robot name="bar"><link name="bar"><inertial><mass value="0.1"/><inertia ixx="1e-4" ixy="0" ixz="0"'
+        ' iyy="1e-4" iyz="0" izz="1e-4"/></inertial><collision><geometry><box size="0.03 0.08 0.05"/></geometry>'
+        "</collision></link></robot>"
+    )
+    for shape, height in (
+        ("cylinder: {radius: 2 cm, height: 6 cm}, mass: 0.1", 0.0),
+        (f"mesh: {{file: {mesh}}}, mass: 0.1", 0.0),
+        (f"urdf: {{file: {urdf}}}", 0.025),
+    ):
+        table = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+        panda = bench("panda", table + f"  thing: {{{shape}, rests_on: table, at: [0.5, -0.1]}}\n")
+        panda.do("pick", {"object": "thing", "approach": {"from": "top"}})
+        panda.do("lift", {"object": "thing"})
+        panda.do("place", {"object": "thing", "at": [0.5, 0.2], "on": "table"})
+        np.testing.assert_allclose(panda.body("thing").p, [0.5, 0.2, 0.2 + height], atol=2e-4)
