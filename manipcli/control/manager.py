@@ -44,11 +44,13 @@ class JointVectors(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Slot:
-    """A controller, where its joints stand in a joint vector, and its own copy of what was measured there."""
+    """A controller, where its joints stand in a joint vector, and what was measured there: rows of `copy`, which is
+    taken anew every tick; None where they are a part of the manager's own."""
 
     controller: Controller
     index: Index
     measured: JointState
+    copy: Array | None
     adds: bool
 
 
@@ -81,6 +83,7 @@ class ControllerManager:
             raise InvalidInput(findings)
         n = len(self.joints)
         self._commands = np.zeros(n)
+        self._measured = np.zeros((3, n))
         self._slots = [self._slot(controller) for controller in self.controllers]
         interfaces: list[Interface | None] = [None] * n
         wants: list[FeedForward] = ["none"] * n
@@ -94,12 +97,16 @@ class ControllerManager:
 
     def _slot(self, controller: Controller) -> _Slot:
         where = [self.joints.index(name) for name in controller.joints]
-        n = len(where)
-        adjacent = where == list(range(where[0], where[0] + n))
+        index: Index = np.array(where, dtype=np.intp)
+        adjacent = where == list(range(where[0], where[0] + len(where)))
+        if adjacent:
+            index = slice(where[0], where[0] + len(where))
+        rows = self._measured[:, index]
         return _Slot(
             controller=controller,
-            index=slice(where[0], where[0] + n) if adjacent else np.array(where, dtype=np.intp),
-            measured=JointState(position=np.zeros(n), velocity=np.zeros(n), effort=np.zeros(n)),
+            index=index,
+            measured=JointState(position=rows[0], velocity=rows[1], effort=rows[2]),
+            copy=None if adjacent else rows,
             adds=controller.feed_forward != "none",
         )
 
@@ -137,17 +144,17 @@ class ControllerManager:
         contact_force: Array | None = None,
     ) -> Array:
         """One control tick at `time` [s]: the commands (n) before limits; see the module for the vectors."""
-        position, velocity, effort = state.position, state.velocity, state.effort
+        measured = self._measured
+        measured[0], measured[1], measured[2] = state.position, state.velocity, state.effort
         commands, period = self._commands, self.period
         outputs = []
         for slot in self._slots:
-            index, measured = slot.index, slot.measured
-            measured.position[:] = position[index]
-            measured.velocity[:] = velocity[index]
-            measured.effort[:] = effort[index]
+            index = slot.index
+            if slot.copy is not None:
+                slot.copy[:] = measured[:, index]
             addition = feed_forward[index] if slot.adds and feed_forward is not None else None
             force = contact_force[index] if contact_force is not None else None
-            output = slot.controller.update(time, period, measured, addition, contact_force=force)
+            output = slot.controller.update(time, period, slot.measured, addition, contact_force=force)
             commands[index] = output.command
             outputs.append(output)
         self.outputs = tuple(outputs)

@@ -2,7 +2,7 @@
 
 `tick` only copies numbers into preallocated blocks. Twice a simulated second a block is encoded in one go: every
 message of a fixed size as rows of bytes, the few others one by one, all in the order of their time, as one compressed
-chunk. What has been flushed stays readable whatever happens to the process.
+chunk, which a thread compresses and writes. What has been flushed stays readable whatever happens to the process.
 
 Times are nanoseconds of simulated time: round(tick * period * 1e9); log time = publish time = header stamp.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from manipcli.control.controller import ControllerOutput
@@ -72,6 +73,8 @@ class Recorder:
         self._contact_filter = ContactFilter()
         self._contact_encoder = messages.ContactEncoder()
         self._container = Container(path, overwrite=overwrite)
+        self._thread = ThreadPoolExecutor(max_workers=1)
+        self._writing: Future[None] | None = None
         _declare(self._container, table)
         for name, media_type, data in attachments:
             self._container.attachment(name, media_type, data)
@@ -97,7 +100,7 @@ class Recorder:
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
         """The state of the world at `tick` and what the controllers put out; the arrays may be reused afterwards."""
         if self._block.count == self._block.capacity:
-            self.flush()
+            self._send()
         self._block.add(tick, state, outputs)
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
@@ -121,10 +124,23 @@ class Recorder:
 
     def flush(self) -> None:
         """Everything given so far is in the partial file when this returns."""
+        self._send()
+        self._written()
+
+    def _send(self) -> None:
+        """Encodes what waits and hands it to the thread that compresses and writes, once that is done with what it
+        has: the control loop goes on meanwhile. What the disk refuses is met here or in the next flush."""
         singles, self._singles = self._singles, []
         content = self._block.encode(singles)
+        self._written()
         if content is not None:
-            self._container.chunk(content)
+            self._writing = self._thread.submit(self._container.chunk, content)
+
+    def _written(self) -> None:
+        """Waits for the thread; what it met is raised here."""
+        writing, self._writing = self._writing, None
+        if writing is not None:
+            writing.result()
 
     def finish(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """Writes the last metadata (the verdict) and the summary, closes the file and gives it its name."""
@@ -132,18 +148,20 @@ class Recorder:
         for name, values in metadata.items():
             self._container.metadata(name, values)
         self._container.finish()
+        self._thread.shutdown()
 
     def close_partial(self) -> None:
         """Stops without finishing: everything is flushed, the file keeps the name `*.partial`.
 
         Does nothing once the recording is finished, has stopped or has failed.
         """
-        if self._container.closed:
+        if self._container.closed and self._writing is None:
             return
         try:
             self.flush()
         finally:
             self._container.close()
+            self._thread.shutdown()
 
     def _ns(self, tick: int) -> int:
         return round(tick * self._period * 1e9)
