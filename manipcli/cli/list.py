@@ -11,7 +11,7 @@ from manipcli.cli import console
 from manipcli.cli.options import Format
 from manipcli.core.errors import ExitCode
 
-Kind = Literal["robots", "tasks", "controllers", "steps", "expectations", "conditions", "shapes", "engines"]
+Kind = Literal["robots", "tasks", "controllers", "steps", "expectations", "conditions", "shapes", "engines", "checks"]
 FILES = {"robots": "robot", "tasks": "task", "controllers": "controllers"}
 """The kinds that are files, and the word for one such file."""
 
@@ -29,6 +29,12 @@ def list_(
     """
     from manipcli.report.json import dumps
 
+    if kind == "checks" and format_ == "text":
+        from manipcli.model.checks import CHECKS
+        from manipcli.report.description import render_checks
+
+        console.result(render_checks(CHECKS))
+        return ExitCode.PASSED
     found = {one: _names(one) for one in (get_args(Kind) if kind is None else (kind,))}
     if format_ == "json":
         console.result(dumps(found))

@@ -7,16 +7,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.flow.describe import inspect
 from manipcli.flow.load import load_task
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import SHAPES
+from manipcli.model.checks import CHECKS
 from manipcli.model.conditions import CONDITIONS
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.tree import Plain
+
+DESCRIPTIONS = (".urdf", ".xacro")
 
 
 def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:
@@ -25,6 +29,8 @@ def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:
 
 
 def _findings(path: Path) -> tuple[Finding, ...]:
+    if path.suffix.lower() in DESCRIPTIONS:
+        return inspect(path).examination.findings
     try:
         kind = load.kind_of(path)
         if kind == "task":
@@ -47,13 +53,14 @@ def kind_of(path: Path) -> load.FileKind | None:
 
 
 def words(kind: str) -> tuple[str, ...]:
-    """The words that files may use: `steps`, `expectations`, `conditions`, `shapes` or `engines`."""
+    """The words that files may use (`steps`, `expectations`, `conditions`, `shapes`, `engines`); codes (`checks`)."""
     known = {
         "steps": STEPS.names,
         "expectations": EXPECTATIONS.names,
         "conditions": CONDITIONS.names,
         "shapes": SHAPES,
         "engines": ENGINES.names,
+        "checks": tuple(check.code for check in CHECKS),
     }
     return known[kind]
 

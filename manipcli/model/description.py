@@ -16,12 +16,16 @@ XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro"
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """`root` is the <robot> element, expanded; `packages` finds what it names; `findings` are warnings."""
+    """`root` is the <robot> element, expanded; `packages` finds what it names; `findings` are warnings.
+
+    `expanded`: the file is xacro, and its elements come from macros and other files.
+    """
 
     path: Path
     root: Element
     packages: Packages
     findings: tuple[Finding, ...]
+    expanded: bool = False
 
 
 def read_description(
@@ -46,7 +50,8 @@ def read_description(
     top = document.documentElement
     declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
     findings: tuple[Finding, ...] = ()
-    if path.suffix == ".xacro" or declared:
+    expanded = path.suffix == ".xacro" or declared
+    if expanded:
         from manipcli.model.xacro import expand
 
         words = {name: argument_text(value) for name, value in arguments.items()}
@@ -58,7 +63,7 @@ def read_description(
     root = element_of(document.documentElement)
     if root.tag != "robot":
         raise _other_format(root)
-    return Description(path=path, root=root, packages=packages, findings=findings)
+    return Description(path=path, root=root, packages=packages, findings=findings, expanded=expanded)
 
 
 _FORMATS = {

@@ -29,7 +29,7 @@ def guess_groups(root: str, joints: Sequence[Joint]) -> tuple[GuessedGroup, ...]
 
     A chain runs down to where moving joints branch. What branches there is a hand where no finger has more than
     `DEEPEST_FINGER` joints one after the other, and a chain leads there or the robot is nothing else; otherwise
-    every branch is a chain of its own. Mimic joints beside a long branch are its linkage, not branches.
+    every branch is a chain of its own. Mimic joints beside the one branch that leads on are a linkage, no branches.
 
     Args:
         root: the root link.
@@ -57,17 +57,20 @@ class _Tree:
     def __init__(self, joints: Sequence[Joint]) -> None:
         self._children: dict[str, list[Joint]] = {}
         self._depth: dict[str, int] = {}
-        self._independent: set[str] = set()
+        self._independent: dict[str, int] = {}
         for joint in joints:
             self._children.setdefault(joint.parent, []).append(joint)
         for joint in reversed(joints):
             self._depth[joint.parent] = max(self._depth.get(joint.parent, 0), self.depth(joint))
-            if joint.independent or joint.child in self._independent:
-                self._independent.add(joint.parent)
+            self._independent[joint.parent] = max(self._independent.get(joint.parent, 0), self._leading(joint))
 
     def depth(self, joint: Joint) -> int:
         """The most moving joints on a way that begins with `joint`."""
         return joint.moves + self._depth.get(joint.child, 0)
+
+    def _leading(self, joint: Joint) -> int:
+        """The most independent joints on a way that begins with `joint`."""
+        return joint.independent + self._independent.get(joint.child, 0)
 
     def chain(self, base: str, first: Joint | None) -> tuple[list[Joint], str, list[Joint]]:
         """Moving joints from `base` (through `first`) to the next branching; the link there, and its branches."""
@@ -85,9 +88,8 @@ class _Tree:
 
     def _branches(self, link: str) -> list[Joint]:
         moving = [joint for joint in self._children.get(link, []) if self.depth(joint)]
-        leading = [joint for joint in moving if joint.independent or joint.child in self._independent]
-        linkage = len(leading) == 1 and self.depth(leading[0]) > DEEPEST_FINGER
-        return leading if linkage else moving
+        leading = [joint for joint in moving if self._leading(joint)]
+        return leading if len(leading) == 1 and self._leading(leading[0]) > 1 else moving
 
     def _end(self, link: str) -> str:
         """The last link of a chain: down fixed joints, to a frame that is called a tool where there are several."""

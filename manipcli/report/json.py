@@ -55,7 +55,7 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
         {
             "verdict": "failed" if failed else "passed",
             "files": list(files),
-            "findings": [{"severity": finding.severity, **_finding(finding)} for finding in findings],
+            "findings": [{"severity": finding.severity, **finding_object(finding)} for finding in findings],
         }
     )
 
@@ -110,11 +110,11 @@ def _object(
             }
             for expectation in (judged.expectations if judged is not None else ())
         ],
-        "errors": [_finding(finding) for finding in errors],
+        "errors": [finding_object(finding) for finding in errors],
     }
 
 
-def _finding(finding: Finding) -> dict[str, Json]:
+def finding_object(finding: Finding) -> dict[str, Json]:
     place = finding.place
     return {
         "code": finding.code,

@@ -17,7 +17,9 @@ def _find(subject: Subject) -> Iterator[Finding]:
                 continue
             message = f"<{child.tag}> does not belong in <{element.tag}>; it is ignored"
             hint = f"it belongs in {any_of(PARENTS.get(child.tag, ()))}" if child.tag in PARENTS else None
-            yield Finding("URDF054", message, child.place, hint, "warning")
+            # Exporters write a colour for the collision shape; nobody misses it.
+            harmless = (element.tag, child.tag) == ("collision", "material")
+            yield Finding("URDF054", message, child.place, hint, "note" if harmless else "warning")
 
 
 CHECK = Check(

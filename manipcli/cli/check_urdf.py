@@ -1,0 +1,149 @@
+"""`manipcli check-urdf FILE`: everything that is wrong with a robot description, before a simulator meets it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.flow.describe import Inspection
+
+Codes = list[str] | None
+
+
+def check_urdf(
+    file: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)
+    ] = None,
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ARG:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
+    ] = None,
+    *,
+    format_: Annotated[
+        Literal["text", "json", "sarif"], typer.Option("--format", help="Text, one JSON object, or SARIF 2.1.0.")
+    ] = "text",
+    select: Annotated[
+        Codes,
+        typer.Option("--select", metavar="CODES", help="Only these: URDF2,URDF031, or a tier; repeatable."),
+    ] = None,
+    ignore: Annotated[
+        Codes, typer.Option("--ignore", metavar="CODES", help="Not these: codes, their beginnings, tiers; repeatable.")
+    ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Warnings fail, too.")] = False,
+    explain: Annotated[
+        str | None, typer.Option("--explain", metavar="CODE", help="What a code means, and why it matters.")
+    ] = None,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Mend what is safe to mend, in NAME.fixed.urdf beside the file.")
+    ] = False,
+    in_place: Annotated[bool, typer.Option("--in-place", help="With --fix: in the file itself.")] = False,
+    tree: Annotated[bool, typer.Option("--tree", help="Print the tree of links and joints.")] = False,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the robot.", show_default=False)
+    ] = None,
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+    allow_env: Annotated[
+        list[str] | None,
+        typer.Option("--allow-env", metavar="NAME", help="Let $(env NAME) read this variable; repeatable."),
+    ] = None,
+) -> ExitCode:
+    """Check a robot description, URDF or xacro: schema, topology, physics, assets, readiness.
+
+    Exit code 0: no error. 1: errors (with --strict: or warnings). 4: no such file, or a wrong option.
+    """
+    from manipcli.flow import describe
+    from manipcli.report import description
+
+    if explain is not None:
+        console.result(description.render_explanation(describe.explained(explain)))
+        return ExitCode.PASSED
+    if file is None:
+        raise InvalidInput([Finding("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
+    if in_place and not fix:
+        raise InvalidInput([Finding("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
+    codes = describe.wanted_codes(_words(select), _words(ignore))
+    given = _arguments(arguments or [])
+
+    def inspect(path: Path) -> Inspection:
+        return describe.inspect(
+            path,
+            arguments=given,
+            package_path=tuple(package_path or ()),
+            allow_outside=allow_outside,
+            allow_env=tuple(allow_env or ()),
+        )
+
+    inspection = inspect(file)
+    if fix:
+        inspection = _mended(inspection, inspect, in_place=in_place)
+    told = inspection.told(codes)
+    grave = ("error", "warning") if strict else ("error",)
+    passed = not any(finding.severity in grave for finding in told)
+    console.result(_rendered(inspection, told, codes, format_, passed=passed, tree=tree))
+    if picture is not None:
+        if inspection.examination.errors:
+            console.talk(f"not drawn: {file} has errors")
+        else:
+            describe.draw(inspection, picture)
+            console.talk(f"drawn: {picture}")
+    return ExitCode.PASSED if passed else ExitCode.FAILED
+
+
+def _mended(inspection: Inspection, inspect: Callable[[Path], Inspection], *, in_place: bool) -> Inspection:
+    """What there is to say once the file is mended."""
+    from manipcli.flow import describe
+
+    path, changes = describe.mend(inspection, in_place=in_place)
+    for change in changes:
+        console.talk(f"mended: {change}")
+    console.talk(f"written: {path}" if changes else "nothing to mend: no file is written")
+    return inspect(path) if changes else inspection
+
+
+def _rendered(
+    inspection: Inspection,
+    told: Sequence[Finding],
+    codes: Collection[str],
+    format_: str,
+    *,
+    passed: bool,
+    tree: bool,
+) -> str:
+    from manipcli.model.checks import CHECKS
+    from manipcli.report import description, sarif
+
+    if format_ == "sarif":
+        return sarif.render(told, CHECKS)
+    render = description.render_json if format_ == "json" else description.render_text
+    return render(
+        str(inspection.path),
+        told,
+        inspection.summary,
+        passed=passed,
+        left_out=[(code, number) for code, number in inspection.examination.left_out if code in codes],
+        tree=inspection.tree if tree else (),
+    )
+
+
+def _words(options: list[str] | None) -> tuple[str, ...]:
+    return tuple(word for option in options or [] for word in option.replace(",", " ").split())
+
+
+def _arguments(words: list[str]) -> dict[str, str]:
+    found = {}
+    for word in words:
+        name, mark, value = word.partition(":=")
+        if not mark or not name:
+            message = f"'{word}' is no argument of a description; expected ARG:=VALUE"
+            raise InvalidInput([Finding("USE045", message)])
+        found[name] = value
+    return found

@@ -1,0 +1,163 @@
+"""A description that was examined: its findings, then what it consists of. As text, and as one JSON object."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import listed, shorten
+from manipcli.model.check import Check
+from manipcli.model.guess_groups import GuessedGroup
+from manipcli.model.summary import Summary
+from manipcli.report.json import Json, dumps, finding_object
+from manipcli.report.table import table
+from manipcli.report.text import FAIL, PASS, describe
+
+
+def render_text(
+    file: str,
+    findings: Sequence[Finding],
+    summary: Summary | None,
+    *,
+    passed: bool,
+    left_out: Sequence[tuple[str, int]] = (),
+    tree: Sequence[str] = (),
+) -> str:
+    """Findings, the summary, the tree where it is asked for, and the verdict in the last line."""
+    lines = [*map(describe, findings)]
+    lines += [f"... and {number} more of {code}" for code, number in left_out]
+    if lines:
+        lines.append("")
+    if summary is not None:
+        lines += [*_summary(summary), ""]
+    if tree:
+        lines += [*tree, ""]
+    mark, word = (PASS, "passed") if passed else (FAIL, "failed")
+    counts = [
+        _many(sum(finding.severity == severity for finding in findings), severity)
+        for severity in ("error", "warning", "note")
+    ]
+    more = f", {sum(number for _, number in left_out)} more not shown" if left_out else ""
+    return "\n".join([*lines, f"{mark} {word}: {file}: {', '.join(counts)}{more}"])
+
+
+def render_explanation(check: Check) -> str:
+    """What a code means, why it matters, and a description that has the defect."""
+    return "\n".join(
+        [
+            f"{check.code} {check.name} ({check.tier}, {check.severity})",
+            "",
+            f"{check.summary}.",
+            *textwrap.wrap(check.reason, 100),
+            "",
+            "for example:",
+            *(f"  {line}" for line in _lines(check.bad)),
+        ]
+    )
+
+
+def _lines(xml: str) -> list[str]:
+    """One element a line, as far as they begin on the top levels; a long example is cut."""
+    lines = _TOP.sub(">\n<", xml).splitlines()
+    return [shorten(line, width=110) for line in lines[:20]] + (["..."] if len(lines) > 20 else [])
+
+
+def render_checks(checks: Iterable[Check]) -> str:
+    """The table of checks."""
+    rows = [(check.code, check.name, check.tier, check.severity, check.summary) for check in checks]
+    return table(("code", "name", "tier", "severity", "what is wrong"), rows)
+
+
+_TOP = re.compile(r"><(?=/?(robot|link|joint|material|inertial|visual|collision|xacro:|transmission|ros2)\b)")
+
+
+def _summary(summary: Summary) -> list[str]:
+    types = ", ".join(f"{number} {kind or 'without type'}" for kind, number in summary.types)
+    rows = {
+        "robot": summary.name + (f", root link '{summary.root}'" if summary.root else ""),
+        "links": str(summary.links),
+        "joints": f"{summary.joints}" + (f" ({types})" if types else ""),
+        "moving": f"{summary.moving}: {_many(summary.dof, 'degree')} of freedom"
+        + (f", {_many(summary.mimics, 'mimic joint')}" if summary.mimics else ""),
+        "transmissions": str(summary.transmissions),
+        "mass": f"{summary.mass:.4g} kg"
+        + (f"; {_many(summary.massless, 'moving link')} without mass" if summary.massless else ""),
+    }
+    if summary.reach:
+        rows["reach"] = f"about {summary.reach:.3g} m from the first joint of the longest chain to its tip"
+    if summary.meshes:
+        rows["meshes"] = f"{summary.meshes_found} of {summary.meshes} found"
+    width = max(map(len, rows)) + 2
+    lines = [f"{name + ':':<{width}}{value}" for name, value in rows.items()]
+    if summary.groups:
+        lines.append("groups, guessed:")
+        lines += [f"  {_group(group)}" for group in summary.groups]
+    return lines
+
+
+def _group(group: GuessedGroup) -> str:
+    where = f"{group.base} -> {group.tip}" if group.tip else f"at {group.base}"
+    own = listed(group.joints, most=8) or "no joint of its own"
+    follow = f"; follow: {listed(group.mimics, most=8)}" if group.mimics else ""
+    return f"{group.kind} of {len(group.joints)}, {where}: {own}{follow}"
+
+
+def _many(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def render_json(
+    file: str,
+    findings: Sequence[Finding],
+    summary: Summary | None,
+    *,
+    passed: bool,
+    left_out: Sequence[tuple[str, int]] = (),
+    tree: Sequence[str] = (),
+) -> str:
+    """The object of `check`, with `summary` (null where the file could not be expanded), `left_out` and `tree`."""
+    return dumps(
+        {
+            "verdict": "passed" if passed else "failed",
+            "files": [file],
+            "findings": [{"severity": finding.severity, **finding_object(finding)} for finding in findings],
+            "left_out": dict(left_out),
+            "summary": _summary_object(summary) if summary is not None else None,
+            "tree": list(tree),
+        }
+    )
+
+
+def _summary_object(summary: Summary) -> Mapping[str, Json]:
+    return {
+        "name": summary.name,
+        "root": summary.root or None,
+        "links": summary.links,
+        "joints": summary.joints,
+        "joint_types": {kind or "": number for kind, number in summary.types},
+        "moving_joints": summary.moving,
+        "dof": summary.dof,
+        "mimic_joints": summary.mimics,
+        "transmissions": summary.transmissions,
+        "groups": [
+            {
+                "kind": group.kind,
+                "joints": list(group.joints),
+                "mimics": list(group.mimics),
+                "base": group.base,
+                "tip": group.tip or None,
+            }
+            for group in summary.groups
+        ],
+        "mass": _finite(summary.mass),
+        "moving_links_without_mass": summary.massless,
+        "reach": _finite(summary.reach),
+        "meshes": summary.meshes,
+        "meshes_found": summary.meshes_found,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 9) if abs(value) < 1e300 else None
