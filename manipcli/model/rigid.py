@@ -36,12 +36,16 @@ def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
     return found
 
 
-def extent(link: Link) -> tuple[Array, Array] | None:
+def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
     """Lowest and highest corner (3,) [m] of a box about a link's collision shapes, else its visuals, in the link.
 
-    None where it has neither, or one that cannot be read.
+    None where `element`, which describes the link, has neither, or one that could not be read.
     """
-    return box_about(link.collisions) or box_about(link.visuals)
+    for tag, shapes in (("collision", link.collisions), ("visual", link.visuals)):
+        written = len(element.all(tag))
+        if written:
+            return box_about(shapes) if len(shapes) >= written else None
+    return None
 
 
 def box_about(geometries: Sequence[Geometry]) -> tuple[Array, Array] | None:

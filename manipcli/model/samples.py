@@ -25,6 +25,15 @@ def one_joint(inside: str = LIMIT, *, kind: str = "revolute", tip: str = INERTIA
     return f'<robot name="r"><link name="base"/><link name="tip">{tip}</link>{joint}{more}</robot>'
 
 
+GEARED = '<joint name="j"><hardwareInterface>PositionJointInterface</hardwareInterface></joint>'
+MOTOR = '<actuator name="m"><mechanicalReduction>1</mechanicalReduction></actuator>'
+
+
+def transmission(inside: str = GEARED + MOTOR, *, kind: str = "SimpleTransmission") -> str:
+    """A ROS 1 transmission; for `more` of `one_joint`."""
+    return f'<transmission name="t"><type>transmission_interface/{kind}</type>{inside}</transmission>'
+
+
 def one_link(mesh: str, *, role: str = "visual") -> str:
     """A description of one link with a <mesh> of these attributes."""
     return f'<robot name="r"><link name="base"><{role}><geometry><mesh {mesh}/></geometry></{role}></link></robot>'

@@ -11,12 +11,20 @@ from manipcli.model.checks.centre_of_mass import CHECK as CENTRE_OF_MASS
 from manipcli.model.checks.collada_up_axis import CHECK as COLLADA_UP_AXIS
 from manipcli.model.checks.colour_range import CHECK as COLOUR_RANGE
 from manipcli.model.checks.continuous_limits import CHECK as CONTINUOUS_LIMITS
+from manipcli.model.checks.control_element import CHECK as CONTROL_ELEMENT
+from manipcli.model.checks.control_interface import CHECK as CONTROL_INTERFACE
+from manipcli.model.checks.control_joint import CHECK as CONTROL_JOINT
+from manipcli.model.checks.control_mimic import CHECK as CONTROL_MIMIC
+from manipcli.model.checks.control_number import CHECK as CONTROL_NUMBER
+from manipcli.model.checks.control_plugin import CHECK as CONTROL_PLUGIN
 from manipcli.model.checks.default_axis import CHECK as DEFAULT_AXIS
 from manipcli.model.checks.doctype import CHECK as DOCTYPE
 from manipcli.model.checks.duplicate_name import CHECK as DUPLICATE_NAME
 from manipcli.model.checks.fixed_axis import CHECK as FIXED_AXIS
 from manipcli.model.checks.flat_mesh import CHECK as FLAT_MESH
 from manipcli.model.checks.foreign_shape import CHECK as FOREIGN_SHAPE
+from manipcli.model.checks.gazebo_tags import CHECK as GAZEBO_TAGS
+from manipcli.model.checks.hardware_interface import CHECK as HARDWARE_INTERFACE
 from manipcli.model.checks.inertia import CHECK as INERTIA
 from manipcli.model.checks.inertia_size import CHECK as INERTIA_SIZE
 from manipcli.model.checks.inertia_without_mass import CHECK as INERTIA_WITHOUT_MASS
@@ -31,6 +39,7 @@ from manipcli.model.checks.mesh_suffix import CHECK as MESH_SUFFIX
 from manipcli.model.checks.mesh_triangles import CHECK as MESH_TRIANGLES
 from manipcli.model.checks.mesh_unit import CHECK as MESH_UNIT
 from manipcli.model.checks.mimic_circle import CHECK as MIMIC_CIRCLE
+from manipcli.model.checks.mimic_limits import CHECK as MIMIC_LIMITS
 from manipcli.model.checks.mimic_target import CHECK as MIMIC_TARGET
 from manipcli.model.checks.mirrored_mesh import CHECK as MIRRORED_MESH
 from manipcli.model.checks.misplaced_element import CHECK as MISPLACED_ELEMENT
@@ -38,6 +47,7 @@ from manipcli.model.checks.missing_attribute import CHECK as MISSING_ATTRIBUTE
 from manipcli.model.checks.missing_mesh import CHECK as MISSING_MESH
 from manipcli.model.checks.missing_name import CHECK as MISSING_NAME
 from manipcli.model.checks.missing_visual import CHECK as MISSING_VISUAL
+from manipcli.model.checks.no_collision import CHECK as NO_COLLISION
 from manipcli.model.checks.no_link import CHECK as NO_LINK
 from manipcli.model.checks.not_a_robot import CHECK as NOT_A_ROBOT
 from manipcli.model.checks.not_xml import CHECK as NOT_XML
@@ -48,7 +58,9 @@ from manipcli.model.checks.redefined_material import CHECK as REDEFINED_MATERIAL
 from manipcli.model.checks.remote_mesh import CHECK as REMOTE_MESH
 from manipcli.model.checks.repeated_element import CHECK as REPEATED_ELEMENT
 from manipcli.model.checks.robot_name import CHECK as ROBOT_NAME
+from manipcli.model.checks.ros_names import CHECK as ROS_NAMES
 from manipcli.model.checks.safety_limits import CHECK as SAFETY_LIMITS
+from manipcli.model.checks.self_collision import CHECK as SELF_COLLISION
 from manipcli.model.checks.self_joint import CHECK as SELF_JOINT
 from manipcli.model.checks.several_roots import CHECK as SEVERAL_ROOTS
 from manipcli.model.checks.several_shapes import CHECK as SEVERAL_SHAPES
@@ -56,7 +68,14 @@ from manipcli.model.checks.shape import CHECK as SHAPE
 from manipcli.model.checks.shared_name import CHECK as SHARED_NAME
 from manipcli.model.checks.stray_text import CHECK as STRAY_TEXT
 from manipcli.model.checks.too_large import CHECK as TOO_LARGE
+from manipcli.model.checks.too_many_joints import CHECK as TOO_MANY_JOINTS
 from manipcli.model.checks.transmission import CHECK as TRANSMISSION
+from manipcli.model.checks.transmission_count import CHECK as TRANSMISSION_COUNT
+from manipcli.model.checks.transmission_joint import CHECK as TRANSMISSION_JOINT
+from manipcli.model.checks.transmission_reduction import CHECK as TRANSMISSION_REDUCTION
+from manipcli.model.checks.transmission_roles import CHECK as TRANSMISSION_ROLES
+from manipcli.model.checks.transmission_shared import CHECK as TRANSMISSION_SHARED
+from manipcli.model.checks.transmission_type import CHECK as TRANSMISSION_TYPE
 from manipcli.model.checks.two_parents import CHECK as TWO_PARENTS
 from manipcli.model.checks.undefined_link import CHECK as UNDEFINED_LINK
 from manipcli.model.checks.undefined_material import CHECK as UNDEFINED_MATERIAL
@@ -72,6 +91,7 @@ from manipcli.model.checks.xacro_expansion import CHECK as XACRO_EXPANSION
 from manipcli.model.checks.xacro_refused import CHECK as XACRO_REFUSED
 from manipcli.model.checks.xacro_warning import CHECK as XACRO_WARNING
 from manipcli.model.checks.zero_mass import CHECK as ZERO_MASS
+from manipcli.model.checks.zero_outside import CHECK as ZERO_OUTSIDE
 
 _SCHEMA: tuple[Check, ...] = (
     NOT_XML,
@@ -152,6 +172,26 @@ _ASSETS: tuple[Check, ...] = (
 )
 _READINESS: tuple[Check, ...] = (
     TRANSMISSION,
+    NO_COLLISION,
+    TRANSMISSION_TYPE,
+    TRANSMISSION_SHARED,
+    TRANSMISSION_ROLES,
+    TRANSMISSION_COUNT,
+    HARDWARE_INTERFACE,
+    TRANSMISSION_JOINT,
+    TRANSMISSION_REDUCTION,
+    CONTROL_JOINT,
+    CONTROL_MIMIC,
+    CONTROL_PLUGIN,
+    CONTROL_INTERFACE,
+    CONTROL_NUMBER,
+    CONTROL_ELEMENT,
+    GAZEBO_TAGS,
+    ROS_NAMES,
+    TOO_MANY_JOINTS,
+    SELF_COLLISION,
+    ZERO_OUTSIDE,
+    MIMIC_LIMITS,
 )
 
 CHECKS: Seam[Check] = Seam(kind="check", members=(*_SCHEMA, *_TOPOLOGY, *_PHYSICS, *_ASSETS, *_READINESS))

@@ -19,7 +19,7 @@ NEAR: Final = 0.01
 def _find(subject: Subject) -> Iterator[Finding]:
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
-        box = extent(link)
+        box = extent(link, links[link.name])
         if link.inertial is None or box is None:
             continue
         low, high = box

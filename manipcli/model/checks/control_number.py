@@ -1,0 +1,63 @@
+"""Numbers of ros2_control that are no numbers."""
+
+from collections.abc import Iterator
+
+from manipcli.core.errors import Finding
+from manipcli.model.check import Check, Subject
+from manipcli.model.control_tags import controlled_joints
+from manipcli.model.samples import one_joint
+from manipcli.model.urdf_numbers import finite
+
+
+def _find(subject: Subject) -> Iterator[Finding]:
+    limits = {joint.name: joint.limits for joint in subject.parts.joints}
+    for joint in controlled_joints(subject):
+        for interface in (*joint.commands, *joint.element.all("state_interface")):
+            values: dict[str, float] = {}
+            for parameter in interface.all("param"):
+                key = parameter.attributes.get("name", "")
+                value = finite(parameter.text.strip())
+                if key not in ("min", "max", "initial_value") or not parameter.text.strip():
+                    continue
+                if value is None:
+                    message = f"joint '{joint.name}': '{parameter.text.strip()[:40]}' is no finite number for {key}"
+                    yield Finding("URDF324", message, parameter.place, None)
+                else:
+                    values[key] = value
+            own = limits.get(joint.name)
+            start = values.get("initial_value")
+            if "min" in values and "max" in values and values["min"] > values["max"]:
+                message = f"joint '{joint.name}': min {values['min']:g} is above max {values['max']:g}"
+                yield Finding("URDF324", message, interface.place, None)
+            if start is None or own is None or interface.attributes.get("name") != "position":
+                continue
+            if (own.lower is not None and start < own.lower - 1e-9) or (
+                own.upper is not None and start > own.upper + 1e-9
+            ):
+                message = f"joint '{joint.name}': the initial position {start:g} is outside of its limits"
+                hint = (
+                    f"limits: {own.lower:g} to {own.upper:g}"
+                    if own.lower is not None and own.upper is not None
+                    else None
+                )
+                yield Finding("URDF324", message, interface.place, hint, "warning")
+
+
+CHECK = Check(
+    code="URDF324",
+    name="control-number",
+    tier="readiness",
+    severity="error",
+    summary="A number in <ros2_control> cannot be read, or contradicts the limits",
+    reason=(
+        "ros2_control takes its default instead, without a word; an initial position outside of the limits "
+        "starts the robot where it cannot be."
+    ),
+    bad=one_joint(
+        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+        '<joint name="j">'
+        '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
+        "</ros2_control>"
+    ),
+    find=_find,
+)
