@@ -194,11 +194,11 @@ def test_tool_and_mount_are_frames(file: Path) -> None:
 
 
 def test_the_tool_is_the_tip_of_the_first_group_unless_said(file: Path) -> None:
-    tool = build(file, groups=GROUPS).tool
+    tool = build(file, groups={"chain": {"chain": {"base": "base", "tip": "flange"}}, **GROUPS}).tool
     assert tool is not None
     assert tool.link == "flange"
     np.testing.assert_array_equal(tool.X_LT.matrix, np.eye(4))
-    assert build(file).tool is None
+    assert build(file, groups=GROUPS).tool is None
 
 
 def test_findings_carry_the_place_of_the_value(file: Path) -> None:
