@@ -26,6 +26,11 @@ class Camera:
     target: Vector
     field: float = FIELD
 
+    def further(self, factor: float) -> Camera:
+        """The same from `factor` times as far away."""
+        eye = np.add(self.target, factor * np.subtract(self.eye, self.target))
+        return Camera(_vector(eye), self.target, self.field)
+
 
 def framing(
     drawing: Drawing, poses: Poses, *, aspect: float = 4 / 3, leave_out: frozenset[str] = frozenset()

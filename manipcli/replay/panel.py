@@ -83,7 +83,7 @@ class JointPanel:
         self._sliders: dict[int, viser.GuiSliderHandle[float]] = {}
         self._q = q
         with server.gui.add_folder("Poses"):
-            for name in (*(pose.name for pose in robot.poses), ZERO):
+            for name in dict.fromkeys((*(pose.name for pose in robot.poses), ZERO)):
                 server.gui.add_button(name).on_click(self._goer(name))
         with server.gui.add_folder("Joints [rad, m]"):
             for k, joint in enumerate(robot.moving_joints):

@@ -18,8 +18,8 @@ from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, Layer, draw
+from manipcli.replay.image import Image, sky, write_png
 from manipcli.replay.placing import Placing, Poses
-from manipcli.replay.png import Image, write_png
 from manipcli.replay.posture import following, posture
 from manipcli.replay.surface import Surface, surface
 
@@ -27,8 +27,6 @@ SIZE = (960, 720)
 """Of a picture [pixel]."""
 FINER = 2
 """Rendered this many times larger."""
-SKY = ((203, 213, 224), (246, 248, 250))
-"""Behind everything, from top to bottom."""
 MAX_VERTICES = 60_000
 """Of one surface in Bullet, whose commands hold some more than twice as many."""
 FLOOR = "floor"
@@ -122,9 +120,7 @@ class Studio:
             physicsClientId=self._client,
         )
         rgb = np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-        part = np.linspace(0.0, 1.0, height)[:, None, None]
-        sky = (1.0 - part) * np.array(SKY[0]) + part * np.array(SKY[1])
-        whole = np.where(np.asarray(seen).reshape(height, width, 1) < 0, sky, rgb)
+        whole = np.where(np.asarray(seen).reshape(height, width, 1) < 0, sky(height), rgb)
         small = whole.reshape(self._size[1], FINER, self._size[0], FINER, 3).mean(axis=(1, 3))
         image: Image = small.round().astype(np.uint8)
         return image

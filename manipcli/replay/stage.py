@@ -12,6 +12,7 @@ import numpy as np
 from manipcli.core.geometry import Transform
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
+from manipcli.replay.image import sky
 from manipcli.replay.placing import Poses
 from manipcli.replay.surface import Rgba
 
@@ -22,8 +23,8 @@ AXES = 0.08
 """Length of the axes of a frame [m]."""
 GRID = 0.1
 """Width of a cell of the grid on the ground [m]."""
-BELOW = 5e-4
-"""The grid lies this much above the floor of a scene [m], or the two would flicker."""
+BRIGHTNESS = 0.7
+"""Of the surroundings that light the scene; at 1 colours look washed out."""
 
 
 class _Shown(Protocol):
@@ -37,7 +38,7 @@ class Stage:
         server: where.
         drawing: what.
         poses: where its frames are at first; also what the camera looks at.
-        floors: frames of bodies that are floors: they need not be in view.
+        floors: frames of bodies that are floors: the grid is drawn in their place, for its shadows.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Stage:
         self._layers: dict[Layer, list[_Shown]] = {layer: [] for layer in LAYERS}
         self._axes: list[_Shown] = []
         self._labels: list[_Shown] = []
+        _furnish(server)
         paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
         with server.atomic():
             for frame in drawing.frames:
@@ -57,10 +59,11 @@ class Stage:
             for k, mark in enumerate(drawing.marks):
                 self._frame(f"{paths[mark.frame]}/mark_{k}", mark.name, mark.X_FM)
             for k, drawable in enumerate(drawing.drawables):
-                self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
+                if drawable.frame not in floors:
+                    self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
         self.place(poses)
         self._ground(drawing, poses, floors)
-        self.look(framing(drawing, poses, leave_out=floors))
+        self.look(framing(drawing, poses, leave_out=floors).further(1.2))
 
     def _frame(self, path: str, label: str, X: Transform | None = None) -> None:
         """Axes with a name beside them (not below: one is shown without the other), both hidden at first."""
@@ -91,6 +94,7 @@ class Stage:
             side="double",
             visible=drawable.layer == "visual",
             cast_shadow=clear >= 1.0,
+            receive_shadow=False,  # only the ground does: on thin walls a shadow map flickers
         )
         self._layers[drawable.layer].append(mesh)
 
@@ -113,8 +117,8 @@ class Stage:
             section_size=10 * GRID,
             cell_color=(205, 210, 216),
             section_color=(165, 172, 180),
-            shadow_opacity=0.0 if floors else 0.25,
-            position=(0.0, 0.0, min(0.0, lowest) + BELOW),
+            shadow_opacity=0.25,
+            position=(0.0, 0.0, min(0.0, lowest)),
         )
 
     def place(self, poses: Poses) -> None:
@@ -141,6 +145,12 @@ class Stage:
     def show_labels(self, shown: bool) -> None:
         """Show or hide the names of all frames and marks."""
         _set(self._labels, shown)
+
+
+def _furnish(server: viser.ViserServer) -> None:
+    """Light and sky. The presets come with viser: nothing is fetched."""
+    server.scene.configure_environment_map("warehouse", environment_intensity=BRIGHTNESS)
+    server.scene.set_background_image(np.repeat(sky(64), 64, axis=1))
 
 
 def _set(nodes: list[_Shown], shown: bool) -> None:
