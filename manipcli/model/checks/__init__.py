@@ -48,6 +48,7 @@ from manipcli.model.checks.missing_mesh import CHECK as MISSING_MESH
 from manipcli.model.checks.missing_name import CHECK as MISSING_NAME
 from manipcli.model.checks.missing_visual import CHECK as MISSING_VISUAL
 from manipcli.model.checks.no_collision import CHECK as NO_COLLISION
+from manipcli.model.checks.no_inertial import CHECK as NO_INERTIAL
 from manipcli.model.checks.no_link import CHECK as NO_LINK
 from manipcli.model.checks.not_a_robot import CHECK as NOT_A_ROBOT
 from manipcli.model.checks.not_xml import CHECK as NOT_XML
@@ -58,6 +59,7 @@ from manipcli.model.checks.redefined_material import CHECK as REDEFINED_MATERIAL
 from manipcli.model.checks.remote_mesh import CHECK as REMOTE_MESH
 from manipcli.model.checks.repeated_element import CHECK as REPEATED_ELEMENT
 from manipcli.model.checks.robot_name import CHECK as ROBOT_NAME
+from manipcli.model.checks.root_inertia import CHECK as ROOT_INERTIA
 from manipcli.model.checks.ros_names import CHECK as ROS_NAMES
 from manipcli.model.checks.safety_limits import CHECK as SAFETY_LIMITS
 from manipcli.model.checks.self_collision import CHECK as SELF_COLLISION
@@ -154,6 +156,8 @@ _PHYSICS: tuple[Check, ...] = (
     SAFETY_LIMITS,
     INERTIA_WITHOUT_MASS,
     LIMITS_IN_DEGREES,
+    ROOT_INERTIA,
+    NO_INERTIAL,
 )
 _ASSETS: tuple[Check, ...] = (
     MISSING_MESH,

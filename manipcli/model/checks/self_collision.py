@@ -12,7 +12,7 @@ from manipcli.model.zero_overlap import overlaps_at_zero
 def _find(subject: Subject) -> Iterator[Finding]:
     links = elements_by_name(subject.description.root, "link")
     for a, b, depth in overlaps_at_zero(subject.parts):
-        message = f"links '{a}' and '{b}' overlap by {depth * 1000.0:.1f} mm with all joints at zero"
+        message = f"links '{a}' and '{b}' overlap (their hulls by {depth * 1000.0:.1f} mm) with all joints at zero"
         hint = "check their <origin> and sizes, or list the pair under collision_ignore in the robot file"
         yield Finding("URDF333", message, links[a].place if a in links else None, hint, "warning")
 

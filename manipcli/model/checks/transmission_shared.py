@@ -2,25 +2,30 @@
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Severity
 from manipcli.model.check import Check, Subject
-from manipcli.model.control_tags import transmissions
+from manipcli.model.control_tags import WrittenTransmission, transmissions
 from manipcli.model.samples import one_joint, transmission
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
-    """ROS 1 and ros2_control may describe the same gear, each in its own place: they are two lists."""
-    first: dict[tuple[bool, str, str], str] = {}
+    """ROS 1 and ros2_control may describe the same gear, each in its own place: they are two lists.
+
+    Two joints with an actuator of one name are two motors with a name copied, which does no harm in joint space.
+    """
+    owners: dict[tuple[bool, str, str], WrittenTransmission] = {}
     for found in transmissions(subject):
-        told = False
+        shared_joint = False
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
             for element in elements:
                 name = element.attributes.get("name", "").strip()
-                other = first.setdefault((found.ros1, tag, name), found.name + str(id(found.element)))
-                if name and other != found.name + str(id(found.element)) and not told:
-                    told = True
-                    message = f"transmission '{found.name}': {tag} '{name}' belongs to another transmission already"
-                    yield Finding("URDF311", message, element.place, "a joint has one transmission")
+                owner = owners.setdefault((found.ros1, tag, name), found)
+                if not name or owner is found or shared_joint:
+                    continue
+                shared_joint = tag == "joint"
+                severity: Severity = "error" if shared_joint else "warning"
+                message = f"transmission '{found.name}': {tag} '{name}' belongs to transmission '{owner.name}' already"
+                yield Finding("URDF311", message, element.place, f"a {tag} has one transmission", severity)
 
 
 CHECK = Check(
