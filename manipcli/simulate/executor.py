@@ -16,13 +16,13 @@ from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.simulate.session import Session
+from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
 """Whether the condition that a step waits for holds in a state."""
 
-UNTIL_TICKS: Final = 10
-"""Control ticks between two looks at an `until`."""
+UNTIL_TICKS: Final = SLOW
+"""Control ticks between two looks at an `until`: at those whose state has the velocities of the bodies."""
 PATIENCE: Final = 30.0
 """A motion without a deadline that takes so much longer [s] than planned is given up."""
 

@@ -145,7 +145,8 @@ class Session:
         that the loop is glad of.
         """
         if self._dynamics:
-            return self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+            efforts = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
+            return efforts + self._damping * self._rate
         return self._kinematics.gravity(state.position) if self._gravity else None
 
     def _touch(self, state: WorldState) -> None:

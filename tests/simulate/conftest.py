@@ -73,7 +73,7 @@ class ScriptedEngine:
             body_linear=np.zeros((1, 3)), body_angular=np.zeros((1, 3)),
         )  # fmt: skip
 
-    def read(self) -> WorldState:
+    def read(self, *, velocities: bool = True) -> WorldState:
         if self.script is not None:
             self.script(self)
         return self.state

@@ -49,9 +49,9 @@ def test_a_tick_reads_commands_tells_and_advances_in_this_order(session_of: Sess
     order: list[str] = []
 
     class Engine(scripted):  # type: ignore[misc]
-        def read(self) -> Any:
+        def read(self, *, velocities: bool = True) -> Any:
             order.append("read")
-            return super().read()
+            return super().read(velocities=velocities)
 
         def write(self, *command: Any) -> None:
             order.append("write")

@@ -63,7 +63,7 @@ class Standing:
             body_quat_xyzw=np.zeros((0, 4)), body_linear=none, body_angular=none,
         )  # fmt: skip
 
-    def read(self):
+    def read(self, *, velocities=True):
         return self.state
 
     def write(self, command, position, velocity):
