@@ -15,7 +15,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.mesh_collada import read_collada
-from manipcli.model.mesh_fault import MAX_BYTES, MAX_TRIANGLES, Faces, UnusableMesh
+from manipcli.model.mesh_fault import MAX_BYTES, MAX_TRIANGLES, Colours, Faces, UnusableMesh
 from manipcli.model.mesh_obj import read_obj
 from manipcli.model.mesh_stl import is_ascii_stl, is_binary_stl, read_ascii_stl, read_binary_stl
 
@@ -35,6 +35,7 @@ class TriangleMesh:
         parts: index of the first face of each part; an engine makes a hull of each part.
         format: what the file holds.
         up_axis: what a Collada file states; it changes nothing here.
+        colours: which faces have which colour, as far as the file itself says.
     """
 
     vertices: Array
@@ -42,6 +43,7 @@ class TriangleMesh:
     parts: tuple[int, ...]
     format: Format
     up_axis: str = "Z_UP"
+    colours: Colours = ()
 
     @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -96,7 +98,7 @@ def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, st
         return "needs more memory than there is", None
 
 
-Parsed = tuple[Format, Array, Faces, tuple[int, ...], str]
+Parsed = tuple[Format, Array, Faces, tuple[int, ...], str, Colours]
 
 
 def _parsed(data: bytes, suffix: str) -> Parsed:
@@ -106,22 +108,24 @@ def _parsed(data: bytes, suffix: str) -> Parsed:
     if head.startswith((b"<!doctype html", b"<html")):
         raise UnusableMesh("is a web page, not a mesh", hint="download the file itself")
     if is_binary_stl(data):
-        return ("stl", *read_binary_stl(data), "Z_UP")
+        return ("stl", *read_binary_stl(data), "Z_UP", ())
     if is_ascii_stl(data):
-        return ("stl-ascii", *read_ascii_stl(data), "Z_UP")
+        return ("stl-ascii", *read_ascii_stl(data), "Z_UP", ())
     if head.startswith((b"<?xml", b"<collada", b"<!doctype")):
         return ("collada", *read_collada(data))
     if suffix == ".stl":
-        return ("stl", *read_binary_stl(data), "Z_UP")
+        return ("stl", *read_binary_stl(data), "Z_UP", ())
     if suffix == ".dae":
         raise UnusableMesh("is no Collada file: it does not begin as XML")
     if suffix == ".obj":
-        return ("obj", *read_obj(data), "Z_UP")
+        return ("obj", *read_obj(data), "Z_UP", ())
     known = ", ".join(SUFFIXES)
     raise UnusableMesh(f"is of a format that is not read ('{suffix}'); expected one of {known}", hint="convert it")
 
 
-def _checked(kind: Format, vertices: Array, faces: Faces, parts: tuple[int, ...], up_axis: str) -> TriangleMesh:
+def _checked(
+    kind: Format, vertices: Array, faces: Faces, parts: tuple[int, ...], up_axis: str, colours: Colours
+) -> TriangleMesh:
     if len(faces) == 0:
         raise UnusableMesh("holds no triangle")
     if len(faces) > MAX_TRIANGLES:
@@ -136,7 +140,9 @@ def _checked(kind: Format, vertices: Array, faces: Faces, parts: tuple[int, ...]
         k = int(np.argmax(bad))
         at = ", ".join(f"{value:g}" for value in vertices[k])
         raise UnusableMesh(f"is damaged: vertex {k + 1} is at ({at})")
-    mesh = TriangleMesh(vertices=frozen(vertices), faces=faces, parts=parts, format=kind, up_axis=up_axis)
+    mesh = TriangleMesh(
+        vertices=frozen(vertices), faces=faces, parts=parts, format=kind, up_axis=up_axis, colours=colours
+    )
     low, high = mesh.bounds
     if not (high > low).any():
         raise UnusableMesh("is damaged: all its triangles lie in one point")

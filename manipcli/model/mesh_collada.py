@@ -2,7 +2,8 @@
 
 `<up_axis>` is reported and not applied: RViz, MoveIt and Pinocchio take the numbers as they are, and every robot was
 looked at in one of them (Y_UP is what some exporters write over a model whose z points up). `<unit>` is applied, as
-they do. Only geometry is read. Materials, animations and whatever an address outside of the file names are left out.
+they do. Geometry and plain colours are read; textures, animations and whatever an address outside of the file names
+are left out.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.mesh_fault import MAX_TRIANGLES, Faces, UnusableMesh
+from manipcli.model.mesh_fault import MAX_TRIANGLES, Colours, Faces, Rgba, UnusableMesh
 
 MAX_ELEMENTS = 200_000
 MAX_DEPTH = 64
@@ -47,8 +48,8 @@ class _Node:
             stack += node.children[::-1]
 
 
-def read_collada(data: bytes) -> tuple[Array, Faces, tuple[int, ...], str]:
-    """Vertices (n, 3) [m], faces (m, 3), one part, the up axis that is stated.
+def read_collada(data: bytes) -> tuple[Array, Faces, tuple[int, ...], str, Colours]:
+    """Vertices (n, 3) [m], faces (m, 3), one part, the up axis that is stated, the colours of the faces.
 
     Raises:
         UnusableMesh: not well-formed, a DOCTYPE, beyond a bound, or wrong counts, references or indices.
@@ -62,11 +63,13 @@ def read_collada(data: bytes) -> tuple[Array, Faces, tuple[int, ...], str]:
             scene.add(geometry, np.eye(4))
     meter, up = _asset(root)
     if not scene.placed:
-        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), (0,), up
-    offsets = np.cumsum([0] + [len(points) for points, _ in scene.placed[:-1]])
-    vertices = np.concatenate([points for points, _ in scene.placed]) * meter
-    faces = np.concatenate([faces + offset for (_, faces), offset in zip(scene.placed, offsets, strict=True)])
-    return vertices, faces, (0,), up
+        return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64), (0,), up, ()
+    offsets = np.cumsum([0] + [len(points) for points, _, _ in scene.placed[:-1]])
+    vertices = np.concatenate([points for points, _, _ in scene.placed]) * meter
+    faces = np.concatenate([faces + offset for (_, faces, _), offset in zip(scene.placed, offsets, strict=True)])
+    first = np.cumsum([0] + [len(faces) for _, faces, _ in scene.placed[:-1]])
+    colours = tuple((int(k), rgba) for k, (_, _, rgba) in zip(first, scene.placed, strict=True))
+    return vertices, faces, (0,), up, colours
 
 
 def _tree(data: bytes) -> _Node:
@@ -131,10 +134,10 @@ class _Scene:
     def __init__(self, root: _Node) -> None:
         self._root = root
         self._by_id = {node.attributes["id"]: node for node in root.walk() if "id" in node.attributes}
-        self._meshes: dict[int, list[tuple[Array, Faces]]] = {}
+        self._meshes: dict[int, list[tuple[Array, Faces, str]]] = {}
         self._instances = 0
         self._triangles = 0
-        self.placed: list[tuple[Array, Faces]] = []
+        self.placed: list[tuple[Array, Faces, Rgba | None]] = []
 
     def roots(self) -> list[_Node]:
         scene = self._root.first("scene")
@@ -165,22 +168,46 @@ class _Scene:
             elif child.tag == "instance_node":
                 self.place(self._named(url, "node"), X, depth + 1)
             elif child.tag == "instance_geometry":
-                self.add(self._named(url, "geometry"), X)
+                self.add(self._named(url, "geometry"), X, child)
             elif child.tag == "instance_controller":
                 skin = self._named(url, "controller").first("skin")
                 if skin is not None:
-                    self.add(self._named(skin.attributes.get("source", ""), "geometry"), X)
+                    self.add(self._named(skin.attributes.get("source", ""), "geometry"), X, child)
 
-    def add(self, geometry: _Node, X: Array) -> None:
+    def add(self, geometry: _Node, X: Array, instance: _Node | None = None) -> None:
+        """Adds a geometry; `instance` binds the names that it calls its materials by."""
         if id(geometry) not in self._meshes:
             meshes = [(mesh, part) for mesh in geometry.all("mesh") for part in mesh.all(*_PRIMITIVES)]
-            self._meshes[id(geometry)] = [self._triangles_of(mesh, part) for mesh, part in meshes]
-        for points, faces in self._meshes[id(geometry)]:
+            self._meshes[id(geometry)] = [
+                (*self._triangles_of(mesh, part), part.attributes.get("material", "")) for mesh, part in meshes
+            ]
+        for points, faces, symbol in self._meshes[id(geometry)]:
             self._triangles += max(len(faces), len(points) // 3)
             if self._triangles > MAX_TRIANGLES:
                 raise UnusableMesh(f"has more than {MAX_TRIANGLES} triangles")
             if len(faces):
-                self.placed.append((points @ X[:3, :3].T + X[:3, 3], faces))
+                self.placed.append((points @ X[:3, :3].T + X[:3, 3], faces, self._colour(symbol, instance)))
+
+    def _colour(self, symbol: str, instance: _Node | None) -> Rgba | None:
+        """The diffuse colour behind a material's name; None where there is none, as with a texture: it is no fault."""
+        bound = {
+            node.attributes.get("symbol"): node.attributes.get("target", "").removeprefix("#")
+            for node in (instance.walk() if instance is not None else ())
+            if node.tag == "instance_material"
+        }
+        material = self._by_id.get(bound.get(symbol) or symbol)
+        reference = material.first("instance_effect") if material is not None else None
+        url = reference.attributes.get("url", "") if reference is not None else ""
+        effect = self._by_id.get(url.removeprefix("#"))
+        for tag in ("diffuse", "emission"):
+            holder = next((node for node in effect.walk() if node.tag == tag), None) if effect is not None else None
+            words = colour.text.split() if holder is not None and (colour := holder.first("color")) is not None else []
+            try:
+                r, g, b, a = (min(max(float(word), 0.0), 1.0) for word in [*words, "1"][:4])
+            except ValueError:
+                continue
+            return (r, g, b, a)
+        return None
 
     def _triangles_of(self, mesh: _Node, part: _Node) -> tuple[Array, Faces]:
         """Vertices (n, 3) of one primitive element and its faces (m, 3)."""

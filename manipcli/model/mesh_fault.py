@@ -9,6 +9,9 @@ MAX_TRIANGLES = 2_000_000
 
 Faces = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 """(m, 3): each row the vertices of a triangle."""
+Rgba = tuple[float, float, float, float]
+Colours = tuple[tuple[int, Rgba | None], ...]
+"""Index of the first face of each run of one colour, with the colour (0 to 1), or None where the file says none."""
 
 
 class UnusableMesh(Exception):

@@ -13,10 +13,11 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Transform
+from manipcli.model.mesh_fault import Rgba
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
-from manipcli.replay.surface import Rgba, Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 
 Layer = Literal["visual", "collision", "inertia"]
 LAYERS: tuple[Layer, ...] = ("visual", "collision", "inertia")

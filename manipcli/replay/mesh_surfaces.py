@@ -1,46 +1,101 @@
-"""Mesh files as coloured surfaces."""
+"""Mesh files as coloured surfaces: the triangles that everything else gets, too, and the colours of the file."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from manipcli.replay.surface import Rgba, Surface, smoothed
+from manipcli.model.mesh import TriangleMesh, read_mesh
+from manipcli.model.mesh_fault import Rgba, UnusableMesh
+from manipcli.replay.surface import Surface, smoothed
+
+MAX_MATERIAL_BYTES = 1_000_000
 
 
 class UnreadableMesh(Exception):
     """A mesh file that cannot be drawn, and why."""
 
 
-@lru_cache(maxsize=256)
 def mesh_surfaces(path: Path) -> tuple[Surface, ...]:
     """The surfaces of a mesh file in its own frame, unscaled; each colour of the file is one.
 
     Raises:
         UnreadableMesh: it is absent, of an unknown kind, damaged or empty.
     """
-    import trimesh
-
-    if not path.is_file():
-        raise UnreadableMesh(f"there is no file '{path.name}'")
     try:
-        scene = trimesh.load_scene(path)
-        parts = scene.dump()
-    except Exception as error:
-        raise UnreadableMesh(f"'{path.name}' cannot be read as a mesh") from error
-    found = [smoothed(part.vertices, part.faces, _colour(part)) for part in parts if isinstance(part, trimesh.Trimesh)]
-    found = [one for one in found if len(one.faces)]
-    if not found or not all(np.isfinite(one.vertices).all() for one in found):
-        raise UnreadableMesh(f"'{path.name}' holds no triangle that can be drawn")
-    return tuple(found)
+        mesh = read_mesh(path)
+    except UnusableMesh as error:
+        raise UnreadableMesh(f"'{path.name}' {error.reason}") from error
+    return _surfaces(path, _Whole(mesh))
 
 
-def _colour(part: object) -> Rgba | None:
-    material = getattr(getattr(part, "visual", None), "material", None)
-    main = getattr(material, "main_color", None)
-    if main is None:
-        return None
-    r, g, b, a = (float(value) / 255.0 for value in main)
-    return (r, g, b, a)
+class _Whole:
+    """A mesh as a cache key: the reader answers with the same object while the file does not change."""
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+
+    def __hash__(self) -> int:
+        return id(self.mesh)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Whole) and other.mesh is self.mesh
+
+
+@lru_cache(maxsize=64)
+def _surfaces(path: Path, whole: _Whole) -> tuple[Surface, ...]:
+    mesh = whole.mesh
+    colours = mesh.colours or (tuple(_obj_colours(path)) if mesh.format == "obj" else ())
+    faces: dict[Rgba | None, list[slice]] = {}
+    for (first, rgba), (last, _) in pairwise([*(colours or ((0, None),)), (len(mesh.faces), None)]):
+        faces.setdefault(rgba, []).append(slice(first, last))
+    made = [
+        smoothed(mesh.vertices, np.concatenate([mesh.faces[part] for part in parts]), rgba)
+        for rgba, parts in faces.items()
+    ]
+    return tuple(one for one in made if len(one.faces))
+
+
+def _obj_colours(path: Path) -> Iterator[tuple[int, Rgba | None]]:
+    """The runs of one colour of an OBJ file whose materials lie beside it; textures are left out."""
+    known: dict[bytes, Rgba] = {}
+    yield 0, None
+    face = 0
+    for line in path.read_bytes().splitlines():
+        word, _, rest = line.strip().partition(b" ")
+        if word == b"f":
+            face += max(0, len(rest.split()) - 2)
+        elif word == b"mtllib":
+            known |= _materials(path.parent / Path(rest.strip().decode(errors="replace")).name)
+        elif word == b"usemtl":
+            yield face, known.get(rest.strip())
+
+
+def _materials(path: Path) -> dict[bytes, Rgba]:
+    """Diffuse colours of an MTL file by the names of the materials; none where it cannot be read."""
+    found: dict[bytes, Rgba] = {}
+    try:
+        if not path.is_file() or path.is_symlink() or path.stat().st_size > MAX_MATERIAL_BYTES:
+            return found
+        lines = path.read_bytes().splitlines()
+    except (OSError, ValueError):
+        return found
+    name, alpha = b"", 1.0
+    for line in lines:
+        word, _, rest = line.strip().partition(b" ")
+        try:
+            if word == b"newmtl":
+                name, alpha = rest.strip(), 1.0
+            elif word == b"Kd":
+                r, g, b = (min(max(float(value), 0.0), 1.0) for value in rest.split()[:3])
+                found[name] = (r, g, b, alpha)
+            elif word == b"d":
+                alpha = min(max(float(rest), 0.0), 1.0)
+                found[name] = (*found[name][:3], alpha) if name in found else (0.8, 0.8, 0.8, alpha)
+        except ValueError:
+            continue
+    return found

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.mesh_fault import Rgba
 from manipcli.model.robot import Box, Cylinder, Sphere
 
-Rgba = tuple[float, float, float, float]
 Faces = npt.NDArray[np.int32]
 
 SEGMENTS = 48
