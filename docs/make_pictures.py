@@ -17,6 +17,7 @@ from operator import itemgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pybullet
@@ -24,7 +25,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from manipcli.core.geometry import Transform
 from manipcli.flow.load import Task, load_task
-from manipcli.model.normalise import engine_urdf
 from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.model.scene_file import scene_from_json
@@ -82,7 +82,7 @@ class Stage:
         self._bodies = {body.name: self._add(body) for body in scene.bodies}
         with TemporaryDirectory() as folder:
             file = Path(folder) / "robot.urdf"
-            file.write_text(engine_urdf(robot, visuals=True), encoding="utf-8")
+            file.write_text(_drawable(robot), encoding="utf-8")
             X = robot.X_WB
             self._robot = pybullet.loadURDF(str(file), list(X.p), list(X.quat_xyzw), useFixedBase=True)
         infos = [pybullet.getJointInfo(self._robot, k) for k in range(pybullet.getNumJoints(self._robot))]
@@ -137,6 +137,16 @@ class Stage:
         empty = np.asarray(seen).reshape(height, width, 1) < 0
         whole = np.where(empty, sky.round().astype(np.uint8), rgb).astype(np.uint8)
         return Image.fromarray(whole).resize(PANEL, Image.Resampling.LANCZOS)
+
+
+def _drawable(robot: RobotModel) -> str:
+    """The description with the meshes' own files: those that engines get have neither normals nor colours."""
+    text = robot.urdf
+    for link in robot.links:
+        for geometry in (*link.visuals, *link.collisions):
+            if isinstance(geometry.shape, Mesh):
+                text = text.replace(quoteattr(geometry.shape.uri), quoteattr(str(geometry.shape.path)))
+    return text
 
 
 def _drawn(shape: Shape, rgba: Sequence[float]) -> int:
