@@ -32,6 +32,6 @@ def test_the_script_draws_the_pour_from_its_log(pour_run, tmp_path: Path) -> Non
     red, green, blue = (pixels[..., k] for k in range(3))
     cup = (green > red + 10) & (green > blue + 10)
     arm = (pixels.min(axis=-1) > 225) & (pixels.min(axis=-1) < 254)  # the gaps between panels are 255
-    for seen, least in ((cup, 200), (arm, 2000)):
+    for seen, least in ((cup, 200), (arm, 1000)):
         for row in seen:
             assert all(panel.sum() > least for panel in np.array_split(row, 3, axis=1))
