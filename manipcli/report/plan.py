@@ -41,16 +41,21 @@ class Limiting:
 
 
 def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
-    """What a time-optimal motion is limited by: the greatest |v| / v_max or |a| / a_max over all joints and times.
+    """What a motion comes nearest to: the greatest |v| / v_max, |a| / a_max or |da/dt| / j_max of all joints and times.
 
-    None where the points carry neither, or no limit is stated.
+    A time-optimal motion at full speed uses all of one of them; at `speed: 0.5` half. None where the points carry none
+    of these, or no limit is stated.
     """
     used: list[Limiting] = []
+    jerks = None
+    if trajectory.accelerations is not None and len(trajectory.times) > 1:
+        jerks = np.diff(trajectory.accelerations, axis=0) / np.diff(trajectory.times)[:, None]
     for k, name in enumerate(trajectory.names):
         limits = robot.joint(name).limits
         for quantity, values, limit in (
             ("velocity", trajectory.velocities, limits.velocity),
             ("acceleration", trajectory.accelerations, limits.acceleration),
+            ("jerk", jerks, limits.jerk),
         ):
             if values is not None and limit:
                 used.append(Limiting(name, quantity, float(np.abs(values[:, k]).max()) / limit))
@@ -74,7 +79,7 @@ def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) 
             )
         )
         previous = motion.step_id
-    headers = ("step", "verb", "motion", "duration", "limited by", "used")
+    headers = ("step", "verb", "motion", "duration", "nearest limit", "used")
     total = sum(motion.duration for motion in motions)
     summary = f"✓ {task} planned: {len(motions)} motion{'' if len(motions) == 1 else 's'}, {total:.2f} s"
     return f"{table(headers, rows, right=('duration', 'used'))}\n\n{summary}"

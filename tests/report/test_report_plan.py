@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.report.plan import limiting
+
+
+def robot(*, velocity: float, acceleration: float, jerk: float | None) -> RobotModel:
+    limits = JointLimits(-9.0, 9.0, velocity, 1.0, acceleration, jerk)
+    joint = Joint("j", "revolute", "a", "b", Transform.identity(), frozen((0, 0, 1)), limits)
+    links = tuple(Link(name=name, inertial=None, visuals=(), collisions=()) for name in ("a", "b"))
+    return RobotModel("r", "a", links, (joint,), (), (), (), Transform.identity(), "")
+
+
+def cosine() -> JointTrajectory:
+    """q = 1 - cos(t) over one turn: velocity, acceleration and jerk all reach 1."""
+    t = np.linspace(0.0, 2 * np.pi, 2001)
+    columns = [values[:, None] for values in (1 - np.cos(t), np.sin(t), np.cos(t))]
+    return JointTrajectory(("j",), t, *columns)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "jerk", "nearest"),
+    [
+        (2.0, 3.0, 4.0, "velocity"),
+        (3.0, 2.0, 4.0, "acceleration"),
+        (4.0, 3.0, 2.0, "jerk"),
+        (2.0, 3.0, None, "velocity"),
+    ],
+)
+def test_the_nearest_limit_is_the_one_used_most(
+    velocity: float, acceleration: float, jerk: float | None, nearest: str
+) -> None:
+    found = limiting(cosine(), robot(velocity=velocity, acceleration=acceleration, jerk=jerk))
+    assert found is not None
+    assert (found.joint, found.quantity) == ("j", nearest)
+    assert found.fraction == pytest.approx(0.5, rel=1e-5)  # differences of neighbours, 3 ms apart
+
+
+def test_points_without_derivatives_say_nothing_of_limits() -> None:
+    bare = JointTrajectory(("j",), np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))
+    assert limiting(bare, robot(velocity=1.0, acceleration=1.0, jerk=1.0)) is None
