@@ -103,6 +103,7 @@ def watched_run(folder: Path) -> tuple[float, Cost]:
         refuses=member.refuses,
         open=partial(Watched, cost),
         version=member.version,
+        prepare=member.prepare,
     )
     with patch("manipcli.flow.execute.ENGINES", {"pybullet": watched}):
         report = run_task(POUR, log=folder / "pour.mcap", force=True)

@@ -14,7 +14,7 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.execute import Progress, controllers, simulate
-from manipcli.flow.load import Task, load_task
+from manipcli.flow.load import Task, load_libraries, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task
 from manipcli.record.recorder import Recorder
@@ -67,6 +67,7 @@ def run_task(
     """
     began = time.perf_counter()
     task = load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
+    load_libraries(task)
     loaded = time.perf_counter()
     plan = plan_task(task)
     planned = time.perf_counter()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +22,7 @@ from manipcli.model.conditions import CONDITIONS
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
+from manipcli.plan import retimer
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -180,6 +182,15 @@ def named_scene(spec: TaskSpec) -> Scene:
     )  # fmt: skip
     frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
     return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, 0.0]))
+
+
+def load_libraries(task: Task) -> None:
+    """Import now what planning, simulating and recording would import at their first use, so that the time of each of
+    them is its own."""
+    for name in ("coal", "pinocchio", "ruckig", "mcap.records", "mcap.opcode", "zstandard"):
+        import_module(name)
+    retimer.library()
+    ENGINES[task.spec.simulation.engine].prepare()
 
 
 def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:

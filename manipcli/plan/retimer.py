@@ -48,7 +48,7 @@ def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: fl
     points = path.waypoints
     if len(points) <= 2:
         return rest_to_rest(points[0], points[-1], limits, period=period, duration=duration)
-    toppra = _toppra()
+    toppra = library()
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     spline = toppra.SplineInterpolator(np.concatenate(([0.0], np.cumsum(chords))), points)
     count = int(np.clip(_PER_WAYPOINT * len(points), *_GRID))
@@ -131,7 +131,7 @@ def _averaged(progress: Progress, nominal: float, window: float, period: float) 
     return smooth, float(at[-1])
 
 
-def _toppra() -> ModuleType:
+def library() -> ModuleType:
     """The library, without the half of its import time that goes into matplotlib, which only its plots use."""
     with _late("matplotlib", "matplotlib.pyplot"):
         import toppra

@@ -78,6 +78,7 @@ class EngineMember:
         refuses: (robot) -> everything for which the engine cannot hold this robot.
         open: (robot, scene, settings) -> a running engine, for a robot that it does not refuse.
         version: of the engine, for the log.
+        prepare: imports the engine's library, which otherwise the first world does.
     """
 
     name: str
@@ -85,3 +86,4 @@ class EngineMember:
     refuses: Callable[[RobotModel], tuple[Finding, ...]]
     open: Callable[[RobotModel, Scene, EngineSettings], Engine]
     version: Callable[[], str]
+    prepare: Callable[[], object]

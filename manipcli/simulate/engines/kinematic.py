@@ -70,4 +70,10 @@ def _refuses(robot: RobotModel) -> tuple[Finding, ...]:
     return ()
 
 
-MEMBER = EngineMember(name="kinematic", physics="none", refuses=_refuses, open=KinematicEngine, version=_version)
+def _prepare() -> None:
+    """Needs no library."""
+
+
+MEMBER = EngineMember(
+    name="kinematic", physics="none", refuses=_refuses, open=KinematicEngine, version=_version, prepare=_prepare
+)

@@ -47,11 +47,9 @@ class PybulletEngine:
     def __init__(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         if refused := refuses(robot):
             raise InvalidInput(refused)
-        with silence():
-            import pybullet
-
+        pybullet = _library()
         with stdout_to_stderr():
-            self._p: ModuleType = pybullet
+            self._p = pybullet
             self._client: int = pybullet.connect(pybullet.DIRECT)
             try:
                 self._build(robot, scene, settings)
@@ -361,6 +359,15 @@ def _cross(a: Vector, b: Vector) -> Vector:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
+def _library() -> ModuleType:
+    """PyBullet, without its banner."""
+    with silence():
+        import pybullet
+
+    library: ModuleType = pybullet
+    return library
+
+
 def _version() -> str:
     from importlib.metadata import PackageNotFoundError, version
 
@@ -385,4 +392,6 @@ def refuses(robot: RobotModel) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-MEMBER = EngineMember(name="pybullet", physics="full", refuses=refuses, open=PybulletEngine, version=_version)
+MEMBER = EngineMember(
+    name="pybullet", physics="full", refuses=refuses, open=PybulletEngine, version=_version, prepare=_library
+)
