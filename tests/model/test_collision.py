@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.collision import Carried, CollisionChecker, pairs
+from manipcli.model.collision import Carried, CollisionChecker, CollisionQuery, pairs
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, Mesh, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
@@ -195,3 +195,17 @@ def test_a_mesh_counts_as_its_convex_hull(tmp_path: Path) -> None:
     hit = CollisionChecker(Kinematics(robot()), scene(body("rock", mesh, (3.0, 0.07, 0.0)))).at().check(np.zeros(3))
     assert hit is not None
     assert hit.distance == pytest.approx(-0.03, abs=1e-4)
+
+
+def test_what_is_absent_or_not_asked_for_is_not_hit() -> None:
+    """The last ball meets a post, the one before it a can."""
+    post, can = body("post", Sphere(0.2), (3.2, 0.0, 0.0)), body("can", Sphere(0.2), (2.0, 0.2, 0.0), fixed=False)
+    checker = CollisionChecker(Kinematics(robot()), scene(post, can))
+
+    def hits(query: CollisionQuery) -> list[tuple[str, str]]:
+        return [(hit.a, hit.b) for hit in query.every(np.zeros(3))]
+
+    assert hits(checker.at()) == [("can", "robot/b"), ("post", "robot/c")]
+    assert hits(checker.at(absent=("can",))) == [("post", "robot/c")]
+    assert hits(checker.at(only="can")) == [("can", "robot/b")]
+    assert hits(checker.at(only="robot/c")) == [("post", "robot/c")]
