@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
+from manipcli.core.text import did_you_mean
 from manipcli.model.bounds import BoundName, bounds, raised
 
 MAX_EXPRESSION: Final = 10_000
@@ -56,15 +57,18 @@ _METHODS: Final[dict[type, frozenset[str]]] = {
 
 
 class Refused(Exception):
-    """An expression asks for something that descriptions may not do."""
+    """An expression asks for something that descriptions may not do; `hint` says what to do instead."""
+
+    def __init__(self, message: str, *, hint: str | None = None) -> None:
+        self.hint = hint
+        super().__init__(message)
 
 
 class Beyond(Refused):
     """A bound is met; `hint` says which and how it is raised."""
 
     def __init__(self, message: str, bound: BoundName) -> None:
-        self.hint = raised(bound)
-        super().__init__(message)
+        super().__init__(message, hint=raised(bound))
 
 
 def size_of(value: Value) -> int:
@@ -235,7 +239,13 @@ class Evaluator:
         container = self._value(node.value, names)
         if not isinstance(container, str | list | tuple | dict):
             raise Refused(f"'{ast.unparse(node.value)[:80]}' has no items")
-        return container[self._index(node.slice, names)]  # type: ignore[call-overload,index]
+        index = self._index(node.slice, names)
+        try:
+            return container[index]  # type: ignore[call-overload,index]
+        except LookupError:
+            near = did_you_mean(str(index), map(str, list(container)[:100])) if isinstance(container, dict) else None
+            message = f"'{ast.unparse(node.value)[:80]}' has no item {str(index)[:80]!r}"
+            raise LookupError(f"{message} ({near})" if near else message) from None
 
     def _index(self, node: ast.expr, names: Mapping[str, Value]) -> Value:
         if isinstance(node, ast.Slice):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.model.bounds import bounds, raised
@@ -55,14 +55,15 @@ def read_document(path: Path) -> Document:
     file = shown_path(path)
     try:
         if not path.is_file():
-            raise invalid("URDF001", f"'{file}' is not a regular file")
+            what = "is a folder" if path.is_dir() else "is no regular file" if path.exists() else "is not there"
+            raise invalid("URDF001", f"'{file}' {what}", Place(file, 0, 0))
         with path.open("rb") as stream:
             data = stream.read(bounds().file_bytes + 1)
         if len(data) > bounds().file_bytes:
             message = f"the file is larger than {bounds().file_bytes / 1e6:g} MB"
             raise invalid("URDF052", message, Place(file, 1, 1), raised("file_bytes"))
     except OSError as error:
-        raise invalid("URDF001", f"cannot read '{file}': {error.strerror}") from error
+        raise invalid("URDF001", f"cannot read '{file}': {error.strerror}", Place(file, 0, 0)) from error
     return parse_document(data, file)
 
 
@@ -106,14 +107,26 @@ def parse_document(data: bytes, file: str) -> Document:
         def start_doctype_decl_handler(self, *declaration: object) -> None:
             raise invalid("URDF051", "a DOCTYPE is not allowed in a description", self.place(), "delete it")
 
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) or data[:2] in (b"<\0", b"\0<"):
+        raise invalid("URDF001", "the file is UTF-16, which few programs read", Place(file, 1, 1), "save it as UTF-8")
+    builder = Builder()
     try:
-        document: Document = Builder().parseString(data)
+        document: Document = builder.parseString(data)
     except expat.ExpatError as error:
         message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise invalid("URDF001", message, Place(file, error.lineno, error.offset + 1)) from error
+        place = Place(file, error.lineno, error.offset + 1)
+        raise invalid("URDF001", message, place, _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
     return document
+
+
+def _open_element(node: Node | None) -> str | None:
+    """The hint that names the element in which a document broke off."""
+    if node is None or node.nodeType != node.ELEMENT_NODE:
+        return None
+    element = cast("DomElement", node)
+    return f"<{element.tagName[:60]}> of line {place.line} is open" if (place := place_of(element)) else None
 
 
 class _CopyPlace:

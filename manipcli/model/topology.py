@@ -11,7 +11,12 @@ from manipcli.model.urdf_numbers import Reader
 
 
 def check_tree(
-    reader: Reader, links: Mapping[str, Element], joints: Mapping[str, Joint | None], elements: Mapping[str, Element]
+    reader: Reader,
+    links: Mapping[str, Element],
+    joints: Mapping[str, Joint | None],
+    elements: Mapping[str, Element],
+    *,
+    complete: bool = True,
 ) -> str:
     """Name of the root link, or '' with findings: undefined links, two parents, loops, several roots.
 
@@ -20,6 +25,7 @@ def check_tree(
         links: <link> by name.
         joints: by name; None for one that could not be read, whose links are unknown.
         elements: <joint> by name.
+        complete: there are no further joints, without a name or with one that is taken.
     """
     before = len(reader.findings)
     parent_joint: dict[str, Joint] = {}
@@ -47,7 +53,7 @@ def check_tree(
         closing = max((elements[parent_joint[link].name] for link in loop), key=_line)
         hint = "a URDF is a tree: leave one joint out"
         reader.report("URDF081", message, closing.place, hint=hint)
-    if len(reader.findings) > before or any(joint is None for joint in joints.values()):
+    if not complete or len(reader.findings) > before or None in joints.values():
         return ""
     roots = [link for link in links if link not in parent_joint]
     if len(roots) > 1:

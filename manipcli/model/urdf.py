@@ -56,7 +56,8 @@ def read_parts(description: Description) -> Parts:
     links = {key: read_link(reader, each, key, description.packages, materials) for key, each in links_by_name.items()}
     joints = {key: read_joint(reader, element, key) for key, element in joints_by_name.items()}
     known = {key: joint for key, joint in joints.items() if joint is not None}
-    top = check_tree(reader, links_by_name, joints, joints_by_name) if links else ""
+    complete = len(joints_by_name) == len(root.all("joint"))
+    top = check_tree(reader, links_by_name, joints, joints_by_name, complete=complete) if links else ""
     known = resolve_mimics(reader, known, joints_by_name)
     transmissions = read_transmissions(reader, root, joints_by_name)
     _check_point_masses(reader, links, known, places)

@@ -72,8 +72,8 @@ class Reader:
         written = f"<{element.tag} {attribute}=\"{shorten(text)}\">"
         wrong = next((word for word in words if finite(word) is None), None)
         if wrong is not None:
-            what = f"'{shorten(wrong)}' is no finite number" if len(words) > 1 else "not a finite number"
-            self.report("URDF004", f"{written}: expected {expected}; {what}", element.place)
+            message = f"{written}: expected {expected}; '{shorten(wrong)}' is no finite number"
+            self.report("URDF004", message, element.place)
             return None
         if len(words) != count:
             self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)

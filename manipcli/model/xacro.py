@@ -19,7 +19,7 @@ from xml.dom.minidom import Document
 from xml.dom.minidom import Element as DomElement
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import any_of, did_you_mean, nearest
 from manipcli.model.bounds import bounds
 from manipcli.model.expression import Beyond, Evaluator, Refused, bounded, math_symbols, python_symbols
 from manipcli.model.located_xml import invalid, place_of, read_document
@@ -27,6 +27,7 @@ from manipcli.model.packages import NotFound, Packages
 from manipcli.model.xacro_yaml import load_yaml
 
 _loading = threading.Lock()
+_ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "Invalid parameter", "unknown macro")
 _DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
 
 
@@ -88,6 +89,8 @@ class _Expansion:
         self._current: DomElement | None = None
         self._calls: list[DomElement] = []
         self._expansions = 0
+        self._near: str | None = None
+        self._macros: object = None
         self._known_arguments: set[str] = set()
         module = self._module
         self._eval_all = module.eval_all
@@ -151,14 +154,24 @@ class _Expansion:
             if isinstance(cause, Beyond):
                 code, own_hint = "XACRO004", cause.hint
             elif isinstance(cause, Refused):
-                code, own_hint = "XACRO002", _DATA
+                code, own_hint = "XACRO002", cause.hint or _DATA
             elif isinstance(cause, UnknownArgument):
                 code, own_hint = "XACRO003", cause.hint
+            elif isinstance(cause, NotFound):
+                own_hint = cause.hint
             cause = getattr(cause, "exc", None) or cause.__cause__
-        message = "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or repr(error)
+        lines = str(error).replace(" (<unknown>, line 1)", "").splitlines()
+        message = "; ".join(line.strip() for line in lines if line.strip()) or repr(error)
+        if self._calls and message.startswith(_ABOUT_A_CALL):
+            self._current = self._calls[-1]
         around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
         hint = "expanded from " + ", from ".join(around[:8]) if around else None
-        return invalid(code, message, self._place(), own_hint or hint)
+        if message.startswith("unknown macro") and self._calls:
+            own_hint = _near_macro(self._calls[-1].tagName, _names(self._macros))
+        elif "is not defined" in message:
+            own_hint = own_hint or self._near
+        hints = [each for each in (own_hint, hint) if each]
+        return invalid(code, message, self._place(), "; ".join(hints) or None)
 
     def _warn(self, *words: object, **options: object) -> str:
         message = " ".join(str(word) for word in words)
@@ -175,7 +188,11 @@ class _Expansion:
 
     def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
         self._check_time()
-        return self._evaluate(expr, globals)
+        try:
+            return self._evaluate(expr, globals)
+        except NameError as error:
+            self._near = _near_name(error, _names(globals))
+            raise
 
     def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
         return bounded(self._eval_text(text, symbols))
@@ -195,6 +212,7 @@ class _Expansion:
         if len(self._calls) >= self._bounds.macro_depth:
             raise Beyond(f"macros call each other more than {self._bounds.macro_depth} deep", "macro_depth")
         self._calls.append(node)
+        self._macros = macros
         done = bool(self._macro_call(node, macros, symbols))
         self._calls.pop()
         return done
@@ -234,7 +252,7 @@ class _Expansion:
             try:
                 yield str(self._packages.resolve(name, relative_to=self._folder()))
             except NotFound as error:
-                raise self._exception(error.message, exc=FileNotFoundError(error.hint or "")) from error
+                raise self._exception(error.message) from error
 
     def _exception(self, message: str, **details: object) -> Exception:
         created: Exception = self._module.XacroException(message, **details)
@@ -268,10 +286,8 @@ class _Expansion:
         """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
         name, _, default = rest.partition(" ")
         if name not in self._allow_env:
-            raise Refused(
-                f"$({command} {name}): a description may not read the environment; allow it with "
-                f"--allow-env {name}, or pass an argument ($(arg NAME)) instead"
-            )
+            hint = f"allow it with --allow-env {name}, or take an argument, $(arg NAME), instead"
+            raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
         value = os.environ.get(name)
         if value is None and command == "env":
             raise NameError(f"environment variable '{name}' is not set")
@@ -318,6 +334,26 @@ class _Expansion:
             "math": namespace(math_symbols()),
             "xacro": namespace({**own, **speak, "tokenize": _tokenize, "arg": self._argument}),
         }
+
+
+def _names(symbols: object) -> list[str]:
+    """The names that an expression could have meant: of a table of the library and of all around it."""
+    found: list[str] = []
+    while isinstance(symbols, Mapping) and len(found) < 2000:
+        found += [str(name) for name in dict.keys(symbols)] if isinstance(symbols, dict) else list(symbols)
+        symbols = getattr(symbols, "parent", None)
+    return found
+
+
+def _near_name(error: NameError, known: Collection[str]) -> str | None:
+    quoted = str(error).split("'")
+    close = nearest(quoted[1], known) if len(quoted) > 2 else ()
+    return f"did you mean {any_of(close)}?" if close else None
+
+
+def _near_macro(tag: str, known: Collection[str]) -> str | None:
+    close = nearest(tag.removeprefix("xacro:"), [name.removeprefix("xacro:") for name in known])
+    return f"did you mean <xacro:{close[0]}>?" if close else None
 
 
 def _typed(text: str) -> object:

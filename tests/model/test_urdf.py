@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from pathlib import Path
 
@@ -23,6 +24,13 @@ ENDS = '<parent link="a"/><child link="b"/>'
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
 JOINT = f'<joint name="j" type="revolute">{ENDS}<axis xyz="0 0 1"/>{LIMIT}</joint>'
 GOOD = f'<robot name="r">\n{LINK_A}\n{LINK_B}\n{JOINT}\n</robot>'
+
+
+_CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+_FACES = [[_CORNERS[k] for k in face] for face in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))]
+TETRAHEDRON = bytes(80) + struct.pack("<I", 4) + b"".join(
+    struct.pack("<12f2x", 0, 0, 0, *(value for corner in face for value in corner)) for face in _FACES
+)
 
 
 def read(folder: Path, text: str) -> Parts:
@@ -259,7 +267,7 @@ def test_a_mesh_is_named_without_the_machine_it_lies_on(tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     mesh = tmp_path / "arm" / "meshes" / "x.stl"
     mesh.parent.mkdir()
-    mesh.write_bytes(b"")
+    mesh.write_bytes(TETRAHEDRON)
     for uri in ("../meshes/x.stl", "package://arm/meshes/x.stl", f"file://{mesh}"):
         shape = f'<collision><geometry><mesh filename="{uri}" scale="1 -1 0.001"/></geometry></collision>'
         parts = read(folder, link_b(INERTIAL + shape))

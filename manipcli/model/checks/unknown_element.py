@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import did_you_mean, shorten
+from manipcli.core.text import nearest, shorten
 from manipcli.model.check import Check, Subject
 from manipcli.model.urdf_schema import RULES, is_foreign, known_elements
 
@@ -16,8 +16,8 @@ def _find(subject: Subject) -> Iterator[Finding]:
             if child.tag in RULES or child.tag == "transmission" or is_foreign(child.tag):
                 continue
             message = f"unknown element <{shorten(child.tag)}> in <{element.tag}>; it is ignored"
-            known = [*rule.children, *RULES] if len(child.tag) < 40 else []
-            yield Finding("URDF053", message, child.place, did_you_mean(child.tag, known), "warning")
+            close = nearest(child.tag, [*sorted(rule.children), *RULES]) if len(child.tag) < 40 else ()
+            yield Finding("URDF053", message, child.place, f"did you mean <{close[0]}>?" if close else None, "warning")
 
 
 CHECK = Check(
