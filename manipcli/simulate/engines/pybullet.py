@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-from operator import attrgetter
 from pathlib import Path
 from types import ModuleType
 from typing import Final, cast
@@ -19,6 +18,7 @@ from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
+from manipcli.simulate.engines.pybullet_contacts import ContactMerger, Vector
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
@@ -30,13 +30,6 @@ UNLIMITED_EFFORT: Final = 1e6
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
 """What a mimic coupling may carry [N m or N]."""
-
-Vector = tuple[float, float, float]
-Pair = tuple[int, int, int, int]
-"""Body a, body b, link of a, link of b."""
-ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float]
-"""What PyBullet says of a contact point, up to its distance and normal force."""
-_sides = attrgetter("a", "b")
 
 
 class PybulletEngine:
@@ -66,11 +59,9 @@ class PybulletEngine:
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )
-        self._names: dict[int, str] = {}
-        self._parts_of: dict[Pair, tuple[str, str]] = {}
         with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
             self._bodies = [self._add_body(body, Path(folder)) for body in scene.bodies]
-            self._load_robot(robot, Path(folder))
+            self._load_robot(robot, scene, Path(folder))
         self._movable = [
             (k, *_centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
@@ -135,10 +126,9 @@ class PybulletEngine:
         )
         if not body.fixed:
             p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
-        self._names[k] = body.name
         return cast(int, k)
 
-    def _load_robot(self, robot: RobotModel, folder: Path) -> None:
+    def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
         p, client = self._p, self._client
         file = folder / "robot.urdf"
         file.write_text(engine_urdf(robot, folder), encoding="utf-8")
@@ -154,8 +144,8 @@ class PybulletEngine:
         infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
         self._joints = [by_name[name] for name in robot.joint_names]
-        self._link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
-        for link in self._link_names:
+        link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
+        for link in link_names:
             p.changeDynamics(
                 self._robot,
                 link,
@@ -164,8 +154,11 @@ class PybulletEngine:
                 lateralFriction=robot.friction,
                 physicsClientId=client,
             )
-        self._names[self._robot] = "robot"
-        unlike = list(differences(p, client, self._robot, robot, self._link_names))
+        self._merge = ContactMerger(
+            {(k, -1): body.name for body, k in zip(scene.bodies, self._bodies, strict=True)}
+            | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()}
+        ).merged
+        unlike = list(differences(p, client, self._robot, robot, link_names))
         if unlike:
             self.close()
             raise ManipcliError(f"Bullet holds another robot than '{robot.name}': {'; '.join(unlike)}")
@@ -276,43 +269,10 @@ class PybulletEngine:
             self._p.stepSimulation(self._client)
 
     def robot_contacts(self) -> tuple[Contact, ...]:
-        return self._merged(self._p.getContactPoints(self._robot, physicsClientId=self._client))
+        return self._merge(self._p.getContactPoints(self._robot, physicsClientId=self._client))
 
     def contacts(self) -> tuple[Contact, ...]:
-        return self._merged(self._p.getContactPoints(physicsClientId=self._client))
-
-    def _merged(self, points: tuple[ContactPoint, ...]) -> tuple[Contact, ...]:
-        """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
-        forces: dict[Pair, float] = {}
-        depths: dict[Pair, float] = {}
-        for point in points:
-            distance, force = point[8], point[9]
-            if force > 0.0 or distance <= 0.0:
-                pair = point[1:5]
-                if pair not in forces:
-                    forces[pair], depths[pair] = force, distance
-                else:
-                    forces[pair] += force
-                    if distance < depths[pair]:
-                        depths[pair] = distance
-        if not forces:
-            return ()
-        found = [Contact(*self._parts(pair), force, depths[pair]) for pair, force in forces.items()]
-        if len(found) > 1:
-            found.sort(key=_sides)
-        return tuple(found)
-
-    def _parts(self, pair: Pair) -> tuple[str, str]:
-        """The names of the two, in their order."""
-        known = self._parts_of.get(pair)
-        if known is None:
-            body_a, body_b, link_a, link_b = pair
-            a, b = self._part(body_a, link_a), self._part(body_b, link_b)
-            known = self._parts_of[pair] = (a, b) if a <= b else (b, a)
-        return known
-
-    def _part(self, body: int, link: int) -> str:
-        return f"robot/{self._link_names[link]}" if body == self._robot else self._names[body]
+        return self._merge(self._p.getContactPoints(physicsClientId=self._client))
 
     def close(self) -> None:
         if self._client >= 0:

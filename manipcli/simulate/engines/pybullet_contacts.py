@@ -1,0 +1,55 @@
+"""PyBullet's contact points as contacts: one a touching pair of parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from operator import attrgetter
+
+from manipcli.model.state import Contact
+
+Vector = tuple[float, float, float]
+Pair = tuple[int, int, int, int]
+"""Body a, body b, link of a, link of b."""
+ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float]
+"""What PyBullet says of a contact point, up to its distance and normal force."""
+_sides = attrgetter("a", "b")
+
+
+class ContactMerger:
+    """Sums up contact points. `parts`: the name of every (body, link); a body's base is its link -1."""
+
+    def __init__(self, parts: Mapping[tuple[int, int], str]) -> None:
+        self._parts = parts
+        self._known: dict[Pair, tuple[str, str]] = {}
+
+    def merged(self, points: tuple[ContactPoint, ...]) -> tuple[Contact, ...]:
+        """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
+        forces: dict[Pair, float] = {}
+        depths: dict[Pair, float] = {}
+        for point in points:
+            distance, force = point[8], point[9]
+            if force > 0.0 or distance <= 0.0:
+                pair = point[1:5]
+                if pair not in forces:
+                    forces[pair], depths[pair] = force, distance
+                else:
+                    forces[pair] += force
+                    if distance < depths[pair]:
+                        depths[pair] = distance
+        if not forces:
+            return ()
+        known = self._known
+        found = []
+        for pair, force in forces.items():
+            a, b = known.get(pair) or self._names(pair)
+            found.append(Contact(a, b, force, depths[pair]))
+        if len(found) > 1:
+            found.sort(key=_sides)
+        return tuple(found)
+
+    def _names(self, pair: Pair) -> tuple[str, str]:
+        """The two names in their order, remembered."""
+        body_a, body_b, link_a, link_b = pair
+        a, b = self._parts[body_a, link_a], self._parts[body_b, link_b]
+        names = self._known[pair] = (a, b) if a <= b else (b, a)
+        return names
