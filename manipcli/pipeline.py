@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manipcli.control.manager import ControllerManager
-from manipcli.core.errors import Finding, SimulationFailed
+from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.load import Task, load_libraries, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
-from manipcli.flow.plan import Plan, plan_task
+from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.record.recorder import Recorder
 from manipcli.report.run_report import RunReport, Timing
 
@@ -58,18 +58,22 @@ def run_task(
         progress: told of steps and ticks.
 
     Returns:
-        The verdict on the log, and how long what took. A simulation that left the plausible, or was interrupted, is
-        in the verdict, too.
+        The verdict on the log, and how long what took. A step that cannot be planned (nothing was simulated, there
+        is no log), a simulation that left the plausible, or an interruption is in the verdict, too.
 
     Raises:
         InvalidInput: a file or the log's path cannot be used; nothing was simulated.
-        NotPlannable: a step has no plan; nothing was simulated.
     """
     began = time.perf_counter()
     task = load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
     load_libraries(task)
     loaded = time.perf_counter()
-    plan = plan_task(task)
+    try:
+        plan = plan_task(task)
+    except NotPlannable as refusal:
+        took = time.perf_counter() - began
+        timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
+        return RunReport(refused(task, refusal), wall_time=took, real_time_factor=0.0, log=None, timing=timing)
     planned = time.perf_counter()
 
     manager = controllers(task)

@@ -11,6 +11,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.plan.hand import with_mimics
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
@@ -80,6 +81,36 @@ def plan_task(task: Task) -> Plan:
     planner = _planner(task)
     start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     return Plan(steps=tuple(_steps(task, planner, start)), start=start, planner=planner)
+
+
+def refused(task: Task, refusal: NotPlannable) -> Verdict:
+    """The verdict on a task that was never run, because one of its steps cannot be planned."""
+    reason = "a step cannot be planned"
+    return Verdict(
+        task=task.name,
+        verdict="failed",
+        seed=task.spec.simulation.seed,
+        engine=task.spec.simulation.engine,
+        simulated_time=0.0,
+        steps=tuple(
+            StepOutcome(
+                id=str(step.id),
+                verb=step.verb,
+                outcome="failed" if step.id == refusal.step else "not_run",
+                started=None,
+                ended=None,
+                planned_duration=0.0,
+                text=f"cannot be planned: {refusal.cause}" if step.id == refusal.step else "",
+            )
+            for step in task.spec.steps
+        ),
+        expectations=tuple(
+            ExpectationOutcome(expected.name, "not_evaluated", margin=None, unit="", at=None, text=reason)
+            for expected in task.spec.expect
+        ),
+        errors=refusal.findings,
+        text=f"{reason}: {refusal}",
+    )
 
 
 def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:

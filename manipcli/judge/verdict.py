@@ -42,7 +42,7 @@ class ExpectationOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The judgement of one recording. `errors` is empty unless the verdict is `error`."""
+    """The judgement of one recording. `errors`: why there is none, or why it is incomplete or was never made."""
 
     task: str
     verdict: VerdictWord

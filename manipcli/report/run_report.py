@@ -26,14 +26,14 @@ class RunReport:
         verdict: read from the log alone.
         wall_time: [s] of the whole run.
         real_time_factor: simulated time over the wall time of its simulation.
-        log: path of the log, as text.
+        log: path of the log, as text; None where nothing was run.
         timing: the parts of `wall_time`.
     """
 
     verdict: Verdict
     wall_time: float
     real_time_factor: float
-    log: str
+    log: str | None
     timing: Timing
 
 

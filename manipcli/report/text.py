@@ -17,7 +17,10 @@ PASS, FAIL = "✓", "✗"
 
 
 def render_run(report: RunReport, *, verbose: bool = False) -> str:
-    """A run: the verdict, then how fast it went and where its log is."""
+    """A run: the verdict, then how fast it went and where its log is; of one that was refused, why."""
+    if report.log is None:
+        mark, verdict = FAIL, report.verdict
+        return "\n".join([*map(describe, verdict.errors), f"{mark} {verdict.task} {verdict.verdict}: nothing was run"])
     speed = (
         f"{report.verdict.simulated_time:.2f} s simulated, {report.wall_time:.2f} s real "
         f"({report.real_time_factor:.1f} x real time while simulating)"

@@ -70,6 +70,14 @@ def refused(ran: Ran, code: int) -> str:
     return str(ran.err)
 
 
+def unplannable(ran: Ran) -> str:
+    """A verdict, so on stdout."""
+    assert ran.code == 1, ran
+    assert "nothing was run" in ran.out
+    assert "Traceback" not in ran.err
+    return ran.out
+
+
 INVALID = {
     "empty": ("", "not an empty file"),
     "binary": (b"\x00\x01\xff\xfe" * 50, "not UTF-8"),
@@ -161,19 +169,20 @@ def test_an_impossible_step_is_refused_before_anything_moves(call: Call, tmp_pat
     steps, told = UNPLANNABLE[case]
     task = written(tmp_path, HEAD + SCENE + "start: home\n" + steps)
     before = files(tmp_path)
-    for command in ("run", "plan"):
-        text = refused(call(command, task), 1)
+    for text in (unplannable(call("run", task)), refused(call("plan", task), 1)):
         for word in told:
             assert word in text, text
     answer = json.loads(call("run", task, "--format", "json").out)
-    assert answer["verdict"] == "failed"
+    assert (answer["task"], answer["verdict"], answer["log"]) == ("refused", "failed", None)
     assert told[0] in answer["errors"][0]["message"]
+    outcomes = [step["outcome"] for step in answer["steps"]]
+    assert outcomes.count("failed") == 1
+    assert set(outcomes) <= {"failed", "not_run"}
     assert files(tmp_path) == before
 
 
 def test_a_cup_out_of_reach_is_told_with_its_step(call: Call, tmp_path: Path) -> None:
-    ran = call("run", ROOT / "tasks" / "pour.yaml", "--set", "scene.cup.at=[1.12, 0.0]")
-    text = refused(ran, 1)
+    text = unplannable(call("run", ROOT / "tasks" / "pour.yaml", "--set", "scene.cup.at=[1.12, 0.0]"))
     assert "step 'pick_1': no way to pick 'cup'" in text
     assert "reach" in text
     assert not files(tmp_path)
