@@ -38,13 +38,13 @@ def framing(
     """A camera that has everything in view, as near as that allows.
 
     Args:
-        drawing: what is shown; collision shapes count where nothing is to be seen.
+        drawing: what is shown.
         poses: one instant.
         aspect: width over height of the picture.
         leave_out: frames that need not be in view, as the floor.
     """
     index = {name: k for k, name in enumerate(drawing.frames)}
-    shown = [one for one in drawing.layer("visual") or drawing.layer("collision") if one.frame not in leave_out]
+    shown = [one for one in drawing.layer("visual") if one.frame not in leave_out]
     clouds = [poses.X_WF(index[one.frame]).apply(one.surface.vertices) for one in shown]
     points = np.concatenate([*clouds, np.zeros((0, 3))])
     if not len(points):

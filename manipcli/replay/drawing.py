@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -88,7 +88,8 @@ def link_frame(link: str) -> str:
 def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
     """The drawing of a robot, a scene, or both.
 
-    Collision meshes are drawn as their convex hulls, which is what planner and physics take them for.
+    Collision meshes are drawn as their convex hulls, which is what planner and physics take them for. The collision
+    shapes of a link stand in for its visual ones where it has none that can be drawn.
     """
     missing: list[str] = []
     frames: list[str] = [WORLD]
@@ -110,8 +111,13 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
 
 def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
     frame = link_frame(link.name)
-    yield from _shapes("visual", frame, link.visuals, None, missing)
-    yield from _shapes("collision", frame, link.collisions, COLLISION, missing)
+    seen = list(_shapes("visual", frame, link.visuals, None, missing))
+    touched = list(_shapes("collision", frame, link.collisions, COLLISION, missing))
+    # A link that has nothing to show, or whose meshes are missing, is better seen by what it touches with than not.
+    instead = () if seen else touched
+    yield from seen
+    yield from (replace(one, name=f"{one.name}_seen", layer="visual", rgba=PLAIN) for one in instead)
+    yield from touched
     if link.inertial is not None:
         yield from _inertia(frame, link.inertial)
 

@@ -28,9 +28,11 @@ WIDE = {"continuous": math.pi, "revolute": math.pi, "prismatic": 1.0}
 def slider_range(joint: Joint) -> tuple[float, float]:
     """From where to where the slider of a joint goes [rad or m]."""
     lower, upper, reach = joint.limits.lower, joint.limits.upper, WIDE[joint.type]
-    low = lower if lower is not None else min(-reach, upper if upper is not None else 0.0)
-    high = upper if upper is not None else max(reach, low)
-    return low, high
+    if lower is None and upper is not None:
+        return min(-reach, upper - reach), upper
+    if lower is not None and upper is None:
+        return lower, max(reach, lower + reach)
+    return (-reach if lower is None else lower, reach if upper is None else upper)
 
 
 def pose_text(robot: RobotModel, q: Array) -> str:
@@ -74,13 +76,16 @@ class JointPanel:
         placing: joints to frames.
         q: (n,) where it is at first.
 
+    Attributes:
+        sliders: by the index of the joint in joint vectors.
+
     The page calls back in threads of the server; one lock makes one movement out of each.
     """
 
     def __init__(self, server: viser.ViserServer, robot: RobotModel, stage: Stage, placing: Placing, q: Array) -> None:
         self._robot, self._stage, self._placing = robot, stage, placing
         self._lock = threading.Lock()
-        self._sliders: dict[int, viser.GuiSliderHandle[float]] = {}
+        self.sliders: dict[int, viser.GuiSliderHandle[float]] = {}
         self._q = q
         with server.gui.add_folder("Poses"):
             for name in dict.fromkeys((*(pose.name for pose in robot.poses), ZERO)):
@@ -88,7 +93,7 @@ class JointPanel:
         with server.gui.add_folder("Joints [rad, m]"):
             for k, joint in enumerate(robot.moving_joints):
                 if joint.independent:
-                    self._sliders[k] = self._slider(server, joint, k)
+                    self.sliders[k] = self._slider(server, joint, k)
         self._text = server.gui.add_text(
             "as YAML", pose_text(robot, q), multiline=True, hint="For `poses:` of the robot file, or a step `move`."
         )
@@ -118,7 +123,7 @@ class JointPanel:
         """Show a posture, and put the sliders there."""
         self._move(q)
         # Each assignment calls `_slid`, which finds the joint there already.
-        for k, slider in self._sliders.items():
+        for k, slider in self.sliders.items():
             slider.value = float(q[k])  # type: ignore[misc]  # viser's setter hides from mypy
 
     def _slid(self, k: int, value: float) -> None:

@@ -152,7 +152,7 @@ def draw_robot(
         robot: the robot.
         path: of the file; replaced.
         pose: a named pose; `home` or else zero where None.
-        layers: visual, collision, inertia; collision shapes alone where a robot has nothing else to show.
+        layers: visual, collision, inertia.
         size: width and height [pixel].
         camera: None frames the robot.
 
@@ -160,8 +160,6 @@ def draw_robot(
         What could not be drawn, a line each.
     """
     drawing = draw(robot)
-    if layers == ("visual",) and not drawing.layer("visual"):
-        layers = ("collision",)
     return _draw(drawing, Placing(robot).start(posture(robot, pose)), path, layers, size, camera, frozenset())
 
 

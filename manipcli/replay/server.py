@@ -71,7 +71,8 @@ class LocalServer:
             self.stop()
             message = f"port {port} is taken"
             raise InvalidInput([Finding("VIEW001", message, hint="give another one, or none for the next free one")])
-        server.gui.configure_theme(show_logo=False, show_share_button=False, control_layout="collapsible")
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
 
     def __enter__(self) -> Self:
         return self

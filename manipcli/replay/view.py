@@ -26,6 +26,9 @@ class View(LocalServer):
         port: see `LocalServer`.
 
     Attributes:
+        robot: as given.
+        stage: what is shown.
+        joints: the panel.
         missing: what could not be drawn, a line each.
     """
 
@@ -38,6 +41,7 @@ class View(LocalServer):
             frozenset(body.name for body in scene.bodies if body.kind == FLOOR) if scene is not None else frozenset()
         )
         super().__init__(robot.name, port=port)
+        self.robot = robot
         self.missing = drawing.missing
         try:
             self.stage = Stage(self.viser, drawing, placing.start(position), floors=floors)

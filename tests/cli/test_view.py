@@ -1,0 +1,74 @@
+"""`manipcli view`: what it opens, what it refuses, and that Ctrl-C ends it well."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.request import urlopen
+
+import pytest
+
+from manipcli.cli.app import main
+
+ROOT = Path(__file__).parents[2]
+LINK = '<robot name="one"><link name="base"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_prints_the_address_and_ends_well(tmp_path: Path, number: signal.Signals) -> None:
+    path = tmp_path / "one.urdf"
+    path.write_text(LINK)
+    command = [sys.executable, "-m", "manipcli", "view", str(path), "--port", "0"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        assert url.startswith("http://127.0.0.1:")
+        with urlopen(url, timeout=20) as answer:
+            assert b"<html" in answer.read()
+        process.send_signal(number)
+        out, told = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert out == ""
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["gone.urdf"], "USE101", "no such file"),
+        (["one.urdf", "side=left"], "VIEW004", "NAME:=VALUE"),
+        (["one.urdf", "side:=left"], "XACRO003", "side"),
+        (["robot.yaml", "side:=left"], "VIEW002", "side"),
+        (["controllers.yaml"], "VIEW003", "controllers"),
+        (["broken.urdf"], "URDF", "broken.urdf:1:"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    code: str,
+    says: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("one.urdf").write_text(LINK)
+    Path("broken.urdf").write_text('<robot name="one"><joint name="j"/></robot>')
+    Path("robot.yaml").write_text("robot: one\ndescription: one.urdf\n")
+    Path("controllers.yaml").write_text("controllers: {}\n")
+    assert main(["view", *words]) == 4
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert code in told.err
+    assert says in told.err
+
+
+@pytest.mark.parametrize("port", ["-1", "70000", "x"])
+def test_a_port_is_a_number(port: str) -> None:
+    assert main(["view", "one.urdf", "--port", port]) == 4

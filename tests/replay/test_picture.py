@@ -1,0 +1,124 @@
+"""Pictures: what stands where in them, and the same bytes every time."""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Box, Geometry, Sphere
+from manipcli.model.scene import Body, Scene
+from manipcli.replay.camera import Camera, framing
+from manipcli.replay.drawing import draw
+from manipcli.replay.image import Image, png_bytes, sky
+from manipcli.replay.picture import Studio, draw_scene
+from manipcli.replay.placing import Placing
+
+
+def _body(name: str, shape: Box | Sphere, rgba: tuple[float, float, float, float], at: tuple[float, ...]) -> Body:
+    return Body(
+        name=name, kind="box", geometries=(Geometry(Transform.identity(), shape, rgba),), mass=1.0,
+        X_OI=Transform.identity(), inertia=frozen(np.eye(3)), friction=1.0, rolling_friction=0.0,
+        spinning_friction=0.0, restitution=0.0, fixed=False, X_WO=Transform.of(xyz=at), interior=None,
+        size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
+    )  # fmt: skip
+
+
+RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
+SCENE = Scene(
+    bodies=(_body("left", Box((0.2, 0.2, 0.2)), RED, (0.0, -0.3, 0.0)), _body("right", Sphere(0.1), BLUE, (0, 0.3, 0))),
+    frames=(),
+    gravity=frozen([0.0, 0.0, -9.8]),
+)
+FRONT = Camera(eye=(2.0, 0.0, 0.0), target=(0.0, 0.0, 0.0), field=40.0)
+
+
+def _decoded(data: bytes) -> Image:
+    """An independent reading of the PNG files that are written: one IDAT, filters 0 (none) and 2 (up)."""
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    chunks, at = {}, 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + body)
+        chunks[kind] = body
+        at += 12 + length
+    width, height, depth, colour = struct.unpack(">IIBB", chunks[b"IHDR"][:10])
+    assert (depth, colour) == (8, 2)
+    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, 1 + 3 * width)
+    image = np.zeros((height, 3 * width), dtype=np.uint8)
+    for k, row in enumerate(rows):
+        image[k] = row[1:] if row[0] == 0 or k == 0 else row[1:] + image[k - 1]
+    return image.reshape(height, width, 3)
+
+
+def test_a_png_file_holds_the_image() -> None:
+    image = np.random.default_rng(1).integers(0, 256, (7, 5, 3)).astype(np.uint8)
+    assert np.array_equal(_decoded(png_bytes(image)), image)
+
+
+def test_bodies_are_where_the_camera_sees_them_in_their_colours() -> None:
+    with Studio(draw(None, SCENE), size=(160, 120)) as studio:
+        image = studio.picture(Placing(None, SCENE).start(), FRONT)
+    assert image.shape == (120, 160, 3)
+    # 2 m away, 40 deg from top to bottom: 120 pixels are 1.456 m, so y = 0.3 is 25 pixels to the right of the middle.
+    assert image[60, 80 - 25].argmax() == 0  # seen from +x with z up, -y is to the left
+    assert image[60, 80 + 25].argmax() == 2
+    assert np.array_equal(image[0, 0], sky(120)[0, 0])
+    assert np.abs(image[60, 80].astype(int) - sky(120)[60, 0]).max() <= 1  # between the two
+    is_blue = image[..., 2].astype(int) - image[..., 0] > 60
+    # The outline of the ball: a circle of radius 0.1 / 2 m.
+    assert is_blue.sum() == pytest.approx(math.pi * (0.1 / 1.456 * 120) ** 2, rel=0.05)
+
+
+def test_a_body_that_moved_is_drawn_where_it_is_now() -> None:
+    placing = Placing(None, SCENE)
+    swapped = placing.at(
+        np.zeros(0), np.array([[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]]), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
+    )
+    with Studio(draw(None, SCENE), size=(160, 120)) as studio:
+        image = studio.picture(swapped, FRONT)
+    assert image[60, 80 + 25].argmax() == 0
+    assert image[60, 80 - 25].argmax() == 2
+
+
+def test_the_framing_has_everything_in_view_and_not_much_more(tmp_path: Path) -> None:
+    for scale in (0.01, 1.0, 100.0):
+        bodies = tuple(
+            replace(body, geometries=(replace(body.geometries[0], shape=Sphere(0.1 * scale)),), X_WO=X)
+            for body in SCENE.bodies
+            for X in [Transform.of(xyz=scale * body.X_WO.p)]
+        )
+        scene = replace(SCENE, bodies=bodies)
+        drawing, poses = draw(None, scene), Placing(None, scene).start()
+        camera = framing(drawing, poses)
+        # Its distance is at least 0.1 m, so that the smallest things do not fill the picture.
+        if scale >= 1.0:
+            with Studio(drawing, size=(160, 120)) as studio:
+                image = studio.picture(poses, camera)
+            strange = np.abs(image.astype(int) - sky(120)).max(axis=2) > 20
+            rows, columns = np.flatnonzero(strange.any(axis=1)), np.flatnonzero(strange.any(axis=0))
+            assert rows[0] > 1 and rows[-1] < 118 and columns[0] > 1 and columns[-1] < 158
+            assert max((rows[-1] - rows[0]) / 120, (columns[-1] - columns[0]) / 160) > 0.75
+
+
+def test_the_same_picture_is_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        assert draw_scene(None, SCENE, None, tmp_path / name, size=(80, 60)) == ()
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_a_surface_too_large_for_one_command_is_drawn_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Studio(draw(None, SCENE), size=(80, 60)) as studio:
+        whole = studio.picture(Placing(None, SCENE).start(), FRONT)
+    monkeypatch.setattr("manipcli.replay.picture.MAX_VERTICES", 900)  # the ball has 1106
+    with Studio(draw(None, SCENE), size=(80, 60)) as studio:
+        parts = studio.picture(Placing(None, SCENE).start(), FRONT)
+    # The same outline; only the shading along the seam differs.
+    assert np.abs(whole.astype(int) - parts).max() < 40
