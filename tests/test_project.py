@@ -17,7 +17,7 @@ PACKAGE = ROOT / "manipcli"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 HEAVY = {
     "coal", "lxml", "matplotlib", "mcap", "numpy", "pinocchio", "pybullet", "pydantic", "rich", "ruckig", "scipy",
-    "toppra", "xacro", "yaml",
+    "toppra", "viser", "xacro", "yaml",
 }  # fmt: skip
 
 
