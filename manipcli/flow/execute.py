@@ -34,6 +34,8 @@ SETTLED_SHIFT: Final = 0.01
 """A body that moves further than this [m] while settling was put where it cannot stay."""
 AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
+LEFT_BEHIND: Final = 0.05
+"""A held object further than this [m] from where it was planned is no longer held."""
 PROGRESS_TICKS: Final = 50
 
 
@@ -141,7 +143,8 @@ class _Run:
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
         self._executor = Executor(session, touch=self._physics)
-        self._world: World | None = None
+        start = session.engine.read().map(np.copy)  # the state at time 0, for words such as `to: start`
+        self._world = World(task.robot, task.scene, start)
 
     def steps(self) -> None:
         """Every step in order, until one is not done."""
@@ -192,25 +195,33 @@ class _Run:
             awaited = awaited and not motion.awaits
             texts += [end.text] if end.text else []
         if awaited and until is not None:
-            return self._executor.wait(until, deadline=deadline or self._session.time + DEFAULT_UNTIL_TIME)
-        return MotionEnd("done", "; ".join(texts)) if texts else DONE
+            end = self._executor.wait(until, deadline=deadline or self._session.time + DEFAULT_UNTIL_TIME)
+            if end.outcome != "done":
+                return end
+        return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    def _left_behind(self, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where the object that the step ends with in the hand is not there; None where it is."""
+        carried = planned.plan.end.carried
+        if carried is None or not self._physics:
+            return None
+        scene = self._task.scene
+        k = scene.movable.index(scene.body(carried.body))
+        away = float(np.linalg.norm(self._session.state.body_position[k] - planned.plan.end.bodies[k].p))
+        if away <= LEFT_BEHIND:
+            return None
+        where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
+        return MotionEnd("failed", f"{where}: it slipped, or was never held")
 
     def _until(self, step: StepSpec) -> Until | None:
         """The step's condition as a question about the live state; None where only physics could answer it."""
         if step.until is None:
             return None
         condition = CONDITIONS[step.until.name]
-        body, world = step.until.body, self._started_world()
+        body, world = step.until.body, self._world
         if not self._physics and needs_physics(condition, body, self._task.scene):
             return None
         return lambda state: bool(condition.margin(body, world, state) >= 0.0)
-
-    def _started_world(self) -> World:
-        """What conditions are asked in; the start is the state at time 0."""
-        if self._world is None:
-            state = self._session.engine.read()
-            self._world = World(self._task.robot, self._task.scene, state.map(np.copy))
-        return self._world
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str, place: str) -> None:
         self._recorder.event(
