@@ -9,6 +9,7 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
+from manipcli.model.checks import CHECKS
 from manipcli.model.description import Description
 from manipcli.model.examine import examine
 from manipcli.model.named_poses import build_groups, build_poses, interval
@@ -175,7 +176,8 @@ class _Descriptions:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
         packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
-        examination = examine(path, packages=packages, arguments=arguments)
+        grave = tuple(check for check in CHECKS if check.severity == "error")  # the others read visual meshes, too
+        examination = examine(path, packages=packages, arguments=arguments, checks=grave)
         self._reporter.findings += examination.errors
         if examination.parts is not None:
             read = [finding for finding in examination.parts.findings if finding.severity != "error"]

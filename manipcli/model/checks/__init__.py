@@ -87,6 +87,7 @@ from manipcli.model.checks.unread_number import CHECK as UNREAD_NUMBER
 from manipcli.model.checks.unstated_limit import CHECK as UNSTATED_LIMIT
 from manipcli.model.checks.unsupported_joint import CHECK as UNSUPPORTED_JOINT
 from manipcli.model.checks.unusable_mesh import CHECK as UNUSABLE_MESH
+from manipcli.model.checks.unusable_visual import CHECK as UNUSABLE_VISUAL
 from manipcli.model.checks.xacro_argument import CHECK as XACRO_ARGUMENT
 from manipcli.model.checks.xacro_bound import CHECK as XACRO_BOUND
 from manipcli.model.checks.xacro_expansion import CHECK as XACRO_EXPANSION
@@ -173,6 +174,7 @@ _ASSETS: tuple[Check, ...] = (
     MIRRORED_MESH,
     FLAT_MESH,
     COLLADA_UP_AXIS,
+    UNUSABLE_VISUAL,
 )
 _READINESS: tuple[Check, ...] = (
     TRANSMISSION,
