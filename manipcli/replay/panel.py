@@ -51,6 +51,7 @@ class LayerSwitches:
     def __init__(self, server: viser.ViserServer, stage: Stage) -> None:
         with server.gui.add_folder("Show"):
             visual = server.gui.add_checkbox("visual meshes", True)
+            clear = server.gui.add_checkbox("see-through", False, hint="Frames and centres of mass lie inside of them.")
             collision = server.gui.add_checkbox(
                 "collision shapes", False, hint="A mesh as its convex hull, which is what planner and physics take."
             )
@@ -60,6 +61,7 @@ class LayerSwitches:
             frames = server.gui.add_checkbox("frames", False, hint="x red, y green, z blue.")
             labels = server.gui.add_checkbox("names", False)
         visual.on_update(lambda _: stage.show("visual", visual.value))
+        clear.on_update(lambda _: stage.see_through(clear.value))
         collision.on_update(lambda _: stage.show("collision", collision.value))
         inertia.on_update(lambda _: stage.show("inertia", inertia.value))
         frames.on_update(lambda _: stage.show_frames(frames.value))
@@ -115,9 +117,9 @@ class JointPanel:
         return lambda _: self.go(self.named(name))
 
     def named(self, name: str) -> Array:
-        """(n,) the posture behind a button."""
+        """(n,) the posture behind a button: joints that the pose does not speak of stay where they are."""
         known = any(pose.name == name for pose in self._robot.poses)
-        return posture(self._robot, name) if known else zero_posture(self._robot)
+        return posture(self._robot, name, rest=self._q) if known else zero_posture(self._robot)
 
     def go(self, q: Array) -> None:
         """Show a posture, and put the sliders there."""

@@ -31,9 +31,15 @@ def zero_posture(robot: RobotModel) -> Array:
     return following(robot, [within(joint.limits, 0.0) for joint in robot.moving_joints])
 
 
-def posture(robot: RobotModel, pose: str | None = None) -> Array:
-    """(n,) a named pose; joints it does not speak of are at zero. None: `home` where there is one, else zero."""
-    q = np.array(zero_posture(robot))
+def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
+    """(n,) a named pose; None: `home` where there is one, else zero.
+
+    Args:
+        robot: the robot.
+        pose: its name.
+        rest: (n,) where the joints are that it does not speak of; at zero by default.
+    """
+    q = np.array(zero_posture(robot) if rest is None else rest)
     if pose is None:
         pose = next((known.name for known in robot.poses if known.name == "home"), None)
     if pose is not None:

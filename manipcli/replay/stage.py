@@ -19,8 +19,10 @@ from manipcli.replay.placing import Poses
 if TYPE_CHECKING:
     import viser
 
-AXES = 0.08
-"""Length of the axes of a frame [m]."""
+AXES = 0.04
+"""Length of the axes of a frame, as a part of the distance from the camera at first to what it looks at."""
+CLEAR = 0.35
+"""Opacity of visual meshes that one sees through."""
 GRID = 0.1
 """Width of a cell of the grid on the ground [m]."""
 BRIGHTNESS = 0.7
@@ -47,14 +49,17 @@ class Stage:
         self._server = server
         self._nodes: list[viser.FrameHandle] = []
         self._layers: dict[Layer, list[_Shown]] = {layer: [] for layer in LAYERS}
+        self._solid: list[tuple[viser.MeshHandle, float]] = []
         self._axes: list[_Shown] = []
         self._labels: list[_Shown] = []
+        camera = framing(drawing, poses, leave_out=floors).further(1.2)
+        self._length = AXES * float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
         _furnish(server)
         paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
         with server.atomic():
             for frame in drawing.frames:
                 self._nodes.append(server.scene.add_frame(paths[frame], show_axes=False))
-                if frame != WORLD:
+                if frame != WORLD and frame not in floors:
                     self._frame(f"{paths[frame]}/frame", frame.removeprefix("robot/"))
             for k, mark in enumerate(drawing.marks):
                 self._frame(f"{paths[mark.frame]}/mark_{k}", mark.name, mark.X_FM)
@@ -63,16 +68,16 @@ class Stage:
                     self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
         self.place(poses)
         self._ground(drawing, poses, floors)
-        self.look(framing(drawing, poses, leave_out=floors).further(1.2))
+        self.look(camera)
 
     def _frame(self, path: str, label: str, X: Transform | None = None) -> None:
         """Axes with a name beside them (not below: one is shown without the other), both hidden at first."""
         X = X or Transform.identity()
         axes = self._server.scene.add_frame(
             path,
-            axes_length=AXES,
-            axes_radius=AXES / 24.0,
-            origin_radius=AXES / 14.0,
+            axes_length=self._length,
+            axes_radius=self._length / 24.0,
+            origin_radius=self._length / 14.0,
             position=X.p,
             wxyz=np.roll(X.quat_xyzw, 1),
             visible=False,
@@ -97,6 +102,8 @@ class Stage:
             receive_shadow=False,  # only the ground does: on thin walls a shadow map flickers
         )
         self._layers[drawable.layer].append(mesh)
+        if drawable.layer == "visual":
+            self._solid.append((mesh, clear))
 
     def _ground(self, drawing: Drawing, poses: Poses, floors: frozenset[str]) -> None:
         """A grid at z = 0, or under what stands lower."""
@@ -137,6 +144,11 @@ class Stage:
     def show(self, layer: Layer, shown: bool) -> None:
         """Show or hide all surfaces of a layer."""
         _set(self._layers[layer], shown)
+
+    def see_through(self, clear: bool) -> None:
+        """Let the visual meshes show what lies inside of them, or not."""
+        for mesh, opacity in self._solid:
+            mesh.opacity = CLEAR * opacity if clear else (opacity if opacity < 1.0 else None)
 
     def show_frames(self, shown: bool) -> None:
         """Show or hide the axes of all frames and marks."""

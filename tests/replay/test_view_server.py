@@ -23,6 +23,7 @@ from manipcli.replay.panel import pose_text, slider_range
 from manipcli.replay.server import is_meant_for
 from manipcli.replay.view import View
 
+ROOT = Path(__file__).parents[2]
 ROBOT = """<robot name="two">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry></visual></link>
   <link name="finger"/><link name="a/b"/>
@@ -132,6 +133,15 @@ def test_a_slider_moves_its_joint_and_what_follows_it(page: View) -> None:
     page.joints.go(frozen([0.1, 0.3]))
     assert page.joints.position == pytest.approx([0.1, 0.3])
     assert page.joints.sliders[0].value == pytest.approx(0.1)
+
+
+def test_a_pose_of_the_hand_leaves_the_arm_alone() -> None:
+    sight = load_sight(ROOT / "robots" / "arm7_hand3" / "robot.yaml")
+    arm, hand = (sight.robot.indices(sight.robot.group(name).joints) for name in ("arm", "hand"))
+    with View(sight.robot, q=sight.q, port=0) as view:
+        view.joints.go(view.joints.named("wrap"))
+        assert view.joints.position[arm] == pytest.approx(sight.q[arm])
+        assert view.joints.position[hand] == pytest.approx(sight.robot.pose("wrap").positions)
 
 
 def _until(condition: object, seconds: float = 10.0) -> None:
