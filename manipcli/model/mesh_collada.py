@@ -186,7 +186,9 @@ class _Scene:
             if self._triangles > MAX_TRIANGLES:
                 raise UnusableMesh(f"has more than {MAX_TRIANGLES} triangles")
             if len(faces):
-                self.placed.append((points @ X[:3, :3].T + X[:3, 3], faces, self._colour(symbol, instance)))
+                with np.errstate(all="ignore"):  # what is not finite is told with its number
+                    placed = points @ X[:3, :3].T + X[:3, 3]
+                self.placed.append((placed, faces, self._colour(symbol, instance)))
 
     def _colour(self, symbol: str, instance: _Node | None) -> Rgba | None:
         """The diffuse colour behind a material's name; None where there is none, as with a texture: it is no fault."""

@@ -13,6 +13,9 @@ from manipcli.model.mesh_fault import UnusableMesh
 from manipcli.model.robot import Box, Cylinder, Geometry, Joint, Link, Mesh, Shape
 from manipcli.model.urdf import Parts
 
+LARGEST = 1e9
+"""[m]: a shape beyond is not measured."""
+
 
 def moved_bodies(parts: Parts) -> Iterator[tuple[Joint, tuple[str, ...]]]:
     """Each moving joint with the names of the links that it moves as one: its child and what is fixed to it."""
@@ -39,15 +42,17 @@ def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
 def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
     """Lowest and highest corner (3,) [m] of a box about a link's collision shapes, else its visuals, in the link.
 
-    None where `element`, which describes the link, has neither, or one that could not be read.
+    None where `element`, which describes the link, has neither, or one that could not be read, or is beyond all bounds.
     """
     for tag, shapes in (("collision", link.collisions), ("visual", link.visuals)):
         written = len(element.all(tag))
         if written:
-            return box_about(shapes) if len(shapes) >= written else None
+            box = box_about(shapes) if len(shapes) >= written else None
+            return box if box is not None and max(map(abs, (*box[0], *box[1]))) < LARGEST else None
     return None
 
 
+@np.errstate(all="ignore")
 def box_about(geometries: Sequence[Geometry]) -> tuple[Array, Array] | None:
     """A box about shapes, along the axes of the frame they are placed in: of each shape's own box, so not tight."""
     boxes = []

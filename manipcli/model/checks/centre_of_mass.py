@@ -1,6 +1,7 @@
 """Centres of mass far outside of the link."""
 
 from collections.abc import Iterator
+from math import hypot
 from typing import Final
 
 import numpy as np
@@ -24,12 +25,12 @@ def _find(subject: Subject) -> Iterator[Finding]:
             continue
         low, high = box
         p = link.inertial.X_LI.p
-        outside = float(np.linalg.norm(np.maximum(np.maximum(low - p, p - high), 0.0)))
-        if outside <= max(NEAR, FAR * float(np.linalg.norm(high - low))):
+        outside, across = hypot(*np.maximum(np.maximum(low - p, p - high), 0.0)), hypot(*(high - low))
+        if outside <= max(NEAR, FAR * across):
             continue
         message = (
             f"link '{link.name}': the centre of mass lies {outside:.2g} m outside of its shape, "
-            f"which is {float(np.linalg.norm(high - low)):.2g} m across"
+            f"which is {across:.2g} m across"
         )
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("origin") or element).place

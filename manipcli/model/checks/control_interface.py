@@ -1,10 +1,10 @@
 """Interfaces of ros2_control with unusual names."""
 
 from collections.abc import Iterator
+from difflib import get_close_matches
 from typing import Final
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import did_you_mean
 from manipcli.model.check import Check, Subject
 from manipcli.model.control_tags import controlled_joints
 from manipcli.model.samples import one_joint
@@ -18,12 +18,12 @@ def _find(subject: Subject) -> Iterator[Finding]:
     for joint in controlled_joints(subject):
         for interface in (*joint.commands, *joint.element.all("state_interface")):
             name = interface.attributes.get("name", "").strip()
-            near = did_you_mean(name, KNOWN) if name else 'name="position"'
-            if name in KNOWN or name in OTHERS or near is None:
+            near = get_close_matches(name, KNOWN, n=1, cutoff=0.8) if name else ["position"]
+            if name in KNOWN or name in OTHERS or not near:
                 continue
             what = f"'{name}'" if name else "no name"
             message = f"ros2_control '{joint.component}': an interface of joint '{joint.name}' has {what}"
-            yield Finding("URDF323", message, interface.place, near, "warning")
+            yield Finding("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
 
 
 CHECK = Check(

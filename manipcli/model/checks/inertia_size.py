@@ -1,7 +1,7 @@
 """Moments of inertia that do not fit the shape of the link."""
 
 from collections.abc import Iterator
-from math import sqrt
+from math import hypot, sqrt
 from typing import Final
 
 import numpy as np
@@ -28,9 +28,8 @@ def _find(subject: Subject) -> Iterator[Finding]:
         if link.inertial is None or box is None or not link.inertial.inertia.any():
             continue
         low, high = box
-        reach = float(
-            np.linalg.norm(np.maximum(np.abs(low - link.inertial.X_LI.p), np.abs(high - link.inertial.X_LI.p)))
-        )
+        centre = np.clip(link.inertial.X_LI.p, low, high)  # one far outside is told as URDF102
+        reach = hypot(*np.maximum(centre - low, high - centre))
         gyration = sqrt(float(np.linalg.eigvalsh(link.inertial.inertia)[2]) / link.inertial.mass)
         if reach / TOO_NEAR <= gyration <= reach * TOO_FAR:
             continue
