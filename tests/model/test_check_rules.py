@@ -91,6 +91,11 @@ QUIET = {
         '<joint name="j"><command_interface name="position"><param name="min">-1</param><param name="max">1</param>'
         "</command_interface></joint>"
     ),
+    "transmission in ros2_control": control(
+        '<joint name="j"><command_interface name="position"/></joint><transmission name="t">'
+        "<plugin>transmission_interface/SimpleTransmission</plugin>"
+        '<joint name="j" role="joint1"><mechanical_reduction>50</mechanical_reduction></joint></transmission>'
+    ),
     "mimic with states only": control(
         '<joint name="k"><state_interface name="position"/></joint>', SECOND + '<mimic joint="j"/></joint>'
     ),
@@ -137,6 +142,13 @@ LOUD = {
     "transmission of a mimic": (
         one_joint(more=SECOND + '<mimic joint="j"/></joint>' + transmission().replace('"j"', '"k"')),
         "URDF315",
+    ),
+    "no role in ros2_control": (
+        control(
+            '<joint name="j"><command_interface name="position"/></joint><transmission name="t">'
+            '<plugin>transmission_interface/SimpleTransmission</plugin><joint name="j"/></transmission>'
+        ),
+        "URDF312",
     ),
     "no actuator": (one_joint(more=transmission().replace(MOTOR, "")), "URDF313"),
     "mimic in ros2_control": (

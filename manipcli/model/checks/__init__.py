@@ -74,6 +74,7 @@ from manipcli.model.checks.too_many_joints import CHECK as TOO_MANY_JOINTS
 from manipcli.model.checks.transmission import CHECK as TRANSMISSION
 from manipcli.model.checks.transmission_count import CHECK as TRANSMISSION_COUNT
 from manipcli.model.checks.transmission_joint import CHECK as TRANSMISSION_JOINT
+from manipcli.model.checks.transmission_name import CHECK as TRANSMISSION_NAME
 from manipcli.model.checks.transmission_reduction import CHECK as TRANSMISSION_REDUCTION
 from manipcli.model.checks.transmission_roles import CHECK as TRANSMISSION_ROLES
 from manipcli.model.checks.transmission_shared import CHECK as TRANSMISSION_SHARED
@@ -186,6 +187,7 @@ _READINESS: tuple[Check, ...] = (
     HARDWARE_INTERFACE,
     TRANSMISSION_JOINT,
     TRANSMISSION_REDUCTION,
+    TRANSMISSION_NAME,
     CONTROL_JOINT,
     CONTROL_MIMIC,
     CONTROL_PLUGIN,

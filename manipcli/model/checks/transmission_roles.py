@@ -1,4 +1,4 @@
-"""Transmissions of two joints without roles."""
+"""Transmissions without roles."""
 
 from collections.abc import Iterator
 
@@ -9,19 +9,20 @@ from manipcli.model.samples import INERTIAL, LIMIT, one_joint
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
+    """ros2_control wants a role everywhere; ROS 1 only where there are two."""
     for found in transmissions(subject):
-        if TRANSMISSIONS.get(found.type) != 2:
-            continue
+        pairs = TRANSMISSIONS.get(found.type) == 2
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
-            wanted = [f"{tag}1", f"{tag}2"]
             roles = [role(element) for element in elements]
-            if len(elements) == 2 and sorted(roles) != wanted:
+            how = "<role>{}1</role>" if found.ros1 else 'role="{}1"'
+            if pairs and len(elements) == 2 and sorted(roles) != [f"{tag}1", f"{tag}2"]:
                 shown = " and ".join(f"'{each}'" if each else "none" for each in roles)
-                message = (
-                    f"transmission '{found.name}': its {tag}s have the roles {shown}; expected {' and '.join(wanted)}"
-                )
-                how = "<role>joint1</role>" if found.ros1 else 'role="joint1"'
-                yield Finding("URDF312", message, elements[0].place, how.replace("joint", tag))
+                expected = f"{tag}1 and {tag}2"
+                message = f"transmission '{found.name}': its {tag}s have the roles {shown}; expected {expected}"
+                yield Finding("URDF312", message, elements[0].place, how.format(tag))
+            elif not pairs and not found.ros1 and "" in roles:
+                message = f"transmission '{found.name}': a {tag} has no role"
+                yield Finding("URDF312", message, elements[roles.index("")].place, how.format(tag))
 
 
 CHECK = Check(
@@ -29,7 +30,7 @@ CHECK = Check(
     name="transmission-roles",
     tier="readiness",
     severity="error",
-    summary="A transmission of two joints does not say which joint and actuator is which",
+    summary="A transmission does not say by roles which joint and actuator is which",
     reason=(
         "A differential or a four-bar linkage maps its two joints in different ways; ros2_control sorts them by "
         "name and swaps them without a word."
