@@ -23,6 +23,7 @@ from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.plan import retimer
+from manipcli.plan.claims import Claims
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -126,10 +127,11 @@ def load_task(
         whole = task
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
     if built:
-        gathered.findings += _unknown_names(read, built[0], scene or named_scene(read.spec))
+        misclaimed = _misclaimed(controllers_file, built[0], read.spec) if controllers_file else ()
+        claims = None if misclaimed or not controllers_file else Claims.of(controllers_file.spec)
+        gathered.findings += _unusable(read, built[0], scene or named_scene(read.spec), claims)
         gathered.findings += _refused(read, built[0])
-        if controllers_file:
-            gathered.findings += _claims(controllers_file, built[0], read.spec)
+        gathered.findings += misclaimed
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
         raise gathered.refusal()
     robot, notes = built
@@ -207,12 +209,18 @@ def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:
     return found
 
 
-def _unknown_names(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> list[Finding]:
-    """Everything that steps, conditions and expectations speak of and that is not there."""
+def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: Claims | None) -> list[Finding]:
+    """Everything that steps, conditions and expectations speak of and that is not there; of steps also what no
+    controller could carry out, where it is known who `claims` what."""
     found: list[tuple[Loc, Problem]] = []
+    uncommanded: list[tuple[Loc, Problem]] = []
     spec = task.spec
     for k, step in enumerate(spec.steps):
-        found += [(("steps", k, step.verb), p) for p in STEPS[step.verb].check(step.body, robot, scene)]
+        member, at = STEPS[step.verb], ("steps", k, step.verb)
+        unknown = member.check(step.body, robot, scene)
+        found += [(at, p) for p in unknown]
+        if claims is not None and not unknown:
+            uncommanded += [(at, p) for p in member.uncommanded(step.body, robot, claims)]
         if step.until is not None:
             condition = CONDITIONS[step.until.name]
             found += [
@@ -222,7 +230,11 @@ def _unknown_names(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> 
     for k, expected in enumerate(spec.expect):
         problems = EXPECTATIONS[expected.name].check(expected.body, robot, scene, ids)
         found += [(("expect", k, expected.name), p) for p in problems]
-    findings = [task.source.finding(230, (*loc, *p.loc), p.message, hint=p.hint) for loc, p in found]
+    findings = [
+        task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
+        for number, problems in ((230, found), (232, uncommanded))
+        for loc, p in problems
+    ]
     known = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in known:
         hint = f"poses: {', '.join(known)}"
@@ -243,7 +255,7 @@ def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
     return tuple(replace(finding, place=task.place("robot")) for finding in ENGINES[engine].refuses(robot))
 
 
-def _claims(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
+def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
     """What is wrong with who commands what."""
     try:
         build_controllers(file.spec, robot, task.simulation.control_period, place=lambda loc: file.place(*loc))

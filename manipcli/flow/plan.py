@@ -12,6 +12,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.plan.claims import Claims
 from manipcli.plan.hand import with_mimics
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
@@ -150,7 +151,7 @@ def _planner(task: Task) -> Planner:
         task.scene,
         period=task.spec.simulation.control_period,
         rng=np.random.default_rng(task.spec.simulation.seed),
-        gripper_joints=tuple(name for spec in grippers for name in spec.joints),
+        gripper_joints=Claims.of(task.controllers).hand,
         gripper_speed=min((spec.speed for spec in grippers), default=1.0),
     )
 

@@ -15,6 +15,7 @@ from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, Co
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Interior, Scene
+from manipcli.plan.claims import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.step import Situation
@@ -80,8 +81,7 @@ class Planner:
                 raise NotPlannable(
                     f"robot '{self.robot.name}' has no tool frame", hint="add `tool: {link: ...}` to the robot file"
                 )
-            above = _joints_above(self.robot, tool.link)
-            joints = tuple(name for name in above if name not in self.gripper_joints)
+            joints = arm_joints(self.robot, self.gripper_joints)
             if not joints:
                 raise NotPlannable(
                     f"no joint of robot '{self.robot.name}' moves its tool at link '{tool.link}'",
@@ -239,15 +239,3 @@ def _within(interior: Interior, X_SP: Transform) -> bool:
     if isinstance(shape, Cylinder):
         return bool(np.hypot(x, y) < shape.radius and abs(z) < shape.length / 2)
     return bool((np.abs(X_SP.p) < np.array(shape.size) / 2).all())
-
-
-def _joints_above(robot: RobotModel, link: str) -> list[str]:
-    """Independent joints from the root to `link`, in that order."""
-    by_child = {joint.child: joint for joint in robot.joints}
-    found = []
-    while link in by_child:
-        joint = by_child[link]
-        if joint.independent:
-            found.append(joint.name)
-        link = joint.parent
-    return found[::-1]

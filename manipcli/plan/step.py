@@ -15,6 +15,7 @@ from manipcli.model.collision import Carried
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.base import Model
 
@@ -99,9 +100,12 @@ class StepMember(Generic[S]):
         spec: what the user writes under it.
         plan: (spec, planner, situation) -> StepPlan. Begins at the situation; raises NotPlannable.
         check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know.
+        uncommanded: (spec, robot, claims) -> everything in it that these controllers cannot carry out; only to be
+            asked when `check` finds nothing.
     """
 
     name: str
     spec: type[S]
     plan: Callable[[S, Planner, Situation], StepPlan]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
+    uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]

@@ -22,6 +22,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unfollowed
 from manipcli.plan.draft import Draft
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.names import unknown_joint
@@ -136,10 +137,13 @@ def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:
 def check(spec: FollowSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown joints."""
     return tuple(
-        problem
-        for k, name in enumerate(spec.joint_names)
-        for problem in unknown_joint(robot, name, ("joint_names", k))
+        problem for k, name in enumerate(spec.joint_names) for problem in unknown_joint(robot, name, ("joint_names", k))
     )
 
 
-MEMBER = StepMember(name="follow", spec=FollowSpec, plan=plan, check=check)
+def uncommanded(spec: FollowSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """Joints of two controllers, or of the hand."""
+    return unfollowed(claims, spec.joint_names, ("joint_names",))
+
+
+MEMBER = StepMember(name="follow", spec=FollowSpec, plan=plan, check=check, uncommanded=uncommanded)

@@ -1,6 +1,6 @@
 """`grasp`: close the hand until each finger meets the stated force.
 
-    - grasp: {object: cup, posture: wrap, force: 8 N}
+- grasp: {object: cup, posture: wrap, force: 8 N}
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from pydantic import Field
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
 from manipcli.plan.planner import Planner
@@ -52,4 +53,10 @@ def check(spec: GraspSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
     return found if spec.object is None else found + unknown_body(scene, spec.object, ("object",), movable=True)
 
 
-MEMBER = StepMember(name="grasp", spec=GraspSpec, plan=plan, check=check)
+def uncommanded(spec: GraspSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A hand, or the tool that it is to hold with, that nothing moves."""
+    tool = () if spec.object is None else unmoved_tool(claims, robot, ("object",))
+    return tool + unmoved_hand(claims, robot, spec.posture, ("posture",))
+
+
+MEMBER = StepMember(name="grasp", spec=GraspSpec, plan=plan, check=check, uncommanded=uncommanded)

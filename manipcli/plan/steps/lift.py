@@ -1,6 +1,6 @@
 """`lift`: raise a held object straight up.
 
-    - lift: {object: cup, by: [8 cm, 20 cm]}
+- lift: {object: cup, by: [8 cm, 20 cm]}
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body
 from manipcli.plan.planner import Planner
@@ -49,4 +50,9 @@ def check(spec: LiftSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     return unknown_body(scene, spec.object, ("object",), movable=True)
 
 
-MEMBER = StepMember(name="lift", spec=LiftSpec, plan=plan, check=check)
+def uncommanded(spec: LiftSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A tool that nothing moves."""
+    return unmoved_tool(claims, robot, ("object",))
+
+
+MEMBER = StepMember(name="lift", spec=LiftSpec, plan=plan, check=check, uncommanded=uncommanded)

@@ -18,6 +18,7 @@ from manipcli.model.build_scene import pose_transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import Planner
@@ -82,4 +83,13 @@ def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     return unknown_frame(scene, spec.frame, ("frame",))
 
 
-MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check)
+def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """Joints of two controllers; a tool that nothing moves."""
+    if isinstance(spec.to, str):
+        return unmoved_joints(claims, robot.pose(spec.to).joints, ("to",))
+    if spec.to is not None:
+        return unmoved_joints(claims, tuple(spec.to), ("to",))
+    return unmoved_tool(claims, robot, ("pose",))
+
+
+MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded)

@@ -19,6 +19,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
 from manipcli.plan.planner import Planner
@@ -147,4 +148,13 @@ def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     )
 
 
-MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check)
+def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A tool or a hand that nothing moves."""
+    return (
+        unmoved_tool(claims, robot, ("object",))
+        + unmoved_hand(claims, robot, spec.grasp.posture, ("grasp", "posture"))
+        + unmoved_hand(claims, robot, spec.open, ("open",))
+    )
+
+
+MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded)

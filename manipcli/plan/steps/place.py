@@ -1,7 +1,7 @@
 """`place`: set a held object down, let go, and withdraw.
 
-    - place: {object: cup, at: start}
-    - place: {object: block, at: [0.5, 0.2], on: table, yaw: 90 deg}
+- place: {object: cup, at: start}
+- place: {object: block, at: [0.5, 0.2], on: table, yaw: 90 deg}
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
+from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body, unknown_pose
 from manipcli.plan.planner import Planner
@@ -39,9 +40,7 @@ class PlaceSpec(Model):
         "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `on`."
     )
     on: str | None = Field(None, description="The body that takes the object at [x, y]: on its top, or inside a tray.")
-    yaw: Angle | None = Field(
-        None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held."
-    )
+    yaw: Angle | None = Field(None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held.")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
@@ -122,4 +121,9 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
     return found
 
 
-MEMBER = StepMember(name="place", spec=PlaceSpec, plan=plan, check=check)
+def uncommanded(spec: PlaceSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A tool or a hand that nothing moves."""
+    return unmoved_tool(claims, robot, ("object",)) + unmoved_hand(claims, robot, spec.posture, ("posture",))
+
+
+MEMBER = StepMember(name="place", spec=PlaceSpec, plan=plan, check=check, uncommanded=uncommanded)

@@ -27,6 +27,7 @@ from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Body, Scene
+from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_body
 from manipcli.plan.planner import Planner
@@ -126,4 +127,9 @@ def check(spec: PourSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     return unknown_body(scene, spec.object, ("object",), movable=True) + unknown_body(scene, spec.into, ("into",))
 
 
-MEMBER = StepMember(name="pour", spec=PourSpec, plan=plan, check=check)
+def uncommanded(spec: PourSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A tool that nothing moves."""
+    return unmoved_tool(claims, robot, ("object",))
+
+
+MEMBER = StepMember(name="pour", spec=PourSpec, plan=plan, check=check, uncommanded=uncommanded)

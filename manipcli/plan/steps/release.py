@@ -1,6 +1,6 @@
 """`release`: open the hand.
 
-    - release: {posture: open}
+- release: {posture: open}
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pydantic import Field
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unmoved_hand
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_pose
 from manipcli.plan.planner import Planner
@@ -35,4 +36,9 @@ def check(spec: ReleaseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, 
     return unknown_pose(robot, spec.posture, ("posture",))
 
 
-MEMBER = StepMember(name="release", spec=ReleaseSpec, plan=plan, check=check)
+def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """A hand that nothing moves."""
+    return unmoved_hand(claims, robot, spec.posture, ("posture",))
+
+
+MEMBER = StepMember(name="release", spec=ReleaseSpec, plan=plan, check=check, uncommanded=uncommanded)

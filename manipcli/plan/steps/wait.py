@@ -1,7 +1,7 @@
 """`wait`: hold still.
 
-    - wait: 1 s
-    - wait: {duration: 1 s}
+- wait: 1 s
+- wait: {duration: 1 s}
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims
 from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
@@ -44,4 +45,9 @@ def check(spec: WaitSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     return ()
 
 
-MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=check)
+def uncommanded(spec: WaitSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """It commands nothing."""
+    return ()
+
+
+MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=check, uncommanded=uncommanded)
