@@ -23,6 +23,7 @@ from manipcli.model.checks.duplicate_name import CHECK as DUPLICATE_NAME
 from manipcli.model.checks.fixed_axis import CHECK as FIXED_AXIS
 from manipcli.model.checks.flat_mesh import CHECK as FLAT_MESH
 from manipcli.model.checks.foreign_shape import CHECK as FOREIGN_SHAPE
+from manipcli.model.checks.foreign_tags import CHECK as FOREIGN_TAGS
 from manipcli.model.checks.gazebo_tags import CHECK as GAZEBO_TAGS
 from manipcli.model.checks.hardware_interface import CHECK as HARDWARE_INTERFACE
 from manipcli.model.checks.inertia import CHECK as INERTIA
@@ -123,6 +124,7 @@ _SCHEMA: tuple[Check, ...] = (
     REDEFINED_MATERIAL,
     UNREAD_NUMBER,
     SHARED_NAME,
+    FOREIGN_TAGS,
     XACRO_EXPANSION,
     XACRO_REFUSED,
     XACRO_ARGUMENT,
