@@ -38,7 +38,7 @@ class Check:
         code: stable, `URDF031`.
         name: one or a few words, joined by `-`, for tables.
         tier: what it is about.
-        severity: of its findings, unless one says otherwise; none is graver. Loading a robot makes the checks of errors.
+        severity: of its findings, unless one says otherwise; none is graver. Loading makes the checks of errors.
         summary: what is wrong, in one line without values.
         reason: why it matters: what a simulator or planner does with it. For `--explain`.
         bad: a whole description (URDF or xacro text) that has exactly this defect.
