@@ -94,7 +94,9 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
     if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "manipcli"
-        finding = Finding(code="USE001", message=error.format_message(), hint=f"`{command} --help` shows the usage")
+        finding = Finding(
+            code="USE001", message=_without_jargon(error.format_message()), hint=f"`{command} --help` shows the usage"
+        )
         return ExitCode.USAGE, (finding,)
     if isinstance(error, KeyboardInterrupt):
         return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
@@ -106,6 +108,11 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
         hint="this is a bug in manipcli; MANIPCLI_DEBUG=1 shows where",
     )
     return ExitCode.INTERNAL, (finding,)
+
+
+def _without_jargon(message: str) -> str:
+    """Typer's message without what pydantic, which it uses, puts before its own."""
+    return message.replace(": Value error, ", ": ", 1)
 
 
 def _wants_json(words: Sequence[str]) -> bool:

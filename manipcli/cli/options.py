@@ -13,7 +13,12 @@ Format = Annotated[OutputFormat, typer.Option("--format", help="Text for people,
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="The task file.", show_default=False)]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="A.B=VALUE", help="Set any field of the task file; repeatable.", show_default=False),
+    typer.Option(
+        "--set",
+        metavar="A.B=VALUE",
+        help="Set any field of the task, or robot.A.B, controllers.A.B; repeatable.",
+        show_default=False,
+    ),
 ]
 Seed = Annotated[
     int | None,

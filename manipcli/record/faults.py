@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
+from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError, Place
 
 
 class RecordingRefused(InvalidInput):
@@ -37,4 +37,4 @@ class BadRecording(InvalidInput):
     code = "LOG300"
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
-        super().__init__((Finding(code=self.code, message=f"{path.name}: {cause}", hint=hint),))
+        super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))

@@ -148,6 +148,11 @@ def test_wrong_usage_is_4_and_one_message(capsys: pytest.CaptureFixture[str], wo
     assert "--help" in told.err
 
 
+def test_wrong_usage_is_told_without_the_words_of_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "pour.yaml", "--format", "xml"]) == 4
+    assert capsys.readouterr().err.startswith("error[USE001]: Invalid value for '--format': 'xml' is not one of ")
+
+
 def test_wrong_usage_answers_in_json_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--format=json"]) == 4
     assert json.loads(capsys.readouterr().out)["errors"][0]["code"] == "USE001"
