@@ -10,6 +10,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import did_you_mean, shorten
+from manipcli.model.bounds import bounds
 from manipcli.model.build_robot import bare_robot
 from manipcli.model.check import Check
 from manipcli.model.checks import CHECKS
@@ -48,8 +49,10 @@ def inspect(
     """Everything that can be said about a description; see `examine`.
 
     Raises:
-        InvalidInput: there is no such file. Whatever a file holds is told in findings.
+        InvalidInput: there is no such file, or a bound of the user's own is none. Whatever a file holds is told in
+            findings.
     """
+    bounds()
     if not os.path.lexists(path):
         raise InvalidInput([Finding("USE101", "there is no such file", Place(str(path), 0, 0), hint=sibling(path))])
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)

@@ -9,10 +9,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from manipcli.core.errors import Finding, InvalidInput, Severity
+from manipcli.core.errors import Finding, InvalidInput, Place, Severity
 from manipcli.model.check import Check, Subject
 from manipcli.model.checks import CHECKS
 from manipcli.model.description import Description, read_description
+from manipcli.model.located_xml import shown_path
 from manipcli.model.packages import Packages
 from manipcli.model.urdf import Parts, read_parts
 
@@ -64,6 +65,9 @@ def examine(
         parts = read_parts(description)
     except InvalidInput as error:
         return _examination(error.findings, None, None)
+    except (RecursionError, MemoryError):
+        message = "the description is nested too deep, or too large, for this machine; this cannot be raised"
+        return _examination([Finding("URDF052", message, Place(shown_path(path), 0, 0))], None, None)
     subject = Subject(description, parts, packages)
     found = list(parts.findings)
     for check in checks:

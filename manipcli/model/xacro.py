@@ -165,7 +165,8 @@ class _Expansion:
         if self._calls and message.startswith(_ABOUT_A_CALL):
             self._current = self._calls[-1]
         around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
-        hint = "expanded from " + ", from ".join(around[:8]) if around else None
+        more = [f"{len(around) - 4} more"] if len(around) > 4 else []
+        hint = "expanded from " + ", from ".join([*around[:4], *more]) if around else None
         if message.startswith("unknown macro") and self._calls:
             own_hint = _near_macro(self._calls[-1].tagName, _names(self._macros))
         elif "is not defined" in message:

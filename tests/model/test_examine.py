@@ -152,6 +152,8 @@ def test_a_bound_is_raised_as_its_error_says(tmp_path: Path, monkeypatch: pytest
     variable, _, value = (error.hint or "").rpartition(": ")[2].partition("=")
     monkeypatch.setenv(variable, value)
     assert look(tmp_path, deep).errors == ()
+    monkeypatch.setenv("MANIPCLI_BOUNDS", "depth=99999")
+    assert codes(look(tmp_path, deep.replace("<x>", "<x>" * 30).replace("</x>", "</x>" * 30))) == ["URDF052"]
     monkeypatch.setenv("MANIPCLI_BOUNDS", "deep=3")
     with pytest.raises(InvalidInput, match="'deep=3' is no bound"):
         bounds()
