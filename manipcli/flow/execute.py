@@ -77,7 +77,8 @@ def controllers(task: Task) -> ControllerManager:
     """The task's controllers, for its robot and control period."""
     file = task.controllers_file
     period = task.spec.simulation.control_period
-    return build_controllers(file.spec, task.robot, period, place=lambda loc: file.place(*loc))
+    compat = task.robot_file.spec.compat
+    return build_controllers(file.spec, task.robot, period, place=lambda loc: file.place(*loc), compat=compat)
 
 
 def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None) -> None:
@@ -227,4 +228,3 @@ class _Run:
         self._recorder.event(
             self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=place
         )
-

@@ -130,4 +130,6 @@ class RobotSpec(Model):
     friction: Annotated[float, Field(ge=0)] = Field(
         1.0, description="Coefficient of the robot's surfaces; the engine multiplies it by the other body's. Default 1."
     )
-    compat: Literal["ros1", "ros2"] = Field("ros2", description="Whose rules hold where the two differ. Default ros2.")
+    compat: Literal["ros1", "ros2"] = Field(
+        "ros2", description="Whose PID the controllers have; in ROS 1 the integral acts a step earlier. Default ros2."
+    )
