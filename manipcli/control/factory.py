@@ -17,6 +17,7 @@ from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Joint, RobotModel
+from manipcli.plan.hand import fingers
 from manipcli.spec.controllers import ControllerSpec, ControllersSpec, GripperSpec, JointTrajectorySpec
 
 STALL_VELOCITY: Final = 0.02
@@ -80,7 +81,7 @@ def _build(name: str, spec: ControllerSpec, robot: RobotModel, compat: Compat) -
         name=name,
         joints=spec.joints,
         gains=spec.gains,
-        fingers=fingers_of(spec.joints, robot),
+        fingers=fingers(robot, spec.joints),
         speed=spec.speed,
         max_effort=np.array([min(own, math.inf if j.limits.effort is None else j.limits.effort) for j in joints]),
         stall_velocity=_each(joints, spec.stall_velocity, turning=STALL_VELOCITY, sliding=STALL_SPEED),
@@ -95,20 +96,6 @@ def _each(joints: Sequence[Joint], stated: float | None, *, turning: float, slid
     """(n) what was stated, or the default of each joint's type."""
     defaults = [sliding if joint.type == "prismatic" else turning for joint in joints]
     return np.array(defaults if stated is None else [stated] * len(joints))
-
-
-def fingers_of(joints: tuple[str, ...], robot: RobotModel) -> tuple[tuple[int, ...], ...]:
-    """Indices into `joints` of each finger: the joints that hang below the same first one of `joints`."""
-    mover = {joint.child: joint for joint in robot.joints}
-    fingers: dict[str, list[int]] = {}
-    for k, name in enumerate(joints):
-        first, link = name, robot.joint(name).parent
-        while link in mover:
-            if mover[link].name in joints:
-                first = mover[link].name
-            link = mover[link].parent
-        fingers.setdefault(first, []).append(k)
-    return tuple(tuple(finger) for finger in fingers.values())
 
 
 def _findings(spec: ControllersSpec, robot: RobotModel, place: Where) -> Iterator[Finding]:

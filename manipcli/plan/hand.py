@@ -15,17 +15,17 @@ STEPS = 40
 
 
 def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-    """The joints of a hand by finger: a joint below another one of the hand is of the same finger."""
-    found: list[list[int]] = []
+    """Indices into the `joints` of a hand by finger: those that hang below the same first one of them."""
+    mover = {joint.child: joint for joint in robot.joints}
+    found: dict[str, list[int]] = {}
     for k, name in enumerate(joints):
-        child = robot.joint(name).child
-        for finger in found:
-            if any(child in robot.descendants(robot.joint(joints[j]).child) for j in finger):
-                finger.append(k)
-                break
-        else:
-            found.append([k])
-    return tuple(tuple(finger) for finger in found)
+        first, link = name, robot.joint(name).parent
+        while link in mover:
+            if mover[link].name in joints:
+                first = mover[link].name
+            link = mover[link].parent
+        found.setdefault(first, []).append(k)
+    return tuple(tuple(finger) for finger in found.values())
 
 
 def moved_links(robot: RobotModel, joints: Sequence[str]) -> frozenset[str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.controller import JointState
-from manipcli.control.factory import build_controllers, fingers_of
+from manipcli.control.factory import build_controllers
 from manipcli.control.gripper import GripperController, GripperGoal
 from manipcli.control.joint_trajectory_controller import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
@@ -153,11 +153,6 @@ def test_serving_and_lookup():
         manager.serving(["elbow", "left_1"])
     with pytest.raises(KeyError, match="known: arm, hand"):
         manager["leg"]
-
-
-def test_fingers_are_what_hangs_below_the_same_first_joint():
-    assert fingers_of(HAND, robot()) == ((0, 1), (2,))
-    assert fingers_of(("left_2", "right_1", "left_1"), robot()) == ((0, 2), (1,))
 
 
 def test_two_controllers_on_one_joint_are_refused_with_both_names():

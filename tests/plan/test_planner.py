@@ -120,6 +120,9 @@ def test_a_finger_is_the_joints_below_one_another(bench: Make) -> None:
     arm, panda = bench(), bench("panda")
     assert fingers(arm.robot, arm.planner.gripper_joints) == ((0, 1), (2, 3), (4, 5))
     assert fingers(panda.robot, ("panda_finger_joint1",)) == ((0,),)
+    outermost_first = arm.planner.gripper_joints[::-1]
+    assert fingers(arm.robot, outermost_first) == ((0, 1), (2, 3), (4, 5))
+    assert fingers(arm.robot, (outermost_first[0], outermost_first[2], outermost_first[1])) == ((0, 2), (1,))
     assert moved_links(panda.robot, ("panda_finger_joint1",)) >= {"panda_leftfinger", "panda_rightfinger"}
 
 
