@@ -74,9 +74,10 @@ def needs_physics(condition: Condition[S], spec: S, scene: Scene) -> bool:
     return any(name in movable for name in condition.bodies(spec, scene))
 
 
-def unknown_body(name: str, loc: tuple[str | int, ...], scene: Scene) -> tuple[Problem, ...]:
-    """The problem that `name` is no body of the scene, or nothing."""
-    known = tuple(body.name for body in scene.bodies)
+def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable: bool = False) -> tuple[Problem, ...]:
+    """Empty if the scene has a (movable) body of this name."""
+    known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
         return ()
-    return (Problem(loc, f"'{name}' is not in the scene", did_you_mean(name, known)),)
+    word = "a movable body of the scene" if movable else "in the scene"
+    return (Problem(loc, f"'{name}' is not {word}", did_you_mean(name, known)),)

@@ -23,13 +23,6 @@ def unknown_joint(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]
     return _unknown(name, known, f"joint '{name}' is not one that robot '{robot.name}' can move", loc)
 
 
-def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) -> tuple[Problem, ...]:
-    """Empty if the scene has a (movable) body of this name."""
-    bodies = scene.movable if movable else scene.bodies
-    word = "a movable body of the scene" if movable else "in the scene"
-    return _unknown(name, (body.name for body in bodies), f"'{name}' is not {word}", loc)
-
-
 def unknown_frame(scene: Scene, name: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if `name` is `world`, `base`, `tool`, a body or a named frame."""
     known = ["world", "base", "tool", *(body.name for body in scene.bodies), *(frame.name for frame in scene.frames)]

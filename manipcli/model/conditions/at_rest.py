@@ -36,7 +36,7 @@ def margin(spec: AtRestSpec, world: World, state: WorldState) -> Array:
 
 def check(spec: AtRestSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(spec.object, ("object",), scene)
+    return unknown_body(scene, spec.object, ("object",))
 
 
 AT_REST = Condition(

@@ -56,7 +56,7 @@ def _depth(interior: Interior, p_S: Array) -> Array:
 
 def check(spec: InsideSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Both bodies exist, differ, and the container has a hollow."""
-    problems = [*unknown_body(spec.object, ("object",), scene), *unknown_body(spec.of, ("of",), scene)]
+    problems = [*unknown_body(scene, spec.object, ("object",)), *unknown_body(scene, spec.of, ("of",))]
     if problems:
         return tuple(problems)
     container = scene.body(spec.of)

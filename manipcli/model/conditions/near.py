@@ -55,7 +55,7 @@ def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
 
 def check(spec: NearSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """The body exists, and so does the target."""
-    problems = unknown_body(spec.object, ("object",), scene)
+    problems = unknown_body(scene, spec.object, ("object",))
     if isinstance(spec.to, str):
         known = (START, *(frame.name for frame in scene.frames), *(body.name for body in scene.bodies))
         if spec.to not in known:

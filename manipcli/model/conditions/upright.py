@@ -33,7 +33,7 @@ def margin(spec: UprightSpec, world: World, state: WorldState) -> Array:
 
 def check(spec: UprightSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(spec.object, ("object",), scene)
+    return unknown_body(scene, spec.object, ("object",))
 
 
 UPRIGHT = Condition(

@@ -9,12 +9,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_body, unknown_pose
+from manipcli.plan.names import unknown_pose
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model

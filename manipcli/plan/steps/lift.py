@@ -10,12 +10,11 @@ from typing import Annotated
 from pydantic import Field
 
 from manipcli.core.geometry import Transform
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_body
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan

@@ -14,12 +14,12 @@ from pydantic import Field
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_body, unknown_pose
+from manipcli.plan.names import unknown_pose
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan

@@ -24,12 +24,11 @@ from pydantic import Field
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_body
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
