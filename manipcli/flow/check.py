@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.flow.describe import inspect
+from manipcli.flow.describe import DESCRIPTIONS, inspect
 from manipcli.flow.load import load_task
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
@@ -19,8 +19,6 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.tree import Plain
-
-DESCRIPTIONS = (".urdf", ".xacro")
 
 
 def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:

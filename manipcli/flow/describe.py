@@ -20,6 +20,9 @@ from manipcli.model.summary import Summary, summarise, tree_lines
 from manipcli.model.urdf_fix import Change, mended
 from manipcli.spec.load import sibling
 
+DESCRIPTIONS = (".urdf", ".xacro", ".xml")
+"""Ends of the names of descriptions; other files are YAML."""
+
 
 @dataclass(frozen=True, slots=True)
 class Inspection:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Array
+from manipcli.flow.describe import DESCRIPTIONS
 from manipcli.flow.load import load_task
 from manipcli.flow.plan import start_position
 from manipcli.model.build_robot import build_robot
@@ -16,9 +17,6 @@ from manipcli.model.scene import Scene
 from manipcli.replay.posture import posture
 from manipcli.spec import load
 from manipcli.spec.robot import RobotSpec
-
-DESCRIPTIONS = (".urdf", ".xacro", ".xml")
-"""Ends of the names of descriptions; other files are YAML."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -146,8 +146,10 @@ class TestCheckUrdf:
         assert main(["check-urdf", "e.xacro", "--allow-env", "SIDE", "--allow-env", "OTHER", "--tree"]) == 0
         assert "sinister_none" in capsys.readouterr().out
 
-    def test_check_takes_descriptions_too(self, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_check_takes_descriptions_too(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["check", "good.urdf"]) == 0
+        (folder / "good.urdf.xml").write_bytes((folder / "good.urdf").read_bytes())
+        assert main(["check", "good.urdf.xml"]) == 0
         assert main(["check", "bad.urdf"]) == 1
         assert "URDF004" in capsys.readouterr().out
 
