@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import threading
 import time
 import xml.dom.minidom
@@ -28,6 +29,11 @@ from manipcli.model.xacro_yaml import load_yaml
 
 _loading = threading.Lock()
 _ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "Invalid parameter", "unknown macro")
+# The library's own pattern for `name:=^|default` tries exponentially many ways where a quote is not closed. This one
+# reads the same, with one way to read each character.
+_MACRO_ARGUMENT = re.compile(
+    r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
+)
 _DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
 
 
@@ -116,6 +122,7 @@ class _Expansion:
         }
         for name, door in doors.items():
             setattr(module, name, door)
+        module.re_macro_arg = _MACRO_ARGUMENT  # type: ignore[attr-defined]
         module._global_symbols = self._symbols()  # type: ignore[attr-defined]
 
     def run(self, path: Path, arguments: Mapping[str, str]) -> tuple[Document, tuple[Finding, ...]]:

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from manipcli.core.errors import InvalidInput
+from manipcli.model import xacro
 from manipcli.model.description import Description, read_description
 from manipcli.model.packages import Packages
 
@@ -128,6 +129,8 @@ ATTACKS = {
         f'<xacro:property name="p{k}" value="${{p{k + 1}}}${{p{k + 1}}}"/>' for k in range(30)
     )
     + '<xacro:property name="p30" value="abc"/><link name="${p0}"/>',
+    "unclosed quote": '<xacro:macro name="m" params="x:=LONG\'"/><xacro:m/>'.replace("LONG", "y" * 100),
+    "many quotes": '<xacro:macro name="m" params="x:=LONG\'"/><xacro:m/>'.replace("LONG", "'a'" * 300),
     "circle": '<xacro:property name="a" value="${b}"/><xacro:property name="b" value="${a}"/><link name="${a}"/>',
 }
 
@@ -203,3 +206,14 @@ def test_the_library_that_others_import_is_left_as_it_was(tmp_path: Path) -> Non
 def test_the_same_file_expands_the_same_twice(tmp_path: Path) -> None:
     body = '<xacro:property name="n" value="3"/><link name="l${n}"/>'
     assert names(expand(tmp_path, body)) == names(expand(tmp_path, body)) == ["l3"]
+
+
+def test_parameters_of_macros_are_read_as_the_library_reads_them() -> None:
+    library = importlib.import_module("xacro")
+    texts = (
+        "a", "a b", "a:=1", "a=1 b", "a := 1", "a:=^", "a:=^|2 *b", "a:=${1 + 2} b:='x y' **c", 'a:="x y"z b', "a:=",
+        "a:=$(arg x) b", "a:=x'y z'w v", "*a *b", "a:='' b:=\"\"", " a:=1   b ", "a:='x", "a:=^|'q r' b:=^",
+    )  # fmt: skip
+    for text in texts:
+        theirs, ours = library.re_macro_arg.match(text), xacro._MACRO_ARGUMENT.match(text)
+        assert (theirs and theirs.groups()) == (ours and ours.groups()), text
