@@ -116,7 +116,3 @@ class Kinematics:
         """M(q) (n, n), symmetric."""
         upper = np.triu(self._pin.crba(self._model, self._data, q))
         return np.asarray(upper + np.triu(upper, 1).T)
-
-    def potential_energy(self, q: Array) -> float:
-        """V(q) = -sum m_i gravity . c_i [J], relative to the world's origin; links fixed to the world excluded."""
-        return float(self._pin.computePotentialEnergy(self._model, self._data, q))

@@ -101,7 +101,7 @@ class Executor:
         if motion.trajectory is not None:
             follower = manager.serving(motion.trajectory.names)
             if not isinstance(follower, JointTrajectoryController):
-                raise InvalidArgument("CTRL150", f"controller '{follower.name}' does not follow trajectories")
+                raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             handles.append(follower.send_goal(self._completed(motion.trajectory, follower)))
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
