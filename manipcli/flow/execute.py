@@ -14,7 +14,7 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, PlannedStep
-from manipcli.judge.verdict import StepOutcome, StepWord
+from manipcli.judge.verdict import StepOutcome
 from manipcli.model.condition import World, needs_physics
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.state import Contact, WorldState
@@ -37,6 +37,7 @@ AFTERMATH: Final = 0.6
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
 PROGRESS_TICKS: Final = 50
+"""Control ticks between two times that are told to whoever shows the progress."""
 
 
 class Progress(Protocol):
@@ -169,12 +170,11 @@ class _Run:
         except SimulationFailed as failure:
             self._event("step_ended", planned, "failed", str(failure), place)
             raise
-        words: dict[str, StepWord] = {"done": "done", "failed": "failed", "timeout": "timeout"}
-        self._event("step_ended", planned, words[end.outcome], end.text, place)
+        self._event("step_ended", planned, end.outcome, end.text, place)
         return StepOutcome(
             id=planned.id,
             verb=planned.verb,
-            outcome=words[end.outcome],
+            outcome=end.outcome,
             started=started,
             ended=self._session.time,
             planned_duration=planned.plan.duration,
@@ -188,15 +188,18 @@ class _Run:
         texts = []
         for motion in planned.plan.motions:
             self._event("phase_started", planned, "", motion.label, place)
-            if motion.awaits and until is not None and deadline is None:
-                deadline = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
-            end = self._executor.run(motion, until=until, deadline=deadline)
+            over = deadline
+            if motion.awaits and until is not None and over is None:
+                over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
+            end = self._executor.run(motion, until=until, deadline=over)
             if end.outcome != "done":
                 return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
             awaited = awaited and not motion.awaits
             texts += [end.text] if end.text else []
         if awaited and until is not None:
-            end = self._executor.wait(until, deadline=deadline or self._session.time + DEFAULT_UNTIL_TIME)
+            if deadline is None:
+                deadline = self._session.time + DEFAULT_UNTIL_TIME
+            end = self._executor.wait(until, deadline=deadline)
             if end.outcome != "done":
                 return end
         return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from manipcli import pipeline
 from manipcli.core.errors import SimulationFailed
 from manipcli.flow import execute
 from manipcli.judge.verdict import Verdict
+from manipcli.plan.step import Motion
 from manipcli.record.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
@@ -131,6 +133,24 @@ def test_until_that_holds_ends_the_step_and_one_that_does_not_fails_it(run: Run)
     assert missed.steps[0].outcome == "timeout"
     assert missed.steps[0].ended == pytest.approx(0.5)
     assert "until" in missed.steps[0].text
+
+
+def test_the_time_for_an_until_ends_with_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What follows in the step (a cup tilted back) may take longer than was left to wait."""
+    plan_task = pipeline.plan_task
+
+    def with_a_sequel(task: pipeline.Task) -> pipeline.Plan:
+        plan = plan_task(task)
+        sequel = Motion("sequel", trajectory=None, grip=None, duration=0.5)
+        (step,) = plan.steps
+        longer = replace(step, plan=replace(step.plan, motions=(*step.plan.motions, sequel)))
+        return replace(plan, steps=(longer,))
+
+    monkeypatch.setattr(pipeline, "plan_task", with_a_sequel)
+    monkeypatch.setattr(execute, "DEFAULT_UNTIL_TIME", 0.2)
+    step = run(scene(*WAITING, steps=NEAR)).steps[0]
+    assert step.outcome == "done"
+    assert step.ended == pytest.approx(0.6, abs=0.011)
 
 
 class Stopping:
