@@ -9,6 +9,7 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.describe import DESCRIPTIONS, inspect
 from manipcli.flow.load import load_task
+from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import SHAPES
@@ -66,7 +67,7 @@ def words(kind: str) -> tuple[str, ...]:
 def schema(kind: load.FileKind) -> Mapping[str, Plain]:
     """The JSON Schema of a kind of file."""
     texts = {
-        "task": lambda: task_schema(STEPS, CONDITIONS, EXPECTATIONS),
+        "task": lambda: task_schema(task_spec()),
         "robot": robot_schema,
         "controllers": controllers_schema,
     }

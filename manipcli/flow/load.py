@@ -14,6 +14,7 @@ import numpy as np
 from manipcli.control.factory import build_controllers
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
+from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import build_scene
@@ -92,14 +93,9 @@ def load_task(
         InvalidInput: every error of all three files at once; of the scene's geometry only once the task file is sound.
     """
     gathered = Gathered()
-    task = gathered(
-        lambda: load.load_task(
-            path, steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS, overrides=overrides, seed=seed
-        )
-    )
-    read = task or load.salvage_task(
-        path, steps=STEPS, conditions=CONDITIONS, expectations=EXPECTATIONS, overrides=overrides, seed=seed
-    )
+    model = task_spec()
+    task = gathered(lambda: load.load_task(path, model=model, overrides=overrides, seed=seed))
+    read = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
     if read is None:
         raise gathered.refusal()
     robot_path = gathered(lambda: _named_file(read, path, "robot"))

@@ -11,14 +11,12 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
-from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
-from manipcli.model.conditions import CONDITIONS
 from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene_file import scene_from_json, scene_to_json
-from manipcli.plan.steps import STEPS
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
@@ -116,13 +114,7 @@ def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
         InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
     """
     recording = open_recording(path, being_written=being_written)
-    task = load_task_text(
-        _attached(recording, path, TASK),
-        f"{path.name}/{TASK}",
-        steps=STEPS,
-        conditions=CONDITIONS,
-        expectations=EXPECTATIONS,
-    ).spec
+    task = load_task_text(_attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
     expect = [(expected.name, expected.body) for expected in task.expect]
     try:
         scene = scene_from_json(_attached(recording, path, SCENE))

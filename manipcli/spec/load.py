@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import ControllersSpec
@@ -22,13 +21,9 @@ from manipcli.spec.ros_form import rewrite
 from manipcli.spec.salvage import salvage
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node
-from manipcli.spec.unions import SpecMember, task_model
 from manipcli.spec.yaml import MAX_BYTES, parse
 
 M = TypeVar("M", bound=Model)
-S = TypeVar("S", bound=SpecMember)
-C = TypeVar("C", bound=SpecMember)
-E = TypeVar("E", bound=SpecMember)
 
 FileKind = Literal["task", "robot", "controllers"]
 
@@ -87,9 +82,7 @@ def kind_of(path: Path) -> FileKind:
 def load_task(
     path: Path,
     *,
-    steps: Seam[S],
-    conditions: Seam[C],
-    expectations: Seam[E],
+    model: type[TaskSpec],
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec]:
@@ -97,52 +90,37 @@ def load_task(
 
     Args:
         path: the file.
-        steps: members whose names are the verbs.
-        conditions: members whose names are the words of `until`.
-        expectations: members whose names are the words of `expect`.
+        model: of `unions.task_model`: which verbs, conditions and expectations there are.
         overrides: of `--set`, for all three files; those of the other two are only read.
         seed: replaces `simulation.seed`.
 
     Raises:
         InvalidInput: every finding of the file and of the overrides.
     """
-    return load_task_text(
-        read_bytes(path),
-        str(path),
-        steps=steps,
-        conditions=conditions,
-        expectations=expectations,
-        overrides=overrides,
-        seed=seed,
-    )
+    return load_task_text(read_bytes(path), str(path), model=model, overrides=overrides, seed=seed)
 
 
 def load_task_text(
     text: str | bytes,
     name: str,
     *,
-    steps: Seam[S],
-    conditions: Seam[C],
-    expectations: Seam[E],
+    model: type[TaskSpec],
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec]:
     """As `load_task`, from text; places call it `name`."""
-    source, findings = _task_source(text, name, task_model(steps, conditions, expectations), overrides, seed)
-    return validate(source, task_model(steps, conditions, expectations), findings=findings)
+    source, findings = _task_source(text, name, model, overrides, seed)
+    return validate(source, model, findings=findings)
 
 
 def salvage_task(
     path: Path,
     *,
-    steps: Seam[S],
-    conditions: Seam[C],
-    expectations: Seam[E],
+    model: type[TaskSpec],
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec] | None:
     """What remains of a task file that `load_task` refused, for checking it further; None where too little does."""
-    model = task_model(steps, conditions, expectations)
     try:
         source, _ = _task_source(read_bytes(path), str(path), model, overrides, seed)
     except InvalidInput:

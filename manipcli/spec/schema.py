@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import TypeVar
 
 from pydantic import BaseModel
 
-from manipcli.core.registry import Seam
 from manipcli.spec.controllers import ControllersSpec
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import Plain
-from manipcli.spec.unions import SpecMember, task_model
-
-S = TypeVar("S", bound=SpecMember)
-C = TypeVar("C", bound=SpecMember)
-E = TypeVar("E", bound=SpecMember)
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
 _REFERENCE = r"\$[A-Za-z_]"
 
 
-def task_schema(steps: Seam[S], conditions: Seam[C], expectations: Seam[E]) -> str:
-    """Of a task file: the verbs and the conditions are `oneOf`; any number may be an expression with `$name`."""
-    schema = _schema(task_model(steps, conditions, expectations), "manipcli task")
+def task_schema(model: type[TaskSpec]) -> str:
+    """Of a task file (`unions.task_model`): verbs are `oneOf`, any number may be an expression with `$name`."""
+    schema = _schema(model, "manipcli task")
     _allow_expressions(schema)
     return _dump(schema)
 

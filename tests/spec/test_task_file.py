@@ -24,6 +24,7 @@ from manipcli.spec.resolved import resolved
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.schema import task_schema
 from manipcli.spec.task import TaskSpec
+from manipcli.spec.unions import task_model
 
 
 class Move(Model):
@@ -77,6 +78,7 @@ class Member:
 
 STEPS = Seam("step", (Member("move", Move), Member("pour", Pour), Member("wait", Wait)))
 CONDITIONS = Seam("condition", (Member("inside", Inside), Member("near", Near)))
+MODEL = task_model(STEPS, CONDITIONS, CONDITIONS)
 
 TASK = """\
 task: pour
@@ -100,9 +102,7 @@ expect:
 
 
 def load(text: str, *overrides: str, seed: int | None = None) -> Located[TaskSpec]:
-    return load_task_text(
-        text, "t.yaml", steps=STEPS, conditions=CONDITIONS, expectations=CONDITIONS, overrides=overrides, seed=seed
-    )
+    return load_task_text(text, "t.yaml", model=MODEL, overrides=overrides, seed=seed)
 
 
 def findings(text: str, *overrides: str) -> tuple[Finding, ...]:
@@ -615,7 +615,7 @@ def test_a_file_that_is_not_there_names_its_neighbour(tmp_path: Path) -> None:
 
     def refused(path: Path) -> Finding:
         with pytest.raises(InvalidInput) as caught:
-            load_task(path, steps=STEPS, conditions=CONDITIONS, expectations=CONDITIONS)
+            load_task(path, model=MODEL)
         (finding,) = caught.value.findings
         return finding
 
@@ -625,13 +625,13 @@ def test_a_file_that_is_not_there_names_its_neighbour(tmp_path: Path) -> None:
     assert refused(tmp_path / "pour.yaml" / "x").code == "USE101"
     assert refused(tmp_path / ("x" * 300)).code == "USE103"
     assert refused(tmp_path / "a\0b").code == "USE103"
-    located = load_task(tmp_path / "pour.yaml", steps=STEPS, conditions=CONDITIONS, expectations=CONDITIONS)
+    located = load_task(tmp_path / "pour.yaml", model=MODEL)
     assert located.spec == load(TASK).spec
 
 
 def test_the_schema_offers_each_verb_once_and_takes_expressions() -> None:
-    text = task_schema(STEPS, CONDITIONS, CONDITIONS)
-    assert text == task_schema(STEPS, CONDITIONS, CONDITIONS)
+    text = task_schema(MODEL)
+    assert text == task_schema(MODEL)
     schema = json.loads(text)
     steps = schema["properties"]["steps"]["items"]["oneOf"]
     assert [option["$ref"] for option in steps] == ["#/$defs/MoveStep", "#/$defs/PourStep", "#/$defs/WaitStep"]
