@@ -14,6 +14,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import ControllersSpec
 from manipcli.spec.expression import substitute
+from manipcli.spec.kind import refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.robot import RobotSpec
@@ -133,7 +134,7 @@ def _task_source(
 ) -> tuple[Source, list[Finding]]:
     """The tree of a task, overrides and parameters put in, and what is wrong with those."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
-    source, findings = _changed(_source(text, name, "TASK"), wanted, model)
+    source, findings = _changed(_source(text, name, "TASK", "task"), wanted, model)
     root, more = substitute(source.root, "TASK")
     return Source(name, root, "TASK"), [*findings, *more]
 
@@ -145,7 +146,7 @@ def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpe
 
 def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
     """As `load_robot`, from text; places call it `name`."""
-    source, findings = _changed(_source(text, name, "ROBOT"), read_overrides(overrides), RobotSpec)
+    source, findings = _changed(_source(text, name, "ROBOT", "robot"), read_overrides(overrides), RobotSpec)
     return validate(source, RobotSpec, findings=findings)
 
 
@@ -156,13 +157,17 @@ def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[Co
 
 def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
     """As `load_controllers`, from text; places call it `name`."""
-    root, told = rewrite(_source(text, name, "CTRL").root)
+    root, told = rewrite(_source(text, name, "CTRL", "controllers").root)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
     return validate(source, ControllersSpec, findings=[*told, *findings])
 
 
-def _source(text: str | bytes, name: str, area: Area) -> Source:
+def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> Source:
+    if kind is not None:
+        refuse_description(name, kind)
     root: Node | None = parse(text, name)
+    if kind is not None and root is not None:
+        refuse_other_kind(root, name, kind)
     return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area)
 
 

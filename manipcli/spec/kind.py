@@ -1,0 +1,47 @@
+"""A file given in the place of another kind, refused in one finding instead of by all that it lacks."""
+
+from __future__ import annotations
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode
+
+_DESCRIPTIONS = (".urdf", ".xacro")
+
+
+def refuse_description(name: str, wanted: str) -> None:
+    """A URDF or xacro, known by its `name`, where a file of the kind `wanted` belongs.
+
+    Raises:
+        InvalidInput: USE105 it is one.
+    """
+    if name.lower().endswith(_DESCRIPTIONS):
+        raise _refusal(name, "a robot description", wanted, hint=f"a robot file names it: `description: {name}`")
+
+
+def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
+    """The tree of the file `name` is of another kind than `wanted`, without doubt.
+
+    Raises:
+        InvalidInput: USE105 it is.
+    """
+    found = _certain_kind(root) if isinstance(root, MappingNode) else None
+    if found is not None and found != wanted:
+        raise _refusal(name, f"a {found} file", wanted)
+
+
+def _certain_kind(root: MappingNode) -> str | None:
+    """Which kind this is; None for the controllers files of ROS, and where keys of several kinds stand together."""
+    entries = root.entries
+    texts = {key for key, entry in entries.items() if isinstance(entry.node, ScalarNode)}
+    if "task" in texts or ("steps" in entries and isinstance(entries["steps"].node, SequenceNode)):
+        return "task"
+    if {"robot", "description"} <= texts:
+        return None if entries.keys() & {"controllers", "scene", "expect"} else "robot"
+    if entries.keys() <= {"version", "controllers"} and "controllers" in entries.keys() - texts:
+        return "controllers"
+    return None
+
+
+def _refusal(name: str, found: str, wanted: str, *, hint: str | None = None) -> InvalidInput:
+    message = f"this is {found}; a {wanted} file was expected"
+    return InvalidInput([Finding("USE105", message, Place(name, 1, 1), hint=hint)])
