@@ -19,9 +19,7 @@ Codes = list[str] | None
 
 
 def check_urdf(
-    file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)] = None,
     arguments: Annotated[
         list[str] | None,
         typer.Argument(metavar="[ARG:=VALUE]...", help="Arguments of a xacro file.", show_default=False),

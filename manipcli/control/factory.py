@@ -122,7 +122,7 @@ def _findings(spec: ControllersSpec, robot: RobotModel, place: Where) -> Iterato
             code="CTRL145",
             message=f"no controller commands {', '.join(repr(joint) for joint in idle)} of robot '{robot.name}'",
             place=place(("controllers",)),
-            hint="add them to a controller: a joint that nobody commands falls",
+            hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller: a joint that nobody commands falls",
         )
 
 
@@ -147,6 +147,12 @@ def _joint_findings(name: str, joint: str, robot: RobotModel, place: Place | Non
         yield Finding(code="CTRL143", message=message, place=place, hint=hint)
 
 
+def _other_owner(joint: str, joints: Collection[str], given: Collection[str], what: str) -> str:
+    """Whose gains or tolerances those `given` to `joint` may be: only a joint that has none was meant."""
+    without = [other for other in joints if other not in given]
+    return did_you_mean(joint, without, kind=f"joints without {what}") or f"take them out, or add '{joint}' to `joints`"
+
+
 def _gain_findings(name: str, spec: ControllerSpec, place: Where) -> Iterator[Finding]:
     at = ("controllers", name)
     for joint in spec.gains:
@@ -155,7 +161,7 @@ def _gain_findings(name: str, spec: ControllerSpec, place: Where) -> Iterator[Fi
                 code="CTRL102",
                 message=f"controller '{name}': '{joint}' has gains, but is not one of its joints",
                 place=place((*at, "gains", joint)),
-                hint=did_you_mean(joint, spec.joints, kind="joints"),
+                hint=_other_owner(joint, spec.joints, spec.gains, "gains"),
             )
     tolerances = spec.constraints.joints if isinstance(spec, JointTrajectorySpec) else {}
     for joint in tolerances:
@@ -164,7 +170,7 @@ def _gain_findings(name: str, spec: ControllerSpec, place: Where) -> Iterator[Fi
                 code="CTRL104",
                 message=f"controller '{name}': '{joint}' has tolerances, but is not one of its joints",
                 place=place((*at, "constraints", "joints", joint)),
-                hint=did_you_mean(joint, spec.joints, kind="joints"),
+                hint=_other_owner(joint, spec.joints, tolerances, "tolerances"),
             )
     if spec.command_interface == "position":
         return

@@ -64,9 +64,7 @@ _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 def cross(a: Array, b: Array) -> Array:
     """`a x b` for (..., 3), broadcast; for single vectors several times as fast as `np.cross`."""
-    return np.asarray(
-        a.take(_NEXT, axis=-1) * b.take(_LAST, axis=-1) - a.take(_LAST, axis=-1) * b.take(_NEXT, axis=-1)
-    )
+    return np.asarray(a.take(_NEXT, axis=-1) * b.take(_LAST, axis=-1) - a.take(_LAST, axis=-1) * b.take(_NEXT, axis=-1))
 
 
 def rotate(quat_xyzw: npt.ArrayLike, vector: npt.ArrayLike) -> Array:

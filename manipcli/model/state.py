@@ -37,7 +37,6 @@ class WorldState:
     body_linear: Array
     body_angular: Array
 
-
     def map(self, change: Callable[[Array], Array]) -> WorldState:
         """The same with every array changed: `states.map(np.copy)`, `states.map(lambda a: a[-1])`."""
         return WorldState(**{field.name: change(getattr(self, field.name)) for field in fields(self)})

@@ -172,7 +172,7 @@ def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tupl
         return None
     values = reader.numbers(element, attribute, count)
     if values is not None and min(values) <= 0.0:
-        message = f"<{element.tag} {attribute}=\"{element.attributes[attribute]}\">: expected positive lengths [m]"
+        message = f'<{element.tag} {attribute}="{element.attributes[attribute]}">: expected positive lengths [m]'
         reader.report("URDF012", message, element.place)
         return None
     return values

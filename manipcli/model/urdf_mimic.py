@@ -42,9 +42,7 @@ def resolve_mimics(reader: Reader, joints: Mapping[str, Joint], elements: Mappin
     return {name: dataclasses.replace(joint, mimic=resolved[name]) for name, joint in joints.items()}
 
 
-def _direct(
-    reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements: Mapping[str, Element]
-) -> Mimic | None:
+def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements: Mapping[str, Element]) -> Mimic | None:
     """Whom a joint says it follows; None with a finding where it cannot."""
     mimic = joint.mimic
     if mimic is None:

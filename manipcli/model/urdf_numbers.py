@@ -69,7 +69,7 @@ class Reader:
             return None
         words = text.split() if len(text) < 10_000 else [text]
         expected = "a number" if count == 1 else f"{count} numbers"
-        written = f"<{element.tag} {attribute}=\"{shorten(text)}\">"
+        written = f'<{element.tag} {attribute}="{shorten(text)}">'
         wrong = next((word for word in words if finite(word) is None), None)
         if wrong is not None:
             message = f"{written}: expected {expected}; '{shorten(wrong)}' is no finite number"

@@ -44,9 +44,7 @@ RULES: Final[dict[str, ElementRule]] = {
     "material": _rule("name", once="color texture"),
     "color": _rule("rgba"),
     "texture": _rule("filename"),
-    "joint": _rule(
-        "name type", once="origin parent child axis calibration dynamics limit safety_controller mimic"
-    ),
+    "joint": _rule("name type", once="origin parent child axis calibration dynamics limit safety_controller mimic"),
     "parent": _rule("link"),
     "child": _rule("link"),
     "axis": _rule("xyz"),

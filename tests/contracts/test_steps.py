@@ -117,9 +117,7 @@ def test_every_trajectory_rests_at_both_ends(planned: dict[str, Planned], name: 
 
 
 @every_case
-def test_limits_hold_at_1_khz_by_differences_of_the_samples(
-    task: Task, planned: dict[str, Planned], name: str
-) -> None:
+def test_limits_hold_at_1_khz_by_differences_of_the_samples(task: Task, planned: dict[str, Planned], name: str) -> None:
     """Differences are means over a tick, so a motion within its limits passes; jerk is that of stated accelerations."""
     for motion in planned[name].plan.motions:
         trajectory = motion.trajectory

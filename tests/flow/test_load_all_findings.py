@@ -44,7 +44,9 @@ expect:
 """,
     )
     assert [place[:2] for place in found] == [(5, 53), (5, 71), (7, 20), (8, 5), (9, 16), (11, 29), (12, 23)]
-    for (_, _, text), hint in zip(found, ("mass", "friction", "cup", "move", "home", "start", "more than 0"), strict=True):
+    for (_, _, text), hint in zip(
+        found, ("mass", "friction", "cup", "move", "home", "start", "more than 0"), strict=True
+    ):
         assert hint in text
 
 
@@ -54,7 +56,9 @@ def test_an_item_keeps_its_number_when_the_one_before_it_is_faulty(tmp_path: Pat
 
 
 def test_a_faulty_body_is_still_known_by_its_name(tmp_path: Path) -> None:
-    found = findings(tmp_path, "scene:\n  cup: {box: {size: 1}}\nsteps:\n  - pick: {object: cup, grasp: {posture: wrap}}\n")
+    found = findings(
+        tmp_path, "scene:\n  cup: {box: {size: 1}}\nsteps:\n  - pick: {object: cup, grasp: {posture: wrap}}\n"
+    )
     assert {line for line, _, _ in found} == {5}
 
 

@@ -28,8 +28,10 @@ GOOD = f'<robot name="r">\n{LINK_A}\n{LINK_B}\n{JOINT}\n</robot>'
 
 _CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 _FACES = [[_CORNERS[k] for k in face] for face in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))]
-TETRAHEDRON = bytes(80) + struct.pack("<I", 4) + b"".join(
-    struct.pack("<12f2x", 0, 0, 0, *(value for corner in face for value in corner)) for face in _FACES
+TETRAHEDRON = (
+    bytes(80)
+    + struct.pack("<I", 4)
+    + b"".join(struct.pack("<12f2x", 0, 0, 0, *(value for corner in face for value in corner)) for face in _FACES)
 )
 
 
@@ -123,7 +125,7 @@ BAD = {
         link_b('<collision><geometry><box size="1 -1 1"/></geometry></collision>'),
         "expected positive lengths",
     ),
-    "no radius": (link_b('<visual><geometry><sphere/></geometry></visual>'), "no attribute 'radius'"),
+    "no radius": (link_b("<visual><geometry><sphere/></geometry></visual>"), "no attribute 'radius'"),
     "collision mesh": (
         link_b('<collision><geometry><mesh filename="x.stl"/></geometry></collision>'),
         "collision mesh: 'x.stl' is not found",
@@ -246,7 +248,7 @@ def test_a_chain_of_mimics_follows_the_first_joint(tmp_path: Path) -> None:
     assert mimic is not None
     assert mimic.joint == "3"
     assert mimic.multiplier * q3 + mimic.offset == pytest.approx(2 * (-3 * q3 + 1) + 0.5, abs=1e-15)
-    circle = joints.replace("<mimic joint=\"3\"", "<mimic joint=\"1\"")
+    circle = joints.replace('<mimic joint="3"', '<mimic joint="1"')
     assert any("circle" in finding.message for finding in errors(tmp_path, f'<robot name="r">{links}{circle}</robot>'))
     assert parts.joints[1].mimic == Mimic("3", -3.0, 1.0)
 

@@ -108,12 +108,12 @@ ATTACKS = {
     "lambda": "<link name=\"${(lambda: load_yaml.__globals__['os'].system('touch CANARY'))()}\"/>",
     "builtins": "<link name=\"${load_yaml.__globals__['__builtins__']['open']('CANARY', 'w')}\"/>",
     "subclasses": "<link name=\"${python.vars(python.type)['__subclasses__'](python.type)}\"/>",
-    "eval": "<xacro:property name=\"p\" value=\"open('CANARY', 'w')\"/><link name=\"$(eval ${p})\"/>",
+    "eval": '<xacro:property name="p" value="open(\'CANARY\', \'w\')"/><link name="$(eval ${p})"/>',
     "eval import": "<link name=\"$(eval __import__('os').system('touch CANARY')\"/>",
     "format": "<link name=\"${'{0.__globals__[os].environ[HOME]}'.format(xacro.load_yaml)}\"/>",
     "env": '<link name="$(env HOME)"/>',
     "optenv": '<link name="$(optenv HOME x)"/>',
-    "command": '<link name="$(command \'touch CANARY\')"/>',
+    "command": "<link name=\"$(command 'touch CANARY')\"/>",
     "yaml outside": "<link name=\"${xacro.load_yaml('/etc/os-release')}\"/>",
     "yaml above": "<link name=\"${xacro.load_yaml('../../../../../../etc/os-release')}\"/>",
     "include outside": '<xacro:include filename="/etc/fonts/fonts.conf"/>',
@@ -125,9 +125,7 @@ ATTACKS = {
         f'<xacro:macro name="m{k}" params=""><xacro:m{k + 1}/><xacro:m{k + 1}/></xacro:macro>' for k in range(30)
     )
     + '<xacro:macro name="m30" params=""><link name="x"/></xacro:macro><xacro:m0/>',
-    "growing text": "".join(
-        f'<xacro:property name="p{k}" value="${{p{k + 1}}}${{p{k + 1}}}"/>' for k in range(30)
-    )
+    "growing text": "".join(f'<xacro:property name="p{k}" value="${{p{k + 1}}}${{p{k + 1}}}"/>' for k in range(30))
     + '<xacro:property name="p30" value="abc"/><link name="${p0}"/>',
     "unclosed quote": '<xacro:macro name="m" params="x:=LONG\'"/><xacro:m/>'.replace("LONG", "y" * 100),
     "many quotes": '<xacro:macro name="m" params="x:=LONG\'"/><xacro:m/>'.replace("LONG", "'a'" * 300),
@@ -168,7 +166,7 @@ def test_a_pipe_cannot_be_included(tmp_path: Path) -> None:
         "",
         "\0",
         "<robot><link name='a' name='b'/></robot>",
-        '<robot><xacro:x/></robot>',
+        "<robot><xacro:x/></robot>",
         "<robot>" + "<a>" * 200 + "</a>" * 200 + "</robot>",
         f'<robot name="{"a" * 70_000}"/>',
         "<sdf/>",

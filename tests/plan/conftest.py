@@ -92,6 +92,7 @@ def middle() -> Array:
     """A posture well inside the limits, elbow bent, fingers half open."""
     return np.array([0.1, 0.5, 0.0, -1.3, 0.0, 0.8, 0.2, 0.02, 0.02])
 
+
 ROOT = Path(__file__).parents[2]
 SCENE = """
   desk: {box: {size: [0.6, 1.0, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}

@@ -12,11 +12,6 @@ CHECK = Check(
         "Entities declared there can blow a small file up to gigabytes or read other files. A description needs none, "
         "and parsers disagree on them: PyBullet ignores them without a word."
     ),
-    bad=(
-        '<!DOCTYPE robot [<!ENTITY size "0.1">]>'
-        '<robot name="r">'
-        '<link name="base"/>'
-        "</robot>"
-    ),
+    bad=('<!DOCTYPE robot [<!ENTITY size "0.1">]><robot name="r"><link name="base"/></robot>'),
     find=found_while_reading("URDF051"),
 )

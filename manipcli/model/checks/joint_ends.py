@@ -9,10 +9,6 @@ CHECK = Check(
     severity="error",
     summary="A joint has no parent or no child",
     reason="A joint joins two links; without both, the description is no tree.",
-    bad=(
-        '<robot name="r">'
-        '<link name="base"/><joint name="j" type="fixed"><parent link="base"/></joint>'
-        "</robot>"
-    ),
+    bad=('<robot name="r"><link name="base"/><joint name="j" type="fixed"><parent link="base"/></joint></robot>'),
     find=found_while_reading("URDF060"),
 )

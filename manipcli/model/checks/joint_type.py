@@ -8,9 +8,7 @@ CHECK = Check(
     tier="schema",
     severity="error",
     summary="The type of a joint is missing or unknown",
-    reason=(
-        "Nobody can say how such a joint moves; PyBullet ends the whole program where the type is missing."
-    ),
+    reason=("Nobody can say how such a joint moves; PyBullet ends the whole program where the type is missing."),
     bad=(
         '<robot name="r">'
         '<link name="base"/><link name="tip"/>'

@@ -29,10 +29,6 @@ CHECK = Check(
     severity="warning",
     summary="An element of URDF stands where it does not belong",
     reason="Programs read it only in its place: an <inertial> below <robot> says nothing to anybody.",
-    bad=(
-        '<robot name="r">'
-        '<link name="base"><mass value="1"/></link>'
-        "</robot>"
-    ),
+    bad=('<robot name="r"><link name="base"><mass value="1"/></link></robot>'),
     find=_find,
 )

@@ -12,11 +12,6 @@ CHECK = Check(
         "Links, joints and meshes are found by name; PyBullet calls every link without a name the same and joins the "
         "wrong ones."
     ),
-    bad=(
-        '<robot name="r">'
-        '<link name="base"/>'
-        "<link/>"
-        "</robot>"
-    ),
+    bad=('<robot name="r"><link name="base"/><link/></robot>'),
     find=found_while_reading("URDF003"),
 )

@@ -9,9 +9,6 @@ CHECK = Check(
     severity="error",
     summary="The description has no link",
     reason="There is nothing to load; mostly a xacro file that only defines macros and calls none.",
-    bad=(
-        '<robot name="r">'
-        "</robot>"
-    ),
+    bad=('<robot name="r"></robot>'),
     find=found_while_reading("URDF080"),
 )

@@ -9,10 +9,6 @@ CHECK = Check(
     severity="error",
     summary="The file cannot be read as XML",
     reason="Nothing of such a file can be trusted: parsers that go on anyway lose what follows the mistake.",
-    bad=(
-        '<robot name="r">'
-        '<link name="base">'
-        "</robot>"
-    ),
+    bad=('<robot name="r"><link name="base"></robot>'),
     find=found_while_reading("URDF001"),
 )

@@ -9,8 +9,7 @@ CHECK = Check(
     severity="error",
     summary="A value has too few or too many numbers",
     reason=(
-        "PyBullet takes a vector of two or four numbers for 0 0 0 without a word: a link then sits where its parent "
-        "is."
+        "PyBullet takes a vector of two or four numbers for 0 0 0 without a word: a link then sits where its parent is."
     ),
     bad=(
         '<robot name="r">'

@@ -8,9 +8,7 @@ CHECK = Check(
     tier="schema",
     severity="warning",
     summary="A geometry has more than one shape",
-    reason=(
-        "Programs read the first and lose the others: what is drawn or collides is less than what was written."
-    ),
+    reason=("Programs read the first and lose the others: what is drawn or collides is less than what was written."),
     bad=(
         '<robot name="r">'
         '<link name="base"><visual><geometry>'

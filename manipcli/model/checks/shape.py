@@ -12,10 +12,6 @@ CHECK = Check(
         "PyBullet takes a size of 0 or less without a word and gives the link no inertia; without a shape nothing "
         "collides."
     ),
-    bad=(
-        '<robot name="r">'
-        '<link name="base"><collision><geometry/></collision></link>'
-        "</robot>"
-    ),
+    bad=('<robot name="r"><link name="base"><collision><geometry/></collision></link></robot>'),
     find=found_while_reading("URDF012"),
 )

@@ -12,10 +12,6 @@ CHECK = Check(
         "Descriptions come from anywhere; one that was made to exhaust memory or the stack of a parser is stopped "
         "early."
     ),
-    bad=(
-        '<robot name="r">'
-        f'{"<link>" * 120}{"</link>" * 120}'
-        "</robot>"
-    ),
+    bad=(f'<robot name="r">{"<link>" * 120}{"</link>" * 120}</robot>'),
     find=found_while_reading("URDF052"),
 )

@@ -31,9 +31,7 @@ CHECK = Check(
         "known to speak to another program (gazebo, ros2_control, anything with a prefix) are left alone."
     ),
     bad=(
-        '<robot name="r">'
-        '<link name="base"><colision><geometry><box size="1 1 1"/></geometry></colision></link>'
-        "</robot>"
+        '<robot name="r"><link name="base"><colision><geometry><box size="1 1 1"/></geometry></colision></link></robot>'
     ),
     find=_find,
 )

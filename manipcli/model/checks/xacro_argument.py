@@ -9,10 +9,6 @@ CHECK = Check(
     severity="error",
     summary="An argument is unknown, or has neither a value nor a default",
     reason="A misspelt argument would leave the default in place without a word.",
-    bad=(
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<link name="$(arg prefix)base"/>'
-        "</robot>"
-    ),
+    bad=('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg prefix)base"/></robot>'),
     find=found_while_reading("XACRO003"),
 )

@@ -12,10 +12,6 @@ CHECK = Check(
         "An undefined property or macro, a missing or unknown parameter, a block nobody uses, a bad condition: the "
         "place is that of the innermost element, the hint names the macros around it."
     ),
-    bad=(
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<link name="${nmae}"/>'
-        "</robot>"
-    ),
+    bad=('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${nmae}"/></robot>'),
     find=found_while_reading("XACRO001"),
 )

@@ -12,10 +12,6 @@ CHECK = Check(
         "The usual evaluation of xacro runs any Python and reads any file. Here a description is data: expressions "
         "compute numbers and text, and only what they need for that is there."
     ),
-    bad=(
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<link name="${load_yaml.__globals__}"/>'
-        "</robot>"
-    ),
+    bad=('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${load_yaml.__globals__}"/></robot>'),
     find=found_while_reading("XACRO002"),
 )

@@ -9,10 +9,6 @@ CHECK = Check(
     severity="warning",
     summary="The description or its expansion gives a warning",
     reason="Authors of macros warn of deprecated files and of values that do not fit together.",
-    bad=(
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<link name="base${xacro.warning(0)}"/>'
-        "</robot>"
-    ),
+    bad=('<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="base${xacro.warning(0)}"/></robot>'),
     find=found_while_reading("XACRO010"),
 )
