@@ -203,7 +203,7 @@ def claim_findings(
             Finding(
                 code="CTRL145",
                 message=f"no controller commands {', '.join(repr(name) for name in idle)}",
-                hint="add them to a controller: a joint that nobody commands falls",
+                hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller: a joint that nobody commands falls",
             )
         )
     return tuple(findings)

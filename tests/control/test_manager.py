@@ -200,6 +200,15 @@ def test_all_findings_of_a_file_come_at_once_each_with_its_place():
     assert ("controllers", "arm", "gains", "left_1") in asked
 
 
+def test_gains_of_no_joint_of_the_controller_point_to_a_joint_without_gains():
+    misspelt = spec(hand={"joints": ["lfet_1", "left_2"], "gains": gains(["left_1", "left_2"])})
+    hints = {finding.code: finding.hint for finding in findings(misspelt)}
+    assert hints["CTRL102"] == "did you mean 'lfet_1'?"
+    spare = spec(hand={"joints": ["left_2"], "gains": gains(["left_1", "left_2"])})
+    hints = {finding.code: finding.hint for finding in findings(spare)}
+    assert hints["CTRL102"] == "take them out, or add 'left_1' to `joints`"
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
