@@ -140,7 +140,13 @@ def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
         refusal.cause
     )
     assert "(90 of 90)" in refusal.cause
-    assert refusal.hint == "move the goal nearer, or change the orientation of the tool"
+    assert refusal.hint.startswith("move 'can', or say from where and how high it is taken")
+
+
+def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) -> None:
+    refusal = bench("panda").refused("pick", {"object": "block", "approach": {"from": "top"}, "grasp": {"height": 0}})
+    assert "overlap" in refusal.cause
+    assert "`grasp: {height: ...}`" in refusal.hint
 
 
 def test_a_cup_behind_a_wall_names_the_wall_and_the_motion(bench: Make) -> None:

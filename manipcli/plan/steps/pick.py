@@ -35,6 +35,8 @@ YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 
+_OTHERWISE = "say from where and how high it is taken: `approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`"
+
 
 class ApproachSpec(Model):
     """From where the hand comes."""
@@ -87,7 +89,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
             out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
         refusal = out_of_reach[k]
         if refusal is not None:
-            raise refusal
+            raise NotPlannable(refusal.cause, hint=f"move '{spec.object}', or {_OTHERWISE}")
         draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
         draft.straight("approach", X_WG, speed=spec.speed / 2)
         draft.close(
