@@ -137,10 +137,15 @@ class Recorder:
             self._writing = self._thread.submit(self._container.chunk, content)
 
     def _written(self) -> None:
-        """Waits for the thread; what it met is raised here."""
-        writing, self._writing = self._writing, None
-        if writing is not None:
+        """Waits for the thread; what it met is raised here. An interrupted wait is not over: the thread still writes."""
+        writing = self._writing
+        if writing is None:
+            return
+        try:
             writing.result()
+        finally:
+            if writing.done():
+                self._writing = None
 
     def finish(self, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """Writes the last metadata (the verdict) and the summary, closes the file and gives it its name."""

@@ -46,9 +46,11 @@ class PybulletEngine:
             self._client: int = pybullet.connect(pybullet.DIRECT)
             try:
                 self._build(robot, scene, settings)
-            except pybullet.error as error:
+            except BaseException as error:
                 self.close()
-                raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
+                if isinstance(error, pybullet.error):
+                    raise SimulationFailed(f"the engine refused the world: {error}", time=0.0) from error
+                raise
 
     def _build(self, robot: RobotModel, scene: Scene, settings: EngineSettings) -> None:
         p, client = self._p, self._client
@@ -186,7 +188,7 @@ class PybulletEngine:
         ]
         limits = [joint.limits for joint in robot.moving_joints]
         self._efforts = [UNLIMITED_EFFORT if limit.effort is None else limit.effort for limit in limits]
-        self._velocities = [limit.velocity or math.inf for limit in limits]
+        self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
 
     def _couple(self, robot: RobotModel, follower: str, driver: str, multiplier: float, offset: float) -> None:
         """A gear constraint between the two joints' child links: follower - multiplier * driver = offset."""
