@@ -119,8 +119,8 @@ def finding_object(finding: Finding) -> dict[str, Json]:
     return {
         "code": finding.code,
         "file": place.file if place is not None else None,
-        "line": place.line if place is not None else None,
-        "column": place.column if place is not None else None,
+        "line": place.line if place is not None and place.line > 0 else None,
+        "column": place.column if place is not None and place.line > 0 else None,
         "message": finding.message,
         "hint": finding.hint,
     }

@@ -61,3 +61,9 @@ def test_judging_a_log_says_what_the_run_said() -> None:
 def test_what_is_no_number_is_null(margin: float) -> None:
     verdict = Verdict("t", "passed", 0, "kinematic", 1.0, (), (ExpectationOutcome("x", "passed", margin, "m", None),))
     assert json.loads(render_verdict(verdict, "x"))["expectations"][0]["margin"] is None
+
+
+def test_of_a_file_as_a_whole_line_and_column_are_unknown() -> None:
+    finding = Finding("USE101", "there is no such file", Place("a.yaml", 0, 0))
+    (error,) = json.loads(render_errors([finding]))["errors"]
+    assert (error["file"], error["line"], error["column"]) == ("a.yaml", None, None)
