@@ -8,6 +8,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.describe import DESCRIPTIONS, inspect
+from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectations import EXPECTATIONS
@@ -33,7 +34,8 @@ def _findings(path: Path) -> tuple[Finding, ...]:
     try:
         kind = load.kind_of(path)
         if kind == "task":
-            return load_task(path).findings
+            task = load_task(path)
+            return (*task.findings, *gain_findings(task))
         if kind == "controllers":
             return load.load_controllers(path).findings
         file = load.load_robot(path)

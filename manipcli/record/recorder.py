@@ -137,7 +137,7 @@ class Recorder:
             self._writing = self._thread.submit(self._container.chunk, content)
 
     def _written(self) -> None:
-        """Waits for the thread; what it met is raised here. An interrupted wait is not over: the thread still writes."""
+        """Waits for the thread; what it met is raised here. After an interrupted wait it still writes."""
         writing = self._writing
         if writing is None:
             return
