@@ -10,6 +10,7 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.describe import DESCRIPTIONS, inspect
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
+from manipcli.flow.postures import posture_findings
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
@@ -39,8 +40,8 @@ def _findings(path: Path) -> tuple[Finding, ...]:
         if kind == "controllers":
             return load.load_controllers(path).findings
         file = load.load_robot(path)
-        _, notes = build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))
-        return (*file.findings, *notes)
+        robot, notes = build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))
+        return (*file.findings, *notes, *posture_findings(file, robot))
     except InvalidInput as invalid:
         return invalid.findings
 

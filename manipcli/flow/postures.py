@@ -1,0 +1,40 @@
+"""Does a robot touch itself in one of its named poses?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manipcli.core.errors import Finding
+from manipcli.model.collision import CollisionChecker
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.hand import with_mimics
+from manipcli.spec.located import Located
+from manipcli.spec.robot import RobotSpec
+
+
+def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:
+    """A warning for every pair of links that overlap in a named pose; other joints stand as at `home`, if there is one.
+
+    Not told: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
+    """
+    nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
+    query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()
+    rest = np.zeros(len(robot.joint_names))
+    for pose in (pose for pose in robot.poses if pose.name == "home"):
+        rest[robot.indices(pose.joints)] = pose.positions
+    for pose in robot.poses:
+        q = rest.copy()
+        q[robot.indices(pose.joints)] = pose.positions
+        for hit in query.every(with_mimics(robot, q)):
+            a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
+            yield Finding(
+                code="ROBOT340",
+                message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {-1000 * hit.distance:.1f} mm",
+                place=file.place("poses", pose.name),
+                hint="change the pose; or list the pair under `collision_ignore` if the links may touch",
+                severity="warning",
+            )

@@ -1,0 +1,30 @@
+"""A named pose in which the robot touches itself is told, with the pair and the place of the pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from manipcli.flow.check import check_files
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+
+@pytest.mark.parametrize("name", ["arm7_hand3", "iiwa7", "panda"])
+def test_no_pose_of_the_robots_here_is_told(name: str) -> None:
+    findings = check_files([ROBOTS / name / "robot.yaml"])
+    assert not [finding for finding in findings if finding.severity != "note"]
+
+
+def test_an_arm_folded_into_itself_is_told_where_the_pose_stands(tmp_path: Path) -> None:
+    text = (ROBOTS / "arm7_hand3" / "robot.yaml").read_text()
+    text = text.replace("description: urdf", f"description: {ROBOTS}/arm7_hand3/urdf")
+    text = text.replace("  wrap:", "  folded: {arm: [0, -2.0, 0, -2.05, 0, 2.05, 0]}\n  wrap:")
+    file = tmp_path / "robot.yaml"
+    file.write_text(text)
+    found = [finding for finding in check_files([file]) if finding.code == "ROBOT340"]
+    assert found
+    assert all("'folded'" in finding.message for finding in found)
+    line = text.splitlines().index("  folded: {arm: [0, -2.0, 0, -2.05, 0, 2.05, 0]}") + 1
+    assert {finding.place.line for finding in found if finding.place} == {line}
