@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def check_urdf(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)] = None,
     arguments: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[ARG:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
+        typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
     ] = None,
     *,
     format_: Annotated[
@@ -69,7 +69,7 @@ def check_urdf(
     if in_place and not fix:
         raise InvalidInput([Finding("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
     codes = describe.wanted_codes(_words(select), _words(ignore))
-    given = _arguments(arguments or [])
+    given = xacro_arguments(arguments or [])
 
     def inspect(path: Path) -> Inspection:
         return describe.inspect(
@@ -134,14 +134,3 @@ def _rendered(
 
 def _words(options: list[str] | None) -> tuple[str, ...]:
     return tuple(word for option in options or [] for word in option.replace(",", " ").split())
-
-
-def _arguments(words: list[str]) -> dict[str, str]:
-    found = {}
-    for word in words:
-        name, mark, value = word.partition(":=")
-        if not mark or not name:
-            message = f"'{word}' is no argument of a description; expected ARG:=VALUE"
-            raise InvalidInput([Finding("USE045", message)])
-        found[name] = value
-    return found

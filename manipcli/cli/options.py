@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from manipcli.core.errors import Finding, InvalidInput
+
 OutputFormat = Literal["text", "json"]
 
 Format = Annotated[OutputFormat, typer.Option("--format", help="Text for people, or one JSON object on stdout.")]
@@ -31,3 +33,19 @@ PackagePath = Annotated[
 AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a file lie outside the folders of its packages.")
 ]
+
+
+def xacro_arguments(words: list[str]) -> dict[str, str]:
+    """`NAME:=VALUE` words by name.
+
+    Raises:
+        InvalidInput: a word that is none.
+    """
+    found = {}
+    for word in words:
+        name, mark, value = word.partition(":=")
+        if not mark or not name:
+            message = f"'{word}' is no argument of a description; expected NAME:=VALUE"
+            raise InvalidInput([Finding("USE045", message)])
+        found[name] = value
+    return found

@@ -9,8 +9,8 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.cli.options import AllowOutside, PackagePath
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
+from manipcli.core.errors import ExitCode
 
 
 def view(
@@ -32,7 +32,7 @@ def view(
     Joints by sliders, named poses, collision shapes, frames, inertia boxes. Ctrl-C ends it.
     """
     with Interrupts():
-        given = _arguments(arguments or [])
+        given = xacro_arguments(arguments or [])
         from manipcli.flow.look import load_sight
         from manipcli.replay.view import View
         from manipcli.report import text
@@ -54,14 +54,3 @@ def view(
             except KeyboardInterrupt:
                 console.talk("")
     return ExitCode.PASSED
-
-
-def _arguments(words: list[str]) -> dict[str, str]:
-    found = {}
-    for word in words:
-        name, mark, value = word.partition(":=")
-        if not mark or not name:
-            message = f"'{word}' is no argument of a description; expected NAME:=VALUE"
-            raise InvalidInput([Finding("VIEW004", message)])
-        found[name] = value
-    return found

@@ -42,7 +42,7 @@ def test_it_prints_the_address_and_ends_well(tmp_path: Path, number: signal.Sign
     ("words", "code", "says"),
     [
         (["gone.urdf"], "USE101", "no such file"),
-        (["one.urdf", "side=left"], "VIEW004", "NAME:=VALUE"),
+        (["one.urdf", "side=left"], "USE045", "NAME:=VALUE"),
         (["one.urdf", "side:=left"], "XACRO003", "side"),
         (["robot.yaml", "side:=left"], "VIEW002", "side"),
         (["controllers.yaml"], "VIEW003", "controllers"),
