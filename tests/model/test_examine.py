@@ -210,3 +210,13 @@ def test_two_arms_are_two_chains_and_a_linkage_is_none(tmp_path: Path) -> None:
     assert found.parts is not None
     groups = guess_groups(found.parts.root, found.parts.joints)
     assert [(group.kind, len(group.joints), group.tip) for group in groups] == [("chain", 6, "l5"), ("chain", 6, "r5")]
+
+
+def test_a_link_that_is_not_there_is_told_once_and_has_no_further_faults(tmp_path: Path) -> None:
+    file = tmp_path / "r.urdf"
+    file.write_text(
+        '<robot name="r"><link name="a"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 0 1"/></joint></robot>'
+    )
+    errors = [f for f in examine(file, packages=Packages(file)).findings if f.severity != "note"]
+    assert [f.code for f in errors] == ["URDF006"]

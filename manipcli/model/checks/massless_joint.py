@@ -15,10 +15,10 @@ def _find(subject: Subject) -> Iterator[Finding]:
     links = elements_by_name(subject.description.root, "link")
     massive = {name for name, link in links.items() if _states_mass(link)}
     for joint, body in moved_bodies(subject.parts):
-        if not massive.intersection(body):
+        if joint.child in links and not massive.intersection(body):  # of a link that is not there enough is said
             message = f"joint '{joint.name}' moves nothing that has mass: link '{joint.child}' has no inertial"
-            place = links[joint.child].place if joint.child in links else None
-            yield Finding("URDF100", message, place, "state the mass and moments of inertia of the link", "warning")
+            hint = "state the mass and moments of inertia of the link"
+            yield Finding("URDF100", message, links[joint.child].place, hint, "warning")
 
 
 def _states_mass(link: Element) -> bool:
