@@ -65,9 +65,12 @@ def _lines(xml: str) -> list[str]:
 
 
 def render_checks(checks: Iterable[Check]) -> str:
-    """The table of checks."""
-    rows = [(check.code, check.name, check.tier, check.severity, check.summary) for check in checks]
-    return table(("code", "name", "tier", "severity", "what is wrong"), rows)
+    """The table of checks, one a line, with the reason of each."""
+    rows = [
+        (check.code, check.name, check.tier, check.severity, check.summary, " ".join(check.reason.split()))
+        for check in checks
+    ]
+    return table(("code", "name", "tier", "severity", "what is wrong", "why it matters"), rows)
 
 
 _TOP = re.compile(r"><(?=/?(robot|link|joint|material|inertial|visual|collision|xacro:|transmission|ros2)\b)")

@@ -161,3 +161,4 @@ class TestCheckUrdf:
         assert main(["list", "checks"]) == 0
         rows = capsys.readouterr().out.splitlines()
         assert [row.split()[0] for row in rows[1:]] == [check.code for check in CHECKS]
+        assert all(" ".join(check.reason.split()) in row for check, row in zip(CHECKS, rows[1:], strict=True))
