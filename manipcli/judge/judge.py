@@ -34,7 +34,7 @@ def judge(
 ) -> Verdict:
     """Judge a recording by what its task expected.
 
-    The order of importance: a run that was interrupted, crashed or has lost its end is an `error`, whatever else is
+    The order of importance: a run that was interrupted, did not end or has lost its end is an `error`, whatever else is
     true of it; a step that is not done makes it `failed`; so does an expectation that is not met, or could not be
     evaluated. With no expectations the steps alone decide, and the text says so.
 
@@ -47,7 +47,7 @@ def judge(
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
     errors = _errors(recording, status)
-    steps = step_outcomes(recording, interrupted=bool(errors) and status != "crashed")
+    steps = step_outcomes(recording, interrupted=bool(errors))
     examined = examine(
         recording, expect, robot=robot, scene=scene, seam=seam, physics=run.get("physics", "") == "full", steps=steps
     )
@@ -71,8 +71,6 @@ def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
     errors = []
     if status == "interrupted":
         errors.append(Finding(INTERRUPTED, "the run was interrupted"))
-    elif status == "crashed":
-        errors.append(Finding("RUN102", "the run crashed", hint="its log ends where it did; see its last events"))
     elif status not in _JUDGED:
         what = f"status '{status}'" if status else "no status"
         errors.append(Finding("RUN103", f"the run did not come to its end: the log has {what}"))

@@ -312,7 +312,7 @@ def test_a_log_without_plan_knows_the_steps_that_started_and_one_without_steps_f
     ("changes", "code"),
     [
         ({"metadata": run(status="interrupted")}, "RUN101"),
-        ({"metadata": run(status="crashed")}, "RUN102"),
+        ({"metadata": run(status="crashed")}, "RUN103"),
         ({"metadata": run(status="running")}, "RUN103"),
         ({"metadata": {}}, "RUN103"),
         ({"lost": "the file ends in a record"}, "RUN104"),
