@@ -39,6 +39,7 @@ class Interrupts:
 
     def __exit__(self, *raised: object) -> None:
         for one, before in self._before.items():
+            # `before` is what signal.signal returned; its declared type is wider than what it takes.
             signal.signal(one, before if before is not None else signal.SIG_DFL)  # type: ignore[arg-type]
 
     def check(self) -> None:

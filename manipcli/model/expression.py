@@ -125,6 +125,7 @@ def python_symbols() -> dict[str, Value]:
         return list(steps)
 
     def bounded_list(function: Callable[..., Value]) -> Callable[..., Value]:
+        # A Value may be a number; zip, map and their like answer that with the TypeError that becomes a finding.
         return lambda *values: bounded(list(function(*(bounded(value) for value in values))))  # type: ignore[call-overload]
 
     def text(value: Value = "") -> str:
@@ -241,6 +242,7 @@ class Evaluator:
             raise Refused(f"'{ast.unparse(node.value)[:80]}' has no items")
         index = self._index(node.slice, names)
         try:
+            # An index of the wrong kind is Python's to refuse: its TypeError becomes a finding.
             return container[index]  # type: ignore[call-overload,index]
         except LookupError:
             near = did_you_mean(str(index), map(str, list(container)[:100])) if isinstance(container, dict) else None
@@ -279,6 +281,7 @@ class Evaluator:
                 if size_of(owner) * size_of(list(arguments)) > bounds().value_size * 64:
                     raise too_large("a text")
             result = method(owner, *arguments)
+            # These three methods give views, which mypy cannot know from a name.
             return list(result) if name in {"keys", "values", "items"} else result  # type: ignore[call-overload]
 
         return call

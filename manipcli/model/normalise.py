@@ -146,7 +146,7 @@ FileOf = Callable[[Mesh], str]
 def _link(link: Link, inertial: Inertial | None, visuals: Sequence[Geometry], file_of: FileOf) -> list[str]:
     lines = [f"  <link name={quoteattr(link.name)}>"]
     if inertial is not None:
-        I = inertial.inertia  # noqa: E741
+        I = inertial.inertia  # noqa: E741  (the inertia matrix)
         lines += ["    <inertial>", *_origin(inertial.X_LI, "      ")]
         lines.append(f'      <mass value="{number(inertial.mass)}"/>')
         moments = {"ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2]}

@@ -87,7 +87,7 @@ def _product(reader: Reader, moments: Element, key: str) -> float:
     return reader.number(moments, key, 0.0) or 0.0
 
 
-def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741
+def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741  (the inertia matrix)
     if not I.any():
         return True  # a point mass: `read_parts` refuses it where a joint moves it
     principal = np.linalg.eigvalsh(I)

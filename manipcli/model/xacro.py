@@ -122,6 +122,7 @@ class _Expansion:
         }
         for name, door in doors.items():
             setattr(module, name, door)
+        # Names of the private copy of the library, which a module's type does not list.
         module.re_macro_arg = _MACRO_ARGUMENT  # type: ignore[attr-defined]
         module._global_symbols = self._symbols()  # type: ignore[attr-defined]
 

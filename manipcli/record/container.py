@@ -233,6 +233,7 @@ def _records(records: Sequence[McapRecord]) -> bytes:
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
+    # The library's builder carries no types.
     data: bytes = builder.end()  # type: ignore[no-untyped-call]
     return data
 

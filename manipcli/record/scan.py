@@ -221,6 +221,7 @@ def _decompress(compression: str, packed: memoryview, size: int) -> bytes | None
         except zstandard.ZstdError:
             return None
     if compression == "lz4":
+        # It ships no types.
         import lz4.frame  # type: ignore[import-untyped]
 
         try:

@@ -134,9 +134,11 @@ def _checked_requests() -> Iterator[list[object]]:
                     return process_request(connection, request)
                 return connection.respond(http.HTTPStatus.FORBIDDEN, "Only for the browser of this machine.\n")
 
+            # What viser passes on is the library's business: handed through unread.
             super().__init__(*arguments, process_request=answer, **options)  # type: ignore[arg-type]
             made.append(self)
 
+    # A class stands in for the library's class of this name, for as long as viser starts.
     library.serve = Checked  # type: ignore[misc, assignment]
     try:
         yield made

@@ -54,6 +54,7 @@ def _task_model(steps: Members, conditions: Members, expectations: Members) -> t
     expectation = _union("expectation", ConditionSpec, expectations, common=())
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`|` is no operator of `object`)
     step = _union("verb", StepSpec, steps, common=_COMMON, until=until)
+    # These types are made at run time, which annotations cannot follow.
     model = create_model(
         "TaskSpec",
         __base__=TaskSpec,

@@ -37,6 +37,9 @@ def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links:
             yield from _unlike_joint(p.getJointInfo(body, k, physicsClientId=client), robot)
 
 
+# PyBullet's tuples come untyped; what stands where is said by its manual, and a wrong guess ends in an error here.
+
+
 def _inertial(info: tuple[object, ...]) -> Inertial:
     mass, moments, p, quat = info[0], info[2], info[3], info[4]
     X_LI = Transform.of(xyz=p, quat_xyzw=quat)  # type: ignore[arg-type]
