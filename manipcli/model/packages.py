@@ -175,12 +175,16 @@ class Unread(Packages):
 
     def __init__(self) -> None:
         super().__init__(None)
+        self._written: dict[Path, str] = {}
 
     def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
-        return Path(uri)
+        # A path has no place for the two slashes of `package://`: how it was written is kept beside it.
+        path = Path(uri)
+        self._written[path] = uri
+        return path
 
     def portable(self, path: Path) -> str:
-        return str(path)
+        return self._written[path]
 
 
 def _uri(root: Path, path: Path) -> str:

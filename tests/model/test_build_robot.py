@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput, Place
-from manipcli.model.build_robot import build_robot
+from manipcli.model.build_robot import build_robot, rebuild_robot
 from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import RobotSpec
@@ -274,6 +274,14 @@ def test_a_hand_of_its_own_file_reads_again_too(file: Path, tmp_path: Path) -> N
     robot = build(file, **HANDED)
     (tmp_path / "again.urdf").write_text(robot.urdf)
     assert_same(robot, build(file, description="again.urdf"))
+
+
+def test_the_robot_of_a_log_names_its_meshes_as_the_log_does() -> None:
+    path = Path(__file__).parents[2] / "robots" / "arm7_hand3" / "robot.yaml"
+    content = RobotSpec(robot="arm7_hand3", description=DESCRIPTIONS["arm7_hand3"])
+    robot, _ = build_robot(content, file=path)
+    assert rebuild_robot(content, robot.urdf.encode()).urdf == robot.urdf
+    assert robot.urdf.count('filename="package://arm7_hand3/') > 10
 
 
 def test_a_joint_that_moves_no_mass_is_no_matter_for_physics(file: Path) -> None:
