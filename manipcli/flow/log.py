@@ -16,6 +16,7 @@ from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import Mesh, RobotModel
+from manipcli.model.scene import Scene
 from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.messages import portable_name
@@ -113,21 +114,30 @@ def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
     Raises:
         InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
     """
-    recording = open_recording(path, being_written=being_written)
+    return judge_recording(open_recording(path, being_written=being_written), path)
+
+
+def judge_recording(recording: Recording, path: Path) -> Verdict:
+    """The verdict on a log that is open already; see `judge_log`."""
     task = load_task_text(_attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
     expect = [(expected.name, expected.body) for expected in task.expect]
-    try:
-        scene = scene_from_json(_attached(recording, path, SCENE))
-    except ValueError as error:
-        message = f"{path.name}/{SCENE}: this is not the scene of a log"
-        raise InvalidInput([Finding("LOG103", message)]) from error
-    return judge(recording, expect=expect, robot=_recorded_robot(recording, path), scene=scene)
+    scene = recorded_scene(recording, path)
+    return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
 
 
-def _recorded_robot(recording: Recording, path: Path) -> RobotModel:
+def recorded_robot(recording: Recording, path: Path) -> RobotModel:
     """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
     spec = load_robot_text(_attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
     return rebuild_robot(spec, _attached(recording, path, URDF))
+
+
+def recorded_scene(recording: Recording, path: Path) -> Scene:
+    """The scene of a log at its start; no mesh is looked for."""
+    try:
+        return scene_from_json(_attached(recording, path, SCENE))
+    except ValueError as error:
+        message = f"{path.name}/{SCENE}: this is not the scene of a log"
+        raise InvalidInput([Finding("LOG103", message)]) from error
 
 
 def _attached(recording: Recording, path: Path, name: str) -> bytes:

@@ -17,12 +17,13 @@ def within(limits: JointLimits, value: float) -> float:
 
 
 def following(robot: RobotModel, q: npt.ArrayLike) -> Array:
-    """(n,) the same with every mimic joint where its leader puts it: multiplier * q_leader + offset."""
+    """(..., n) the same with every mimic joint where its leader puts it: multiplier * q_leader + offset."""
     position = np.array(q, dtype=np.float64)
     index = {name: k for k, name in enumerate(robot.joint_names)}
     for k, joint in enumerate(robot.moving_joints):
         if joint.mimic is not None:
-            position[k] = joint.mimic.multiplier * position[index[joint.mimic.joint]] + joint.mimic.offset
+            leader = position[..., index[joint.mimic.joint]]
+            position[..., k] = joint.mimic.multiplier * leader + joint.mimic.offset
     return frozen(position)
 
 

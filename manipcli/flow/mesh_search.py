@@ -1,0 +1,97 @@
+"""The mesh files of a log, found again on the machine that shows it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from manipcli.model.packages import NotFound, Packages
+from manipcli.model.robot import Geometry, Mesh, RobotModel
+from manipcli.model.scene import Scene
+
+
+class MeshSearch:
+    """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
+
+    Packages are looked for as for a description beside the log, and in the working directory and its folders. What is
+    not found keeps its URI as its path: whoever draws it draws something else.
+
+    Args:
+        log: where the log is.
+        hashes: SHA-256 of the files in the run, by URI, where they are known.
+        package_path, allow_outside: see `Packages`.
+    """
+
+    def __init__(
+        self,
+        log: Path,
+        *,
+        hashes: Mapping[str, str] = {},
+        package_path: Sequence[Path] = (),
+        allow_outside: bool = False,
+    ) -> None:
+        here = Path.cwd()
+        places = [*package_path, here, *_folders(here), *_folders(log.resolve().parent)]
+        self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
+        self._hashes = hashes
+        self._found: dict[str, Path] = {}
+        self._notes: dict[str, None] = {}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was not found, or is another file than in the run; a sentence each."""
+        return tuple(self._notes)
+
+    def robot(self, robot: RobotModel) -> RobotModel:
+        """The robot with the files of its meshes."""
+        links = tuple(
+            replace(link, visuals=self._all(link.visuals), collisions=self._all(link.collisions))
+            for link in robot.links
+        )
+        return replace(robot, links=links)
+
+    def scene(self, scene: Scene) -> Scene:
+        """The scene with the files of its meshes."""
+        return replace(
+            scene, bodies=tuple(replace(body, geometries=self._all(body.geometries)) for body in scene.bodies)
+        )
+
+    def _all(self, geometries: tuple[Geometry, ...]) -> tuple[Geometry, ...]:
+        return tuple(
+            replace(one, shape=replace(one.shape, path=self._path(one.shape.uri)))
+            if isinstance(one.shape, Mesh)
+            else one
+            for one in geometries
+        )
+
+    def _path(self, uri: str) -> Path:
+        if uri not in self._found:
+            self._found[uri] = self._search(uri)
+        return self._found[uri]
+
+    def _search(self, uri: str) -> Path:
+        try:
+            path = self._packages.resolve(uri)
+        except NotFound as error:
+            scheme, _, rest = uri.partition("://")
+            if scheme == "package":
+                name = rest.partition("/")[0]
+                note = f"package '{name}' is not found, or lacks a mesh: give its place with --package-path DIR"
+            else:
+                note = error.message
+            self._notes.setdefault(note)
+            return Path(uri)
+        known = self._hashes.get(uri)
+        if known is not None and hashlib.sha256(path.read_bytes()).hexdigest() != known:
+            self._notes.setdefault(f"mesh '{uri}' is not the file that it was in the run")
+        return path
+
+
+def _folders(folder: Path) -> list[Path]:
+    """The folders in a folder that are not hidden, by name."""
+    try:
+        return sorted(one for one in folder.iterdir() if one.is_dir() and not one.name.startswith("."))
+    except OSError:
+        return []

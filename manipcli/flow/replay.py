@@ -1,0 +1,80 @@
+"""A log to what is shown of it, from nothing but the log and the files of its meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.flow.log import judge_recording, recorded_robot, recorded_scene
+from manipcli.flow.mesh_search import MeshSearch
+from manipcli.judge.verdict import StepOutcome, Verdict
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import TaskEvent
+from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
+from manipcli.replay.sampling import plot_tables, sampled
+
+
+def open_playback(
+    path: Path, *, rate: float = RATE, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> Playback:
+    """A log as it is shown.
+
+    Args:
+        path: the log of a run, or what a killed run left of it.
+        rate: [Hz] of what is shown.
+        package_path: folders to look for packages of meshes in, before those near the log and the working directory.
+        allow_outside: lets a mesh lie anywhere.
+
+    Raises:
+        InvalidInput: the file is no log, is damaged, or has nothing to show.
+    """
+    recording = open_recording(path)
+    samples = sampled(recording, rate=rate)
+    if not len(samples.times):
+        raise InvalidInput([Finding("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
+    robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
+    verdict = judge_recording(recording, path)
+    meshes = MeshSearch(
+        path, hashes=recording.metadata.get("meshes", {}), package_path=package_path, allow_outside=allow_outside
+    )
+    robot, scene = meshes.robot(robot), meshes.scene(scene)
+    return Playback(
+        name=verdict.task or path.name,
+        robot=robot,
+        scene=scene,
+        times=samples.times,
+        position=samples.position,
+        reference=samples.reference,
+        body_position=samples.body_position,
+        body_quat_xyzw=samples.body_quat_xyzw,
+        contacts=samples.contacts,
+        steps=playback_steps(verdict, recording.events, end=float(samples.times[-1])),
+        verdict=verdict,
+        lost=recording.lost,
+        notes=meshes.notes,
+        tables_of=partial(plot_tables, recording, robot),
+    )
+
+
+def playback_steps(verdict: Verdict, events: Sequence[TaskEvent], *, end: float) -> tuple[PlaybackStep, ...]:
+    """The steps that were begun; what did not end, ends at `end` [s]."""
+    begun = [step for step in verdict.steps if step.started is not None]
+    return tuple(_step(step, events, end) for step in sorted(begun, key=lambda step: step.started or 0.0))
+
+
+def _step(step: StepOutcome, events: Sequence[TaskEvent], end: float) -> PlaybackStep:
+    start, last = step.started or 0.0, end if step.ended is None else step.ended
+    begins = [(one.text, one.time) for one in events if one.kind == "phase_started" and one.step == step.id]
+    return PlaybackStep(
+        id=step.id,
+        verb=step.verb,
+        label=step.id if step.id.startswith(step.verb) else f"{step.id} ({step.verb})",
+        start=start,
+        end=last,
+        outcome=step.outcome,
+        text=step.text,
+        phases=tuple(Phase(a, begin, stop) for (a, begin), (_, stop) in pairwise([*begins, ("", last)])),
+    )

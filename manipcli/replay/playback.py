@@ -1,0 +1,165 @@
+"""A run as it is shown: what stood where at the rate of a screen, its steps, and its curves at the rate of the log.
+
+One value for everything that shows a log: the page in the browser, the page in a file, pictures, films and plots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from manipcli.core.geometry import Array, rotate
+from manipcli.judge.verdict import Verdict
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact
+from manipcli.replay.placing import Placing, Poses
+from manipcli.replay.posture import following
+
+RATE = 50.0
+"""[Hz] at which a run is shown unless somebody asks for another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """A part of a step, from `start` to `end` [s]."""
+
+    name: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlaybackStep:
+    """A step that was begun. `outcome` as judged; `end` [s] is that of the log where the step never ended."""
+
+    id: str
+    verb: str
+    label: str
+    start: float
+    end: float
+    outcome: str
+    text: str = ""
+    phases: tuple[Phase, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlotTable:
+    """Curves over one time axis.
+
+    Attributes:
+        name: what they show, `joint position`.
+        columns: what each is of: a joint, an axis, a pair that touches.
+        units: of each column.
+        times: (T,) [s].
+        values: (T, c); NaN where there is none.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    units: tuple[str, ...]
+    times: Array
+    values: Array
+
+    def column(self, name: str) -> Array:
+        """(T,) one of the curves."""
+        return self.values[:, self.columns.index(name)]
+
+
+TablesOf = Callable[[float, float], tuple[PlotTable, ...]]
+"""The curves from one time to another [s], read when they are asked for."""
+
+
+@dataclass(frozen=True)
+class Playback:
+    """A run at the rate of a screen.
+
+    Attributes:
+        name: the task, or the file where no task is known.
+        robot: None where the log does not say what the robot is.
+        scene: None where the log says of nothing but the robot.
+        times: (T,) [s], at least one; those of the ticks nearest to the wanted rate, first and last among them.
+        position: (T, n) measured joint positions.
+        reference: (T, n) what the joints should follow; NaN for a joint that no controller moves.
+        body_position: (T, m, 3) [m] of `Scene.movable`.
+        body_quat_xyzw: (T, m, 4).
+        contacts: for each time what touched since the time before, with the largest force of each pair.
+        steps: in the order in which they began.
+        verdict: None where the log cannot be judged.
+        lost: why the end of the log is missing, or None.
+        notes: what else is missing or unlike it was in the run, a sentence each.
+        tables_of: see `tables`.
+    """
+
+    name: str
+    robot: RobotModel | None
+    scene: Scene | None
+    times: Array
+    position: Array
+    reference: Array
+    body_position: Array
+    body_quat_xyzw: Array
+    contacts: tuple[tuple[Contact, ...], ...]
+    steps: tuple[PlaybackStep, ...] = ()
+    verdict: Verdict | None = None
+    lost: str | None = None
+    notes: tuple[str, ...] = ()
+    tables_of: TablesOf = field(repr=False, default=lambda start, end: ())
+
+    @property
+    def start(self) -> float:
+        """[s] the first time."""
+        return float(self.times[0])
+
+    @property
+    def end(self) -> float:
+        """[s] the last time."""
+        return float(self.times[-1])
+
+    def index(self, time: float) -> int:
+        """Number of the time nearest to `time` [s]."""
+        k = int(np.searchsorted(self.times, time))
+        if k == len(self.times) or (k > 0 and time - self.times[k - 1] <= self.times[k] - time):
+            k -= 1
+        return max(k, 0)
+
+    def step_at(self, time: float) -> PlaybackStep | None:
+        """The step that is on at `time` [s]; between two steps, none."""
+        return next((step for step in reversed(self.steps) if step.start <= time <= step.end), None)
+
+    def poses(self) -> Poses:
+        """Where the frames of `draw(robot, scene)` are at every time."""
+        return Placing(self.robot, self.scene).at(self.position, self.body_position, self.body_quat_xyzw)
+
+    def reference_position(self) -> Array:
+        """(T, n) where the joints should be: what no controller moves stands as measured, mimic joints follow."""
+        assert self.robot is not None
+        return following(self.robot, np.where(np.isnan(self.reference), self.position, self.reference))
+
+    def reference_poses(self) -> Poses:
+        """Where the robot should be, and the bodies as they are: the frames of `draw(robot, scene)` at every time."""
+        return Placing(self.robot, self.scene).at(self.reference_position(), self.body_position, self.body_quat_xyzw)
+
+    def tool_path(self) -> Array:
+        """(T, 3) [m] the origin of the tool in the world; (0, 3) where the robot has none."""
+        if self.robot is None or self.robot.tool is None:
+            return np.zeros((0, 3))
+        return tool_positions(self.robot, self.position)
+
+    def tables(self, start: float = -np.inf, end: float = np.inf) -> tuple[PlotTable, ...]:
+        """Curves at the full rate of the log, read from it now: joints, reference and error, tool, contact forces.
+
+        Args:
+            start, end: [s] only what lies between; the memory this takes grows with what is asked for.
+        """
+        return self.tables_of(start, end)
+
+
+def tool_positions(robot: RobotModel, position: Array) -> Array:
+    """(T, 3) [m] the origin of the tool in the world, of a robot that has one, at joint positions (T, n)."""
+    assert robot.tool is not None
+    poses = Placing(robot).at(position, np.zeros((len(position), 0, 3)), np.zeros((len(position), 0, 4)))
+    link = 1 + [one.name for one in robot.links].index(robot.tool.link)
+    return poses.position[:, link] + rotate(poses.quat_xyzw[:, link], robot.tool.X_LT.p)

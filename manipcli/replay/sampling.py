@@ -1,0 +1,215 @@
+"""A recording at the rate of a screen, in one pass over its spans, and its curves at full rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.model.robot import RobotModel
+from manipcli.model.state import Contact
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, joined
+from manipcli.replay.playback import PlotTable, tool_positions
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Some ticks of a recording; the arrays are those of `Playback`. `end`: the last tick of the recording [s]."""
+
+    times: Array
+    position: Array
+    reference: Array
+    body_position: Array
+    body_quat_xyzw: Array
+    contacts: tuple[tuple[Contact, ...], ...]
+
+
+def sampled(recording: Recording, *, rate: float) -> Samples:
+    """The ticks nearest to multiples of 1 / rate, and the last one; one span in memory at a time.
+
+    Args:
+        recording: any.
+        rate: [Hz]; beyond that of the recording every tick is taken.
+    """
+    chosen: list[Span] = []
+    gathered = _Contacts()
+    before = -1.0
+    for span in recording.spans:
+        times = span.states.time
+        if not len(times):
+            continue
+        # Number of the last multiple that a tick is the nearest to, or past: a tick is taken where it grows.
+        number = np.floor((times + recording.period / 2.0) * rate + 1e-9)
+        ticks = np.flatnonzero(np.diff(number, prepend=before))
+        before = float(number[-1])
+        chosen.append(_picked(span, ticks))
+        gathered.add(span.contacts, times[ticks])
+        last = _picked(span, np.array([len(times) - 1]))
+    if not chosen:
+        n, m = len(recording.joint_names), len(recording.body_names)
+        nothing = frozen(np.zeros((0, n)))
+        return Samples(
+            frozen([]), nothing, nothing, frozen(np.zeros((0, m, 3))), frozen(np.zeros((0, m, 4))), contacts=()
+        )
+    if last.states.time[0] not in chosen[-1].states.time:
+        chosen.append(last)
+        gathered.add((), last.states.time)
+    whole = joined(chosen)
+    return Samples(
+        times=whole.states.time,
+        position=whole.states.position,
+        reference=references(whole.controllers, recording.joint_names, len(whole.states.time)),
+        body_position=whole.states.body_position,
+        body_quat_xyzw=whole.states.body_quat_xyzw,
+        contacts=gathered.finish(),
+    )
+
+
+def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:
+    return Span(
+        states=span.states.map(lambda a: a[ticks].copy()),
+        controllers=tuple(trace.map(lambda a: a[ticks].copy()) for trace in span.controllers),
+        contacts=(),
+    )
+
+
+class _Contacts:
+    """What touched since the time before, for each of a growing number of times."""
+
+    def __init__(self) -> None:
+        self._now: tuple[Contact, ...] = ()
+        self._waiting: list[ContactSnapshot] = []
+        self._found: list[tuple[Contact, ...]] = []
+
+    def add(self, snapshots: Iterable[ContactSnapshot], times: Array) -> None:
+        self._waiting += snapshots
+        for time in times.tolist():
+            strongest = {(one.a, one.b): one for one in self._now}
+            taken = 0
+            for snapshot in self._waiting:
+                if snapshot.time > time:
+                    break
+                taken += 1
+                self._now = snapshot.contacts
+                for one in snapshot.contacts:
+                    known = strongest.get((one.a, one.b))
+                    if known is None or one.force >= known.force:
+                        strongest[one.a, one.b] = one
+            del self._waiting[:taken]
+            self._found.append(tuple(strongest[pair] for pair in sorted(strongest)))
+
+    def finish(self) -> tuple[tuple[Contact, ...], ...]:
+        return tuple(self._found)
+
+
+def references(traces: Sequence[ControllerTrace], joints: Sequence[str], count: int) -> Array:
+    """(T, n) the reference position of each joint from the controller that moves it; NaN where none does."""
+    found = np.full((count, len(joints)), np.nan)
+    index = {name: k for k, name in enumerate(joints)}
+    for trace in traces:
+        columns = [index[name] for name in trace.joints if name in index]
+        mine = [k for k, name in enumerate(trace.joints) if name in index]
+        found[:, columns] = trace.reference_position[:, mine]
+    found.flags.writeable = False
+    return found
+
+
+def plot_tables(
+    recording: Recording, robot: RobotModel | None, start: float = -np.inf, end: float = np.inf
+) -> tuple[PlotTable, ...]:
+    """The curves of a recording, every tick from `start` to `end` [s].
+
+    Args:
+        recording: any.
+        robot: says the units of joints and where the tool is; None: neither.
+        start, end: [s].
+    """
+    changes = _Changes(start, end)
+    spans = []
+    for span in recording.spans:
+        changes.add(span.contacts)
+        if _meets(span, start, end):
+            spans.append(_between(span, start, end))
+    if not spans:
+        return ()
+    whole = joined(spans)
+    states, names = whole.states, recording.joint_names
+    slides = {joint.name for joint in robot.joints if joint.type == "prismatic"} if robot is not None else set()
+    unit = tuple("m" if name in slides else "rad" for name in names)
+    force = tuple("N" if name in slides else "N m" for name in names)
+    speed = tuple(f"{one}/s" for one in unit)
+    reference = references(whole.controllers, names, len(states.time))
+    error = reference - states.position
+    for k, name in enumerate(names):
+        if robot is not None and robot.joint(name).type == "continuous":
+            error[:, k] = np.remainder(error[:, k] + np.pi, 2.0 * np.pi) - np.pi
+    tables = [
+        PlotTable("joint position", names, unit, states.time, states.position),
+        PlotTable("joint velocity", names, speed, states.time, states.velocity),
+        PlotTable("joint effort", names, force, states.time, states.effort),
+    ]
+    moved = [k for k in range(len(names)) if not np.isnan(reference[:, k]).all()]
+    for title, values in (("joint reference", reference), ("joint error", error)):
+        columns, units = (tuple(of[k] for k in moved) for of in (names, unit))
+        tables.append(PlotTable(title, columns, units, states.time, values[:, moved]))
+    if robot is not None and robot.tool is not None:
+        tool = tool_positions(robot, states.position)
+        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, states.time, tool))
+    tables.append(contact_table(changes.found, states.time))
+    return tuple(tables)
+
+
+class _Changes:
+    """The contacts that hold at some time from `start` to `end` [s]."""
+
+    def __init__(self, start: float, end: float) -> None:
+        self._start, self._end = start, end
+        self.found: list[ContactSnapshot] = []
+
+    def add(self, snapshots: Iterable[ContactSnapshot]) -> None:
+        for one in snapshots:
+            if one.time > self._end:
+                break
+            if one.time <= self._start:
+                self.found.clear()
+            self.found.append(one)
+
+
+def _meets(span: Span, start: float, end: float) -> bool:
+    times = span.states.time
+    return len(times) > 0 and bool(times[-1] >= start and times[0] <= end)
+
+
+def _between(span: Span, start: float, end: float) -> Span:
+    times = span.states.time
+    if times[0] >= start and times[-1] <= end:
+        return span
+    return _picked(span, np.flatnonzero((times >= start) & (times <= end)))
+
+
+def contact_table(snapshots: Sequence[ContactSnapshot], times: Array) -> PlotTable:
+    """Normal force of every pair that touches at some time; 0 while it does not.
+
+    Args:
+        snapshots: every change of contacts.
+        times: (T,) [s].
+    """
+    pairs: Mapping[Pair, int] = {
+        pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in snapshots for one in each.contacts}))
+    }
+    values = np.zeros((len(times), len(pairs)))
+    begins = np.searchsorted(times, [each.time for each in snapshots])
+    for each, first, last in zip(snapshots, begins, [*begins[1:], len(times)], strict=True):
+        for one in each.contacts:
+            values[first:last, pairs[one.a, one.b]] = one.force
+    columns = tuple(f"{_plain(a)} – {_plain(b)}" for a, b in pairs)
+    return PlotTable("contact force", columns, ("N",) * len(pairs), times, values)
+
+
+def _plain(part: str) -> str:
+    return part.removeprefix("robot/")
