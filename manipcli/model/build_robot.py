@@ -148,6 +148,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
         tool=tool,
         collision_ignore=spec.collision_ignore,
         friction=spec.friction,
+        compat=spec.compat,
     )
 
 

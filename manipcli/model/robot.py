@@ -150,7 +150,10 @@ class Tool:
 
 @dataclass(frozen=True, slots=True)
 class TransmissionTag:
-    """A `<transmission>` as written, roles resolved: parallel tuples in role order."""
+    """A `<transmission>`, roles resolved: parallel tuples in role order, as many actuators as joints.
+
+    A simple one has its reduction at the actuator, wherever it was written; its joint reduction is 1.
+    """
 
     name: str
     type: str
@@ -167,7 +170,8 @@ class RobotModel:
 
     `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
     `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact;
-    `collision_ignore` are pairs of links that planning never checks against each other.
+    `collision_ignore` are pairs of links that planning never checks against each other; `compat` says whose four-bar
+    linkages these are, where ROS 1 and ROS 2 differ.
     """
 
     name: str
@@ -182,6 +186,7 @@ class RobotModel:
     tool: Tool | None = None
     collision_ignore: tuple[tuple[str, str], ...] = ()
     friction: float = 1.0
+    compat: Literal["ros1", "ros2"] = "ros2"
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:

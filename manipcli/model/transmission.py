@@ -1,79 +1,177 @@
-"""The contract of transmissions, and the simple one: a gear between one actuator and one joint.
+"""The contract of transmissions: linear maps between the actuators and the joints that they drive.
 
-Position, velocity and effort change by different rules; what every transmission keeps is power:
-effort_j velocity_j = effort_a velocity_a.
+Position, velocity and effort change by different rules. What a transmission keeps is power: with velocity_j =
+M velocity_a, effort_j = E effort_a and E = M^-T, effort_j . velocity_j = effort_a . velocity_a.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, get_args
 
-from manipcli.core.errors import Finding, InvalidInput
-from manipcli.core.geometry import Array
-from manipcli.model.robot import TransmissionTag
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import did_you_mean
+
+if TYPE_CHECKING:
+    from manipcli.model.robot import TransmissionTag
 
 Quantity = Literal["position", "velocity", "effort"]
-
-
-class Transmission(Protocol):
-    """Maps actuators to joints and back; the last axis of `values` runs over them."""
-
-    def actuator_to_joint(self, quantity: Quantity, values: Array) -> Array: ...
-
-    def joint_to_actuator(self, quantity: Quantity, values: Array) -> Array: ...
+Compat = Literal["ros1", "ros2"]
 
 
 @dataclass(frozen=True, slots=True)
-class SimpleTransmission:
-    """One actuator, one joint (or many such pairs, elementwise), as in ros2_control.
-
-    position_j = position_a / reduction + offset;  velocity_j = velocity_a / reduction;  effort_j = reduction effort_a.
+class Maps:
+    """The matrices of a transmission of k actuators and k joints, or of several in blocks.
 
     Attributes:
-        reduction: actuator turns a joint turn; negative turns the other way; not 0.
-        offset: joint position where the actuator is at 0 [rad or m].
-
-    Raises:
-        InvalidInput: a reduction of 0, or a number that is not finite.
+        joint_motion: (k, k) M: velocity_j = M velocity_a, position_j = M position_a + offset.
+        actuator_motion: (k, k) its inverse: velocity_a = M^-1 velocity_j, position_a = M^-1 (position_j - offset).
+        joint_effort: (k, k) E: effort_j = E effort_a.
+        actuator_effort: (k, k) its inverse.
+        offset: (k) position of the joints where the actuators are at 0 [rad or m].
     """
 
-    reduction: float = 1.0
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.reduction == 0.0 or not math.isfinite(self.reduction):
-            message = f"a reduction of {self.reduction:g} is not possible; expected a number that is not 0"
-            raise InvalidInput([Finding("TRAN001", message)])
-        if not math.isfinite(self.offset):
-            raise InvalidInput([Finding("TRAN001", f"a joint offset of {self.offset:g} is not possible")])
+    joint_motion: Array
+    actuator_motion: Array
+    joint_effort: Array
+    actuator_effort: Array
+    offset: Array
 
     @staticmethod
-    def of(tag: TransmissionTag) -> SimpleTransmission:
-        """From a tag with one joint and one actuator.
+    def of(
+        *,
+        joint_motion: npt.ArrayLike,
+        actuator_motion: npt.ArrayLike,
+        joint_effort: npt.ArrayLike,
+        actuator_effort: npt.ArrayLike,
+        offset: npt.ArrayLike,
+    ) -> Maps:
+        """Read-only copies."""
+        return Maps(*(frozen(each) for each in (joint_motion, actuator_motion, joint_effort, actuator_effort, offset)))
 
-        ROS 1 writes the reduction at the actuator, ros2_control at the joint; the other is 1.
+
+class Transmission(ABC):
+    """k actuators that drive k joints; both in the order of their roles.
+
+    `values` are numbers, lists or arrays whose last axis (k) runs over the actuators or joints; leading axes (time,
+    say) stay. A transmission of one actuator takes any shape, a single number too, and maps each element.
+    """
+
+    @cached_property
+    @abstractmethod
+    def maps(self) -> Maps:
+        """Its matrices."""
+
+    @property
+    def size(self) -> int:
+        """k: how many actuators it has, and how many joints."""
+        return len(self.maps.offset)
+
+    def actuator_to_joint(self, quantity: Quantity, values: npt.ArrayLike) -> Array:
+        """Values of the joints for values of the actuators.
+
+        Args:
+            quantity: "position" [rad or m], "velocity" [rad/s or m/s] or "effort" [N m or N].
+            values: (..., k) of the actuators.
+
+        Returns:
+            (..., k) of the joints, a new array.
 
         Raises:
-            InvalidInput: more than one joint or actuator.
+            InvalidArgument: another quantity, or a last axis that is not k.
         """
-        if len(tag.joints) != 1 or len(tag.actuators) > 1:
-            message = f"transmission '{tag.name}': a simple one has one joint and one actuator"
-            raise InvalidInput([Finding("TRAN002", f"{message}, not {len(tag.joints)} and {len(tag.actuators)}")])
-        return SimpleTransmission(
-            reduction=tag.joint_reductions[0] * math.prod(tag.actuator_reductions), offset=tag.joint_offsets[0]
-        )
+        maps = self.maps
+        mapped = self._mapped(maps.joint_effort if _is_effort(quantity) else maps.joint_motion, values)
+        return self._plain(mapped + maps.offset) if quantity == "position" else self._plain(mapped)
 
-    def actuator_to_joint(self, quantity: Quantity, values: Array) -> Array:
-        """Values of the joint for values of the actuator."""
-        if quantity == "effort":
-            return values * self.reduction
-        moved = values / self.reduction
-        return moved + self.offset if quantity == "position" else moved
+    def joint_to_actuator(self, quantity: Quantity, values: npt.ArrayLike) -> Array:
+        """Values of the actuators for values of the joints; arguments and errors as in `actuator_to_joint`."""
+        maps = self.maps
+        matrix = maps.actuator_effort if _is_effort(quantity) else maps.actuator_motion
+        if quantity == "position":
+            self._refuse_shape(values)
+            shifted = np.asarray(values, dtype=np.float64)
+            values = shifted - (maps.offset[0] if self.size == 1 else maps.offset)
+        return self._plain(self._mapped(matrix, values))
 
-    def joint_to_actuator(self, quantity: Quantity, values: Array) -> Array:
-        """Values of the actuator for values of the joint."""
-        if quantity == "effort":
-            return values / self.reduction
-        return (values - self.offset) * self.reduction if quantity == "position" else values * self.reduction
+    def _mapped(self, matrix: Array, values: npt.ArrayLike) -> Array:
+        self._refuse_shape(values)
+        given = np.asarray(values, dtype=np.float64)
+        if self.size == 1:
+            return np.asarray(given[..., np.newaxis] * matrix[0, 0])
+        return np.asarray(given @ matrix.T)
+
+    def _plain(self, mapped: Array) -> Array:
+        """Without the axis that `_mapped` adds for a single actuator."""
+        return np.asarray(mapped[..., 0]) if self.size == 1 else mapped
+
+    def _refuse_shape(self, values: npt.ArrayLike) -> None:
+        shape = np.shape(values)
+        if self.size > 1 and (not shape or shape[-1] != self.size):
+            message = f"values of the shape {shape}; expected {self.size} along the last axis, one a joint or actuator"
+            raise InvalidArgument("TRAN003", message)
+
+
+def _is_effort(quantity: str) -> bool:
+    if quantity not in get_args(Quantity):
+        known = get_args(Quantity)
+        message = f"unknown quantity '{quantity}'; known: {', '.join(known)}"
+        raise InvalidArgument("TRAN004", message, hint=did_you_mean(quantity, known))
+    return quantity == "effort"
+
+
+def nonzero(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
+    """Reductions: `count` finite numbers that are not 0.
+
+    Raises:
+        InvalidArgument: they are not.
+    """
+    checked = finite(name, values, count)
+    for value in checked:
+        if value == 0.0:
+            raise InvalidArgument("TRAN001", f"{name} = 0 is not possible; expected a number that is not 0")
+    return checked
+
+
+def finite(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
+    """`count` finite numbers.
+
+    Raises:
+        InvalidArgument: they are not.
+    """
+    try:
+        checked = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        message = f"{name} = {values!r}: expected {count} number{'s' * (count != 1)}"
+        raise InvalidArgument("TRAN001", message) from None
+    if len(checked) != count:
+        raise InvalidArgument("TRAN001", f"{name} has {len(checked)} number{'s' * (len(checked) != 1)}, not {count}")
+    for value in checked:
+        if not math.isfinite(value):
+            raise InvalidArgument("TRAN001", f"{name} = {value:g} is not possible; expected a finite number")
+    return checked
+
+
+@dataclass(frozen=True, slots=True)
+class TransmissionMember:
+    """A member of the seam.
+
+    Attributes:
+        name: in robot files: "simple".
+        type: in descriptions, without the package before it: "SimpleTransmission".
+        size: how many joints and how many actuators it has.
+        of: (tag, compat) -> the transmission of a tag with `size` joints and actuators in role order.
+    """
+
+    name: str
+    type: str
+    size: int
+    of: Callable[[TransmissionTag, Compat], Transmission]

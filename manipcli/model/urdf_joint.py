@@ -179,15 +179,22 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
             reader.report("URDF015", message, joint.place, hint=reader.near(joint_name, joints))
     if not joint_elements:
         reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
-    reductions = [_reduction(reader, each, name) for each in (*joint_elements, *actuator_elements)]
+    joint_reductions = [_reduction(reader, each, name) for each in joint_elements]
+    actuator_reductions = [_reduction(reader, each, name) for each in actuator_elements]
+    kind_name = kind.text.strip().rpartition("/")[2]
+    if kind_name == "SimpleTransmission" and len(joint_elements) == 1 and len(actuator_elements) <= 1:
+        ros1 = kind.tag == "type"  # ros_control reads that of the actuator, ros2_control that of the joint
+        actuator_names = actuator_names or [name]
+        actuator_reductions = (actuator_reductions or [1.0]) if ros1 else joint_reductions
+        joint_reductions = [1.0]
     return TransmissionTag(
         name=name,
-        type=kind.text.rpartition("/")[2],
+        type=kind_name,
         joints=tuple(joint or "" for joint in joint_names),
-        joint_reductions=tuple(reductions[: len(joint_elements)]),
+        joint_reductions=tuple(joint_reductions),
         joint_offsets=tuple(reader.text_number(joint.first("offset"), 0.0) for joint in joint_elements),
         actuators=tuple(actuator or "" for actuator in actuator_names),
-        actuator_reductions=tuple(reductions[len(joint_elements) :]),
+        actuator_reductions=tuple(actuator_reductions),
     )
 
 

@@ -55,7 +55,7 @@ def _robot() -> RobotModel:
     X_WB = Transform.of(xyz=(0.0, 0.0, 0.5), rpy=(0.0, 0.0, 0.4))
     transmissions = (
         TransmissionTag("arm", "SimpleTransmission", ("slide",), (-50.0,), (0.2,), ("slide_motor",), (2.0,)),
-        TransmissionTag("turn", "SimpleTransmission", ("shoulder",), (3.0,), (0.0,), (), ()),
+        TransmissionTag("turn", "SimpleTransmission", ("shoulder",), (3.0,), (0.0,), ("turn",), (1.0,)),
         TransmissionTag("two", "Differential", ("spin", "copy"), (1.0, 1.0), (0.0, 0.0), ("a", "b"), (1.0, 1.0)),
     )
     return RobotModel("testbot", "base", links, joints, (), (), transmissions, X_WB, "<robot name='testbot'>é</robot>")

@@ -120,7 +120,7 @@ def test_actuators_stand_on_the_other_side_of_their_transmissions(log: tuple[Any
     run, path = log
     states = decoded(path)["/actuator_states"]
     assert [time for time, _ in states] == [k * 10_000_000 for k in range(-(-T // 10))]
-    # A transmission whose actuator has no name lends it its own; one of two joints is not simple.
+    # A transmission of an unknown type is left out.
     assert states[0][1].name == ["slide_motor", "turn"]
     position, velocity, effort = (
         np.array([getattr(message, field) for _, message in states]) for field in ("position", "velocity", "effort")
