@@ -77,6 +77,10 @@ class Span:
         )
 
 
+EMBEDDED = "embedded_meshes"
+"""Name of the metadata record that says which attachment holds which mesh: URI -> name of the attachment."""
+
+
 @dataclass(frozen=True, slots=True)
 class Recording:
     """Everything in one log.
@@ -103,6 +107,12 @@ class Recording:
     attachments: dict[str, bytes]
     lost: str | None
     period: float = 0.0
+
+    def embedded_meshes(self) -> dict[str, bytes]:
+        """The mesh files that the log carries, by the URI that its URDF and its scene call them by; empty unless the
+        run was told to embed them. The material libraries of OBJ files are among them, beside their meshes."""
+        names = self.metadata.get(EMBEDDED, {})
+        return {uri: self.attachments[name] for uri, name in names.items() if name in self.attachments}
 
     def whole(self) -> Recording:
         """The same with all ticks in one span in memory: some 1.2 kB a tick for an arm with a hand and two objects."""
