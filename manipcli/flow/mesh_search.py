@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Geometry, Mesh, RobotModel
@@ -15,13 +16,18 @@ from manipcli.model.scene import Scene
 class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
-    Packages are looked for as for a description beside the log, and in the working directory and its folders. What is
-    not found keeps its URI as its path: whoever draws it draws something else.
+    What the log carries itself is taken from there. Packages are looked for as for a description beside the log, and in
+    the working directory and its folders. What is not found keeps its URI as its path: whoever draws it draws something
+    else.
 
     Args:
         log: where the log is.
         hashes: SHA-256 of the files in the run, by URI, where they are known.
+        embedded: files that the log carries, by URI.
         package_path, allow_outside: see `Packages`.
+
+    Attributes:
+        folder: of the files that the log carried; it is removed when nobody holds this any longer.
     """
 
     def __init__(
@@ -29,6 +35,7 @@ class MeshSearch:
         log: Path,
         *,
         hashes: Mapping[str, str] = {},
+        embedded: Mapping[str, bytes] = {},
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
     ) -> None:
@@ -36,7 +43,8 @@ class MeshSearch:
         places = [*package_path, here, *_folders(here), *_folders(log.resolve().parent)]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
         self._hashes = hashes
-        self._found: dict[str, Path] = {}
+        self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None
+        self._found = _unpacked(embedded, Path(self.folder.name)) if self.folder is not None else {}
         self._notes: dict[str, None] = {}
 
     @property
@@ -87,6 +95,18 @@ class MeshSearch:
         if known is not None and hashlib.sha256(path.read_bytes()).hexdigest() != known:
             self._notes.setdefault(f"mesh '{uri}' is not the file that it was in the run")
         return path
+
+
+def _unpacked(embedded: Mapping[str, bytes], folder: Path) -> dict[str, Path]:
+    """Files by their URIs; those of one folder stay together, as a mesh and its materials, and none leaves `folder`."""
+    found = {}
+    for uri, data in embedded.items():
+        place, _, name = uri.rpartition("/")
+        inside = folder / hashlib.sha256(place.encode()).hexdigest()[:16]
+        inside.mkdir(exist_ok=True)
+        found[uri] = inside / (PurePosixPath(name).name.strip(".\0") or "mesh")
+        found[uri].write_bytes(data)
+    return found
 
 
 def _folders(folder: Path) -> list[Path]:

@@ -38,15 +38,22 @@ def open_playback(
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
     verdict = judge_recording(recording, path)
     meshes = MeshSearch(
-        path, hashes=recording.metadata.get("meshes", {}), package_path=package_path, allow_outside=allow_outside
+        path,
+        hashes=recording.metadata.get("meshes", {}),
+        embedded=recording.embedded_meshes(),
+        package_path=package_path,
+        allow_outside=allow_outside,
     )
     robot, scene = meshes.robot(robot), meshes.scene(scene)
     return Playback(
         name=verdict.task or path.name,
         robot=robot,
         scene=scene,
+        joint_names=recording.joint_names,
         times=samples.times,
         position=samples.position,
+        velocity=samples.velocity,
+        effort=samples.effort,
         reference=samples.reference,
         body_position=samples.body_position,
         body_quat_xyzw=samples.body_quat_xyzw,
@@ -56,6 +63,7 @@ def open_playback(
         lost=recording.lost,
         notes=meshes.notes,
         tables_of=partial(plot_tables, recording, robot),
+        keep=meshes.folder,
     )
 
 

@@ -5,7 +5,7 @@ One value for everything that shows a log: the page in the browser, the page in 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -80,8 +80,9 @@ class Playback:
         name: the task, or the file where no task is known.
         robot: None where the log does not say what the robot is.
         scene: None where the log says of nothing but the robot.
+        joint_names: (n) of `robot.moving_joints`, or those that the log has where there is no robot.
         times: (T,) [s], at least one; those of the ticks nearest to the wanted rate, first and last among them.
-        position: (T, n) measured joint positions.
+        position, velocity, effort: (T, n) as measured; NaN where the log has none.
         reference: (T, n) what the joints should follow; NaN for a joint that no controller moves.
         body_position: (T, m, 3) [m] of `Scene.movable`.
         body_quat_xyzw: (T, m, 4).
@@ -91,13 +92,17 @@ class Playback:
         lost: why the end of the log is missing, or None.
         notes: what else is missing or unlike it was in the run, a sentence each.
         tables_of: see `tables`.
+        keep: what must live as long as this does: the folder of the meshes that the log carries.
     """
 
     name: str
     robot: RobotModel | None
     scene: Scene | None
+    joint_names: tuple[str, ...]
     times: Array
     position: Array
+    velocity: Array
+    effort: Array
     reference: Array
     body_position: Array
     body_quat_xyzw: Array
@@ -107,6 +112,7 @@ class Playback:
     lost: str | None = None
     notes: tuple[str, ...] = ()
     tables_of: TablesOf = field(repr=False, default=lambda start, end: ())
+    keep: object = field(repr=False, default=None)
 
     @property
     def start(self) -> float:
@@ -148,6 +154,16 @@ class Playback:
             return np.zeros((0, 3))
         return tool_positions(self.robot, self.position)
 
+    def curves(self) -> tuple[PlotTable, ...]:
+        """The curves of `tables`, at the times of what is shown."""
+        forces = force_table(self.times, self.contacts)
+        return (
+            *joint_tables(
+                self.joint_names, self.robot, self.times, self.position, self.velocity, self.effort, self.reference
+            ),
+            *((forces,) if forces.columns else ()),
+        )
+
     def tables(self, start: float = -np.inf, end: float = np.inf) -> tuple[PlotTable, ...]:
         """Curves at the full rate of the log, read from it now: joints, reference and error, tool, contact forces.
 
@@ -163,3 +179,60 @@ def tool_positions(robot: RobotModel, position: Array) -> Array:
     poses = Placing(robot).at(position, np.zeros((len(position), 0, 3)), np.zeros((len(position), 0, 4)))
     link = 1 + [one.name for one in robot.links].index(robot.tool.link)
     return poses.position[:, link] + rotate(poses.quat_xyzw[:, link], robot.tool.X_LT.p)
+
+
+def joint_tables(
+    names: tuple[str, ...],
+    robot: RobotModel | None,
+    times: Array,
+    position: Array,
+    velocity: Array,
+    effort: Array,
+    reference: Array,
+) -> tuple[PlotTable, ...]:
+    """Measured and wanted values of joints, what is between them, and the way of the tool; columns without a number go.
+
+    Args:
+        names: (n) of the joints.
+        robot: says the units and where the tool is; None: neither.
+        times: (T,) [s].
+        position, velocity, effort, reference: (T, n); NaN where there is none.
+    """
+    slides = {joint.name for joint in robot.joints if joint.type == "prismatic"} if robot is not None else set()
+    endless = {joint.name for joint in robot.joints if joint.type == "continuous"} if robot is not None else set()
+    unit = tuple("m" if name in slides else "rad" for name in names)
+    error = reference - position
+    wrapped = [k for k, name in enumerate(names) if name in endless]
+    # A joint without limits errs the short way round.
+    error[:, wrapped] = np.remainder(error[:, wrapped] + np.pi, 2.0 * np.pi) - np.pi
+    tables = []
+    for title, values, units in (
+        ("joint position", position, unit),
+        ("joint velocity", velocity, tuple(f"{one}/s" for one in unit)),
+        ("joint effort", effort, tuple("N" if one == "m" else "N m" for one in unit)),
+        ("joint reference", reference, unit),
+        ("joint error", error, unit),
+    ):
+        known = np.flatnonzero(~np.isnan(values).all(axis=0)).tolist() if len(times) else []
+        if known:
+            columns, of = (tuple(each[k] for k in known) for each in (names, units))
+            tables.append(PlotTable(title, columns, of, times, values[:, known]))
+    if robot is not None and robot.tool is not None:
+        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, times, tool_positions(robot, position)))
+    return tuple(tables)
+
+
+def force_table(times: Array, contacts: Sequence[tuple[Contact, ...]]) -> PlotTable:
+    """Normal force of every pair that touches at some time, (T, pairs) [N]; 0 while it does not.
+
+    Args:
+        times: (T,) [s].
+        contacts: what touches at each.
+    """
+    pairs = {pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in contacts for one in each}))}
+    values = np.zeros((len(times), len(pairs)))
+    for k, each in enumerate(contacts):
+        for one in each:
+            values[k, pairs[one.a, one.b]] = one.force
+    columns = tuple(f"{pair[0].removeprefix('robot/')} – {pair[1].removeprefix('robot/')}" for pair in pairs)
+    return PlotTable("contact force", columns, ("N",) * len(pairs), times, values)

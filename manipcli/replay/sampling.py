@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,7 @@ from manipcli.core.geometry import Array, frozen
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, joined
-from manipcli.replay.playback import PlotTable, tool_positions
-
-Pair = tuple[str, str]
+from manipcli.replay.playback import PlotTable, force_table, joint_tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +21,8 @@ class Samples:
 
     times: Array
     position: Array
+    velocity: Array
+    effort: Array
     reference: Array
     body_position: Array
     body_quat_xyzw: Array
@@ -51,10 +51,10 @@ def sampled(recording: Recording, *, rate: float) -> Samples:
         gathered.add(span.contacts, times[ticks])
         last = _picked(span, np.array([len(times) - 1]))
     if not chosen:
-        n, m = len(recording.joint_names), len(recording.body_names)
-        nothing = frozen(np.zeros((0, n)))
+        nothing = frozen(np.zeros((0, len(recording.joint_names))))
+        bodies = np.zeros((0, len(recording.body_names), 7))
         return Samples(
-            frozen([]), nothing, nothing, frozen(np.zeros((0, m, 3))), frozen(np.zeros((0, m, 4))), contacts=()
+            frozen([]), nothing, nothing, nothing, nothing, frozen(bodies[..., :3]), frozen(bodies[..., 3:]), ()
         )
     if last.states.time[0] not in chosen[-1].states.time:
         chosen.append(last)
@@ -63,6 +63,8 @@ def sampled(recording: Recording, *, rate: float) -> Samples:
     return Samples(
         times=whole.states.time,
         position=whole.states.position,
+        velocity=whole.states.velocity,
+        effort=whole.states.effort,
         reference=references(whole.controllers, recording.joint_names, len(whole.states.time)),
         body_position=whole.states.body_position,
         body_quat_xyzw=whole.states.body_quat_xyzw,
@@ -139,29 +141,18 @@ def plot_tables(
         return ()
     whole = joined(spans)
     states, names = whole.states, recording.joint_names
-    slides = {joint.name for joint in robot.joints if joint.type == "prismatic"} if robot is not None else set()
-    unit = tuple("m" if name in slides else "rad" for name in names)
-    force = tuple("N" if name in slides else "N m" for name in names)
-    speed = tuple(f"{one}/s" for one in unit)
     reference = references(whole.controllers, names, len(states.time))
-    error = reference - states.position
-    for k, name in enumerate(names):
-        if robot is not None and robot.joint(name).type == "continuous":
-            error[:, k] = np.remainder(error[:, k] + np.pi, 2.0 * np.pi) - np.pi
-    tables = [
-        PlotTable("joint position", names, unit, states.time, states.position),
-        PlotTable("joint velocity", names, speed, states.time, states.velocity),
-        PlotTable("joint effort", names, force, states.time, states.effort),
-    ]
-    moved = [k for k in range(len(names)) if not np.isnan(reference[:, k]).all()]
-    for title, values in (("joint reference", reference), ("joint error", error)):
-        columns, units = (tuple(of[k] for k in moved) for of in (names, unit))
-        tables.append(PlotTable(title, columns, units, states.time, values[:, moved]))
-    if robot is not None and robot.tool is not None:
-        tool = tool_positions(robot, states.position)
-        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, states.time, tool))
-    tables.append(contact_table(changes.found, states.time))
-    return tuple(tables)
+    forces = force_table(states.time, _held(changes.found, states.time))
+    return (
+        *joint_tables(names, robot, states.time, states.position, states.velocity, states.effort, reference),
+        *((forces,) if forces.columns else ()),
+    )
+
+
+def _held(snapshots: Sequence[ContactSnapshot], times: Array) -> list[tuple[Contact, ...]]:
+    """What touches at each of `times` (T,) [s]."""
+    last = np.searchsorted([one.time for one in snapshots], times, side="right") - 1
+    return [snapshots[k].contacts if k >= 0 else () for k in last.tolist()]
 
 
 class _Changes:
@@ -190,26 +181,3 @@ def _between(span: Span, start: float, end: float) -> Span:
     if times[0] >= start and times[-1] <= end:
         return span
     return _picked(span, np.flatnonzero((times >= start) & (times <= end)))
-
-
-def contact_table(snapshots: Sequence[ContactSnapshot], times: Array) -> PlotTable:
-    """Normal force of every pair that touches at some time; 0 while it does not.
-
-    Args:
-        snapshots: every change of contacts.
-        times: (T,) [s].
-    """
-    pairs: Mapping[Pair, int] = {
-        pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in snapshots for one in each.contacts}))
-    }
-    values = np.zeros((len(times), len(pairs)))
-    begins = np.searchsorted(times, [each.time for each in snapshots])
-    for each, first, last in zip(snapshots, begins, [*begins[1:], len(times)], strict=True):
-        for one in each.contacts:
-            values[first:last, pairs[one.a, one.b]] = one.force
-    columns = tuple(f"{_plain(a)} – {_plain(b)}" for a, b in pairs)
-    return PlotTable("contact force", columns, ("N",) * len(pairs), times, values)
-
-
-def _plain(part: str) -> str:
-    return part.removeprefix("robot/")
