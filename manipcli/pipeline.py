@@ -76,7 +76,7 @@ def run_task(
         return RunReport(refused(task, refusal), wall_time=took, real_time_factor=0.0, log=None, timing=timing)
     planned = time.perf_counter()
 
-    manager = controllers(task)
+    manager = controllers(task, plan.planner.kinematics)
     where = log if log is not None else default_log(task)
     recorder = open_log(task, plan, manager, where, overwrite=force or log is None)
     try:

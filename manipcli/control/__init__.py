@@ -2,8 +2,8 @@
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalResult
 from manipcli.control.controller import Controller, ControllerOutput, JointState
-from manipcli.control.gripper import GripperController, GripperGoal
-from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.controllers.gripper import GripperController, GripperGoal
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.limits import JointLimiter, limit_effort, limit_position, limit_velocity
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid

@@ -1,16 +1,31 @@
-"""The contract of controllers: measured joints in, references and commands out, once per control period."""
+"""The contract of controllers: measured joints in, references and commands out, once per control period.
+
+A controller owns one block of numbers, its `ControllerOutput.rows`, and writes into it at every update; nobody
+allocates in the loop. What its model of the robot has to add to an effort (gravity, inverse dynamics), the manager
+adds, for all controllers at once.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
+import numpy as np
+
+from manipcli.control.pid import Compat
 from manipcli.core.geometry import Array
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import ControllerSpec, Interface
 
-Interface = Literal["position", "velocity", "effort"]
+if TYPE_CHECKING:
+    from manipcli.model.kinematics import Kinematics
 
 FeedForward = Literal["none", "gravity", "inverse_dynamics"]
 """What a controller wants added to its effort command."""
+
+REFERENCE_ROWS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,45 +37,89 @@ class JointState:
     effort: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ControllerOutput:
     """What a controller wants now. The arrays are only valid until its next update: copy to keep.
 
     Attributes:
-        position, velocity, acceleration: (n) the reference.
-        command: (n) in the controller's interface, before limits.
+        rows: (3 + k, n) everything below in one block: the reference, then a command for each of k interfaces.
+        position, velocity, acceleration: (n) the reference; rad or m and its derivatives.
+        commands: k arrays (n), one for each of the controller's interfaces, in their order; before limits.
+        wanted_acceleration: (n) what inverse dynamics shall bring about; the reference's, unless the law asks more.
     """
 
+    rows: Array
     position: Array
     velocity: Array
     acceleration: Array
-    command: Array
+    commands: tuple[Array, ...]
+    wanted_acceleration: Array
+
+    @classmethod
+    def of(cls, joints: int, interfaces: int, *, wanted_acceleration: Array | None = None) -> ControllerOutput:
+        """Zeros for so many joints and interfaces."""
+        rows = np.zeros((REFERENCE_ROWS + interfaces, joints))
+        wanted = rows[2] if wanted_acceleration is None else wanted_acceleration
+        return cls(rows, rows[0], rows[1], rows[2], tuple(rows[REFERENCE_ROWS:]), wanted)
+
+    @property
+    def command(self) -> Array:
+        """(n) in the controller's first interface."""
+        return self.commands[0]
 
 
 class Controller(Protocol):
-    """A controller claims `joints` on one `interface`; `feed_forward` says what it wants added."""
+    """A controller claims `joints` on `interfaces`; `feed_forward` says what it wants added to its effort."""
 
     name: str
     joints: tuple[str, ...]
-    interface: Interface
+    interfaces: tuple[Interface, ...]
     feed_forward: FeedForward
 
-    def update(
-        self,
-        time: float,
-        period: float,
-        measured: JointState,
-        feed_forward: Array | None = None,
-        *,
-        contact_force: Array | None = None,
-    ) -> ControllerOutput:
-        """One control tick at `time` [s].
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote; the same object for the controller's life."""
+        ...
 
-        `feed_forward` (n) is added to an effort command (gravity, dynamics). `contact_force` (n) [N] is the normal
-        force of contacts on what each joint moves, up to the next joint; None where nobody senses it.
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One update at `time` [s], `period` [s] before the next.
+
+        `contact_force` (n) [N] is the normal force of contacts on what each joint moves, up to the next joint; None
+        where nobody senses it.
         """
         ...
 
-    def deactivate(self, time: float) -> None:
-        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+    def deactivate(self, time: float, reason: str = ...) -> None:
+        """Ends its goal as aborted for this reason and forgets its state; the next update activates it again."""
         ...
+
+
+S = TypeVar("S", bound=ControllerSpec)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What controllers are built for: the robot, its kinematics (made when first asked for), and ROS's dialect."""
+
+    robot: RobotModel
+    kinematics: Callable[[], Kinematics]
+    compat: Compat
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerMember(Generic[S]):
+    """A member of the seam.
+
+    Attributes:
+        name: the word under `type`.
+        spec: what the user writes.
+        build: (name of the controller, spec, fit) -> the controller; for a spec without problems.
+        check: (spec, robot) -> what this robot does not have, or what could not work.
+    """
+
+    name: str
+    spec: type[S]
+    build: Callable[[str, S, Fit], Controller]
+    check: Callable[[S, RobotModel], Iterable[Problem]]

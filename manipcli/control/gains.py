@@ -1,15 +1,17 @@
-"""From the gains of a controllers file to the PID of a controller."""
+"""From the gains of a controllers file to the PID of a controller, and what can be wrong with them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from manipcli.control.pid import Compat, Pid
 from manipcli.core.errors import InvalidArgument
-from manipcli.spec.controllers import GainsSpec
+from manipcli.core.text import did_you_mean
+from manipcli.model.condition import Problem
+from manipcli.spec.controllers import GainsSpec, Interface
 
 
 def joint_gains(name: str, joints: tuple[str, ...], gains: Mapping[str, GainsSpec]) -> tuple[GainsSpec, ...]:
@@ -46,3 +48,25 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
         i_max=clamp,
         compat=compat,
     )
+
+
+def strangers(
+    joints: Sequence[str], given: Collection[str], loc: tuple[str | int, ...], what: str, code: str
+) -> Iterator[Problem]:
+    """Whatever (`what`: gains, tolerances) is given at `loc` to joints that are not of `joints`."""
+    without = [joint for joint in joints if joint not in given]  # only one that has none was meant
+    for joint in given:
+        if joint not in joints:
+            near = did_you_mean(joint, without, kind=f"joints without {what}")
+            hint = near or f"take them out, or add '{joint}' to `joints`"
+            yield Problem((*loc, joint), f"'{joint}' has {what}, but is not one of its joints", hint, code)
+
+
+def idle_gains(joints: Sequence[str], gains: Mapping[str, GainsSpec], interface: Interface) -> Iterator[Problem]:
+    """Joints that would never move: their gains are all zero, and they feed no velocity forward."""
+    for joint in joints:
+        own = gains.get(joint)
+        if own is None or own.p == own.i == own.d == own.ff_velocity_scale == 0.0:
+            loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
+            message = f"the gains of joint '{joint}' are all zero; on the {interface} interface it would not move"
+            yield Problem(loc, message, f"give gains.{joint}.p", "CTRL103")

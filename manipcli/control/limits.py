@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import Interface
+from manipcli.control.command import JointCommand, Mode
 from manipcli.core.geometry import Array
 from manipcli.model.robot import JointLimits
 
@@ -103,7 +103,7 @@ def limit_effort(
 
 
 class JointLimiter:
-    """The limits of all joints of a robot on its command vector, once a tick.
+    """The limits of all joints of a robot on their commands, once a tick.
 
     Attributes:
         saturations: (n) int, in how many ticks each joint's command was cut.
@@ -111,10 +111,9 @@ class JointLimiter:
 
     Args:
         limits: (n) of the joints.
-        interfaces: (n) what each command is; None: the joint is not commanded, its entry passes through.
     """
 
-    def __init__(self, limits: Sequence[JointLimits], interfaces: Sequence[Interface | None]) -> None:
+    def __init__(self, limits: Sequence[JointLimits]) -> None:
         n = len(limits)
 
         def bound(values: list[float | None], default: float) -> Array:
@@ -125,25 +124,12 @@ class JointLimiter:
         self._velocity = bound([limit.velocity for limit in limits], math.inf)
         self._acceleration = bound([limit.acceleration for limit in limits], math.inf)
         self._effort = bound([limit.effort for limit in limits], math.inf)
-        kinds = list(interfaces)
-        uncommanded = np.array([kind != "effort" for kind in kinds])
-        self._effort[uncommanded] = math.inf
-        self._positions = np.flatnonzero([kind == "position" for kind in kinds])
-        self._velocities = np.flatnonzero([kind == "velocity" for kind in kinds])
-        efforts = ~uncommanded
-        # Infinite: joints without effort command.
-        self._watch_lower = np.where(efforts, self._lower, -math.inf)
-        self._watch_upper = np.where(efforts, self._upper, math.inf)
-        self._watch_velocity = np.where(efforts, self._velocity, math.inf)
-        # Nothing is cut while position, velocity and command (3 n) lie within these, and all commands are efforts.
-        self._least = np.concatenate((self._watch_lower, -self._watch_velocity, -self._effort))
-        self._most = np.concatenate((self._watch_upper, self._watch_velocity, self._effort))
-        self._plain = not len(self._positions) and not len(self._velocities)
-        self._seen = np.zeros(3 * n)
-        self._above, self._below = np.zeros((2, 3 * n), dtype=np.bool_)
+        self._version = -1
+        self._seen = np.zeros((3, n))
+        self._inside, self._below = np.zeros((2, 3, n), dtype=np.bool_)
         self.saturations = np.zeros(n, dtype=np.int64)
         self.saturated = np.zeros(n, dtype=np.bool_)
-        self._limited = np.zeros(n)
+        self._cut = False
         self._previous = np.full(n, math.nan)
 
     def reset(self) -> None:
@@ -152,49 +138,79 @@ class JointLimiter:
         self.saturations[:] = 0
         self.saturated[:] = False
 
-    def apply(self, command: Array, position: Array, velocity: Array, dt: float) -> Array:
-        """The limited command (n); the array is valid until the next call. `position`, `velocity` (n) are measured."""
-        limited, seen, n = self._limited, self._seen, len(self._limited)
-        seen[:n], seen[n : 2 * n], seen[2 * n :] = position, velocity, command
-        np.greater(seen, self._least, out=self._above)
+    def _obey(self, modes: Sequence[Mode]) -> None:
+        self._previous[:] = math.nan
+        self._positions = np.flatnonzero([mode == "position" for mode in modes])
+        self._velocities = np.flatnonzero([mode == "velocity" for mode in modes])
+        self._plain = not len(self._positions) and not len(self._velocities)
+        efforts = np.array([mode == "effort" for mode in modes])
+        # Infinite: joints without effort command.
+        self._watched = [
+            np.where(efforts, limit, default)
+            for limit, default in (
+                (self._lower, -math.inf),
+                (self._upper, math.inf),
+                (self._velocity, math.inf),
+                (self._effort, math.inf),
+            )
+        ]
+        lower, upper, velocity, effort = self._watched
+        # Nothing is cut while position, velocity and effort lie within these, and all commands are efforts.
+        self._least = np.stack((lower, -velocity, -effort))
+        self._most = np.stack((upper, velocity, effort))
+
+    def apply(self, command: JointCommand, position: Array, velocity: Array, dt: float) -> None:
+        """Cuts the command in place; `position`, `velocity` (n) are measured, `dt` [s] is a control period."""
+        if command.version != self._version:
+            self._version = command.version
+            self._obey(command.modes)
+        seen, inside = self._seen, self._inside
+        seen[0], seen[1], seen[2] = position, velocity, command.effort
+        np.greater(seen, self._least, out=inside)
         np.less(seen, self._most, out=self._below)
-        np.logical_and(self._above, self._below, out=self._above)
-        if np.count_nonzero(self._above) == 3 * n and self._plain:
-            limited[:] = command
-            self.saturated.fill(False)
-            return limited
-        limited[:] = limit_effort(
-            command,
-            effort=self._effort,
+        np.logical_and(inside, self._below, out=inside)
+        if self._plain and np.count_nonzero(inside) == inside.size:
+            if self._cut:
+                self._cut = False
+                self.saturated.fill(False)
+            return
+        self._cut = True
+        self.saturated.fill(False)
+        lower, upper, speed, effort = self._watched
+        limited = limit_effort(
+            command.effort,
+            effort=effort,
             position=position,
             velocity=velocity,
-            lower=self._watch_lower,
-            upper=self._watch_upper,
-            max_velocity=self._watch_velocity,
+            lower=lower,
+            upper=upper,
+            max_velocity=speed,
         )
+        np.not_equal(limited, command.effort, out=self.saturated)
+        command.effort[:] = limited
         if not self._plain:
             self._apply_others(command, position, dt)
-        np.not_equal(limited, command, out=self.saturated)
         self.saturations += self.saturated
-        return limited
 
-    def _apply_others(self, command: Array, position: Array, dt: float) -> None:
+    def _apply_others(self, command: JointCommand, position: Array, dt: float) -> None:
         i = self._positions
         if len(i):
             before = np.where(np.isnan(self._previous[i]), position[i], self._previous[i])
-            self._limited[i] = limit_position(
-                command[i],
+            limited = limit_position(
+                command.position[i],
                 lower=self._lower[i],
                 upper=self._upper[i],
                 velocity=self._velocity[i],
                 previous=before,
                 dt=dt,
             )
+            self.saturated[i] |= limited != command.position[i]
+            self._previous[i] = command.position[i] = limited
         i = self._velocities
         if len(i):
-            before = np.where(np.isnan(self._previous[i]), command[i], self._previous[i])
-            self._limited[i] = limit_velocity(
-                command[i],
+            before = np.where(np.isnan(self._previous[i]), command.velocity[i], self._previous[i])
+            limited = limit_velocity(
+                command.velocity[i],
                 velocity=self._velocity[i],
                 dt=dt,
                 position=position[i],
@@ -203,4 +219,5 @@ class JointLimiter:
                 acceleration=self._acceleration[i],
                 previous=before,
             )
-        self._previous[:] = self._limited
+            self.saturated[i] |= limited != command.velocity[i]
+            self._previous[i] = command.velocity[i] = limited

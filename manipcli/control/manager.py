@@ -1,32 +1,34 @@
-"""All controllers of a robot at once: joint vectors in, one command vector out, once per control period.
+"""All controllers of a robot: who is active, who claims what, and one update of them all a control tick.
 
-    manager = build_controllers(spec, robot, period)      # factory.py; or ControllerManager([...], joints=..., ...)
-    limiter = manager.limiter([joint.limits for joint in robot.moving_joints])
-    commands = manager.update(time, state, feed_forward, contact_force)    # (n) before limits, until the next update
-    limited = limiter.apply(commands, state.position, state.velocity, period)
+    manager = build_controllers(spec, robot, period)       # factory.py; or ControllerManager([...], joints=..., ...)
+    command = manager.update(time, state, contact_force)   # a JointCommand, before limits, until the next update
 
-where every vector (n) follows `RobotModel.joint_names`; `state` has `position`, `velocity`, `effort` (a `WorldState`
-will do); `feed_forward` (n) is gravity or inverse dynamics for all joints at once (`manager.feed_forward` says which
-joint wants which); `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to
-the next joint. `manager.outputs` are the outputs of the last update in the order of `manager.controllers`;
-`manager.interfaces` (n) says what each command is (None: a mimic joint, its command stays 0). Goals go to the
-controllers: `manager["arm_controller"].send_goal(...)`, or `manager.serving(joints)` finds the one that claims them.
+where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState` will do),
+and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to the next joint.
+Goals go to the controllers: `manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` finds the active one
+that claims them.
+
+A controller is unconfigured when loaded, inactive when configured, and active when switched on, as in ros2_control. A
+switch is whole or not at all, and happens between two updates: there is no clock to wait for and no time to run out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import Controller, ControllerOutput, FeedForward, Interface, JointState
-from manipcli.control.limits import JointLimiter
-from manipcli.core.errors import Finding, InvalidArgument, InvalidInput
+from manipcli.control.claims import Claims, conflicts
+from manipcli.control.command import JointCommand, mode_of
+from manipcli.control.controller import Controller, ControllerOutput, JointState
+from manipcli.control.feed_forward import FeedForwardLaw, NoDynamics
+from manipcli.control.lifecycle import ControllerInfo, ControllerState, Strictness, SwitchResult, requested
+from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointLimits
+from manipcli.core.text import did_you_mean
+from manipcli.spec.controllers import Interface
 
 Index = slice | npt.NDArray[np.intp]
 
@@ -42,168 +44,311 @@ class JointVectors(Protocol):
     def effort(self) -> Array: ...
 
 
-@dataclass(slots=True, eq=False)
 class _Slot:
-    """A controller, where its joints stand in a joint vector, and what was measured there: rows of `copy`, which is
-    taken anew every tick; None where they are a part of the manager's own."""
+    """A loaded controller, where its joints stand in a joint vector, and what is measured there.
 
-    controller: Controller
-    index: Index
-    measured: JointState
-    copy: Array | None
-    adds: bool
+    `measured` and `contact_force` are read-only parts of the vectors that the manager was given, or, where the joints
+    do not stand side by side, copies that are taken anew every tick (`gathered`: copy, vector).
+    """
+
+    __slots__ = (
+        "contact_force", "controller", "copies", "every", "gathered", "index", "measured", "period", "scattered",
+        "state",
+    )  # fmt: skip
+
+    def __init__(self, controller: Controller, index: Index, every: int, period: float) -> None:
+        self.controller = controller
+        self.index = index
+        self.scattered = not isinstance(index, slice)
+        self.every = every
+        self.period = every * period
+        self.state: ControllerState = "unconfigured"
+        none = np.zeros(0)
+        self.measured = JointState(none, none, none)
+        self.contact_force: Array | None = None
+        self.copies: tuple[tuple[Array, Index, Array], ...] = ()
+        self.gathered: list[tuple[Array, Array]] = []
+
+    def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:
+        """From now on at these vectors: position, velocity, effort."""
+        self.gathered = []
+        self.measured = JointState(*map(self._part, vectors))
+        self.contact_force = None if contact_force is None else self._part(contact_force)
+
+    def _part(self, vector: Array) -> Array:
+        part = vector[self.index]
+        if self.scattered:
+            self.gathered.append((part, vector))
+            part = part.view()
+        part.flags.writeable = False
+        return part
+
+    def gather(self) -> None:
+        """Copies what is measured now."""
+        for part, vector in self.gathered:
+            part[:] = vector[self.index]
 
 
 class ControllerManager:
-    """Holds the active controllers of one robot.
+    """Holds the controllers of one robot.
 
     Args:
-        controllers: distinct names; none claims a joint that another one claims.
+        controllers: loaded, configured and activated at once.
         joints: (n) all moving joints of the robot, in the order of its joint vectors.
         period: [s] between two updates.
         following: joints that are not to be commanded, because they follow others (mimic).
+        feed_forward: adds gravity or inverse dynamics for the controllers that want it.
 
     Raises:
-        InvalidInput: every conflict at once: a joint claimed twice, unknown, following, or claimed by nobody.
+        InvalidInput: every conflict at once: two of one name, an interface claimed twice, a joint that is unknown or
+            follows another.
     """
 
     def __init__(
         self,
-        controllers: Sequence[Controller],
+        controllers: Sequence[Controller] = (),
         *,
         joints: Sequence[str],
         period: float,
         following: Sequence[str] = (),
+        feed_forward: FeedForwardLaw | None = None,
     ) -> None:
-        self.controllers = tuple(controllers)
         self.joints = tuple(joints)
         self.period = period
-        findings = claim_findings(self.controllers, self.joints, tuple(following))
+        self.following = tuple(following)
+        self.command = JointCommand(len(self.joints))
+        self.outputs: tuple[ControllerOutput | None, ...] = ()
+        self.faults: tuple[Finding, ...] = ()
+        self._feed_forward = feed_forward if feed_forward is not None else NoDynamics()
+        self._slots: dict[str, _Slot] = {}
+        self._active: tuple[_Slot, ...] = ()
+        self._seen: tuple[Array, Array, Array] | None = None
+        self._felt: Array | None = None
+        self._tick = 0
+        self._references = False
+        findings = conflicts(controllers, self.joints, self.following)
         if findings:
             raise InvalidInput(findings)
-        n = len(self.joints)
-        self._commands = np.zeros(n)
-        self._measured = np.zeros((3, n))
-        self._slots = [self._slot(controller) for controller in self.controllers]
-        interfaces: list[Interface | None] = [None] * n
-        wants: list[FeedForward] = ["none"] * n
-        for controller in self.controllers:
-            for name in controller.joints:
-                interfaces[self.joints.index(name)] = controller.interface
-                wants[self.joints.index(name)] = controller.feed_forward
-        self.interfaces = tuple(interfaces)
-        self.feed_forward = tuple(wants)
-        self.outputs: tuple[ControllerOutput, ...] = ()
+        for controller in controllers:
+            self.load(controller)
+            self.configure(controller.name)
+        self.switch(activate=[controller.name for controller in controllers])
 
-    def _slot(self, controller: Controller) -> _Slot:
+    @property
+    def started(self) -> bool:
+        """Whether there was an update."""
+        return self._tick > 0
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """All that are loaded, in the order of loading."""
+        return tuple(slot.controller for slot in self._slots.values())
+
+    def load(self, controller: Controller, *, update_rate: float | None = None) -> None:
+        """Takes a controller in, unconfigured.
+
+        Args:
+            controller: of a name that is not loaded.
+            update_rate: [Hz] of its updates, a whole fraction of the control rate; None: at every tick.
+
+        Raises:
+            InvalidArgument: its name is taken, its rate does not divide the control rate.
+            InvalidInput: a joint that the robot does not have or that follows another.
+        """
+        if controller.name in self._slots:
+            raise InvalidArgument("CTRL141", f"two controllers are named '{controller.name}'")
+        findings = conflicts([controller], self.joints, self.following)
+        if findings:
+            raise InvalidInput(findings)
+        every = 1 if update_rate is None else ticks_between(update_rate, self.period)
         where = [self.joints.index(name) for name in controller.joints]
         index: Index = np.array(where, dtype=np.intp)
-        adjacent = where == list(range(where[0], where[0] + len(where)))
-        if adjacent:
+        if where and where == list(range(where[0], where[0] + len(where))):
             index = slice(where[0], where[0] + len(where))
-        rows = self._measured[:, index]
-        return _Slot(
-            controller=controller,
-            index=index,
-            measured=JointState(position=rows[0], velocity=rows[1], effort=rows[2]),
-            copy=None if adjacent else rows,
-            adds=controller.feed_forward != "none",
-        )
+        self._slots[controller.name] = _Slot(controller, index, every, self.period)
+        self._rearrange()
+
+    def configure(self, name: str) -> None:
+        """Makes a controller ready to be activated; one that is inactive starts afresh.
+
+        Raises:
+            InvalidArgument: it is unknown or active.
+        """
+        slot = self._slot(name)
+        if slot.state == "active":
+            raise InvalidArgument("CTRL160", f"controller '{name}' is active; deactivate it before configuring it")
+        slot.state = "inactive"
+
+    def cleanup(self, name: str) -> None:
+        """Takes an inactive controller back to unconfigured.
+
+        Raises:
+            InvalidArgument: it is unknown, active, or unconfigured already.
+        """
+        slot = self._slot(name)
+        if slot.state != "inactive":
+            raise InvalidArgument("CTRL160", f"controller '{name}' is {slot.state}; only an inactive one is cleaned up")
+        slot.state = "unconfigured"
+
+    def unload(self, name: str) -> None:
+        """Forgets a controller that is not active.
+
+        Raises:
+            InvalidArgument: it is unknown or active.
+        """
+        if self._slot(name).state == "active":
+            raise InvalidArgument("CTRL160", f"controller '{name}' is active; deactivate it before unloading it")
+        del self._slots[name]
+        self._rearrange()
+
+    def switch(
+        self,
+        activate: Collection[str] = (),
+        deactivate: Collection[str] = (),
+        *,
+        strictness: Strictness = "strict",
+        time: float = 0.0,
+    ) -> SwitchResult:
+        """Deactivates and activates controllers, all of it or, when refused, nothing.
+
+        A name on both lists restarts that controller. With `best_effort` names that cannot be switched are left out and
+        told; it is refused only when none of a list is left, or when claims clash.
+
+        Args:
+            activate, deactivate: names.
+            strictness: see above.
+            time: simulated time [s], for the results of goals that end.
+        """
+        states = {name: slot.state for name, slot in self._slots.items()}
+        request = requested(states, activate, deactivate, strictness)
+        if not request.ok:
+            return request
+        kept = [s.controller for s in self._active if s.controller.name not in request.deactivated]
+        wanted = [self._slots[name].controller for name in request.activated]
+        clashes = conflicts([*kept, *wanted], self.joints, self.following)
+        if clashes:
+            return SwitchResult(False, (*request.messages, *(finding.message for finding in clashes)))
+        for name in request.deactivated:
+            self._slots[name].controller.deactivate(time)
+            self._slots[name].state = "inactive"
+        for name in request.activated:
+            self._slots[name].state = "active"
+        self._rearrange()
+        return request
+
+    def list(self) -> tuple[ControllerInfo, ...]:
+        """All that are loaded, and what they claim."""
+        return tuple(ControllerInfo.of(slot.controller, slot.state) for slot in self._slots.values())
 
     def __getitem__(self, name: str) -> Controller:
-        for controller in self.controllers:
-            if controller.name == name:
-                return controller
-        raise KeyError(f"no controller '{name}'; known: {', '.join(c.name for c in self.controllers)}")
+        return self._slot(name).controller
 
-    def index(self, name: str) -> Index:
-        """Where the joints of a controller stand in a joint vector."""
-        return next(slot.index for slot in self._slots if slot.controller.name == name)
+    def _slot(self, name: str) -> _Slot:
+        if name not in self._slots:
+            hint = did_you_mean(name, self._slots, kind="controllers")
+            raise InvalidArgument("CTRL161", f"no controller '{name}' is loaded", hint=hint)
+        return self._slots[name]
 
     def serving(self, joints: Sequence[str]) -> Controller:
-        """The controller that claims all of `joints`.
+        """The active controller that claims all of `joints`.
 
         Raises:
             InvalidArgument: none does.
         """
-        for controller in self.controllers:
-            if set(joints) <= set(controller.joints):
+        active = [slot.controller for slot in self._active]
+        for controller in active:
+            if controller.interfaces and set(joints) <= set(controller.joints):
                 return controller
-        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in self.controllers)
-        raise InvalidArgument("CTRL140", f"no controller claims all of {', '.join(joints)} ({claims})")
+        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active)
+        raise InvalidArgument("CTRL140", f"no active controller claims all of {', '.join(joints)} ({claims})")
 
-    def limiter(self, limits: Sequence[JointLimits]) -> JointLimiter:
-        """A limiter of the commands, for the limits (n) of all joints."""
-        return JointLimiter(limits, self.interfaces)
+    def keep_references(self) -> None:
+        """From now on the command holds the references, too."""
+        self._references = True
+        self._rearrange()
 
-    def update(
-        self,
-        time: float,
-        state: JointVectors,
-        feed_forward: Array | None = None,
-        contact_force: Array | None = None,
-    ) -> Array:
-        """One control tick at `time` [s]: the commands (n) before limits; see the module for the vectors."""
-        measured = self._measured
-        measured[0], measured[1], measured[2] = state.position, state.velocity, state.effort
-        commands, period = self._commands, self.period
-        outputs = []
-        for slot in self._slots:
-            index = slot.index
-            if slot.copy is not None:
-                slot.copy[:] = measured[:, index]
-            addition = feed_forward[index] if slot.adds and feed_forward is not None else None
-            force = contact_force[index] if contact_force is not None else None
-            output = slot.controller.update(time, period, slot.measured, addition, contact_force=force)
-            commands[index] = output.command
-            outputs.append(output)
-        self.outputs = tuple(outputs)
-        return commands
+    def _rearrange(self) -> None:
+        """After a change of who is there and who is active: modes of the joints, and what has to be done every tick."""
+        self._active = tuple(slot for slot in self._slots.values() if slot.state == "active")
+        claimed = Claims.of([slot.controller for slot in self._active])
+        modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
+        if tuple(modes) != self.command.modes:
+            self.command.obey(modes)
+        self._feed_forward.serve([(slot.controller, slot.index, slot.every) for slot in self._active])
+        for slot in self._active:
+            slot.copies = self._copies(slot)
+        self._seen = self._felt = None
+        self.outputs = tuple(s.controller.output if s.state == "active" else None for s in self._slots.values())
+
+    def _copies(self, slot: _Slot) -> tuple[tuple[Array, Index, Array], ...]:
+        """What is copied into the command every tick: target, where in it, source."""
+        command, output = self.command, slot.controller.output
+        commands: dict[Interface, Array] = {
+            "position": command.position,
+            "velocity": command.velocity,
+            "acceleration": command.acceleration,
+            "effort": command.effort,
+        }
+        copies = [
+            (commands[i], slot.index, row) for i, row in zip(slot.controller.interfaces, output.commands, strict=True)
+        ]
+        if self._references and slot.controller.interfaces:
+            copies.append((command.reference_position, slot.index, output.position))
+            copies.append((command.reference_velocity, slot.index, output.velocity))
+        return tuple(copies)
+
+    def _look(self, state: JointVectors, contact_force: Array | None) -> None:
+        """The slots' own parts of vectors that are not those of the tick before."""
+        vectors = self._seen = (state.position, state.velocity, state.effort)
+        self._felt = contact_force
+        for slot in self._active:
+            slot.look(vectors, contact_force)
+
+    def update(self, time: float, state: JointVectors, contact_force: Array | None = None) -> JointCommand:
+        """One control tick at `time` [s]; see the module for the vectors.
+
+        A controller that fails is deactivated, its goal aborted with the cause; its joints are braked. `faults` grows.
+        """
+        seen = self._seen
+        if seen is None or seen[0] is not state.position or self._felt is not contact_force:
+            self._look(state, contact_force)
+        tick, self._tick = self._tick, self._tick + 1
+        for slot in self._active:
+            if slot.scattered:
+                slot.gather()
+            if slot.every == 1 or tick % slot.every == 0:
+                try:
+                    slot.controller.update(time, slot.period, slot.measured, contact_force=slot.contact_force)
+                except ManipcliError as error:
+                    self._fail(slot, error, time)
+        self._feed_forward.add(tick, state.position, state.velocity)
+        for slot in self._active:
+            for target, index, source in slot.copies:
+                target[index] = source
+        return self.command
+
+    def _fail(self, slot: _Slot, error: ManipcliError, time: float) -> None:
+        name = slot.controller.name
+        cause = f"controller '{name}' failed in its update: {error}"
+        self.faults += (Finding("CTRL162", cause),)
+        slot.controller.deactivate(time, cause)
+        slot.state = "inactive"
+        self._rearrange()
 
     def deactivate(self, time: float) -> None:
         """Ends all goals as aborted; the next update activates the controllers again."""
-        for controller in self.controllers:
-            controller.deactivate(time)
+        for slot in self._active:
+            slot.controller.deactivate(time)
 
 
-def claim_findings(
-    controllers: Sequence[Controller], joints: tuple[str, ...], following: tuple[str, ...]
-) -> tuple[Finding, ...]:
-    """Everything that is wrong with who claims what."""
-    findings = []
-    names = [controller.name for controller in controllers]
-    findings += [
-        Finding(code="CTRL141", message=f"two controllers are named '{name}'")
-        for name in dict.fromkeys(names)
-        if names.count(name) > 1
-    ]
-    owner: dict[str, Controller] = {}
-    for controller in controllers:
-        for name in controller.joints:
-            claim = f"{name}/{controller.interface}"
-            if name in owner:
-                other = owner[name]
-                findings.append(
-                    Finding(
-                        code="CTRL142",
-                        message=f"controllers '{other.name}' ({name}/{other.interface}) and '{controller.name}' "
-                        f"({claim}) both claim joint '{name}'",
-                    )
-                )
-            elif name in following:
-                message = f"controller '{controller.name}' claims {claim}, but joint '{name}' follows another joint"
-                findings.append(Finding(code="CTRL143", message=message))
-            elif name not in joints:
-                message = f"controller '{controller.name}' claims {claim}, but the robot has no such moving joint"
-                findings.append(Finding(code="CTRL144", message=message))
-            owner.setdefault(name, controller)
-    idle = [name for name in joints if name not in owner and name not in following]
-    if idle:
-        findings.append(
-            Finding(
-                code="CTRL145",
-                message=f"no controller commands {', '.join(repr(name) for name in idle)}",
-                hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller: a joint that nobody commands falls",
-            )
-        )
-    return tuple(findings)
+def ticks_between(update_rate: float, period: float) -> int:
+    """Control ticks of `period` [s] between two updates at `update_rate` [Hz].
+
+    Raises:
+        InvalidArgument: the rate does not divide the control rate.
+    """
+    every = 1.0 / (update_rate * period)
+    if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6 * every:
+        message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
+        raise InvalidArgument("CTRL163", message, hint=f"say {1.0 / (period * max(1, round(every))):g} Hz")
+    return round(every)

@@ -17,6 +17,7 @@ from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.condition import World, needs_physics
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.kinematics import Kinematics
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recorder import Recorder
 from manipcli.simulate.engine import EngineSettings
@@ -65,7 +66,7 @@ class Watch:
         self._period = period
         self._began = wall_clock.perf_counter()
 
-    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         self._recorder.tick(tick, state, outputs)
         if self._progress is not None and tick % PROGRESS_TICKS == 0:
             self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
@@ -74,12 +75,14 @@ class Watch:
         self._recorder.contacts(tick, contacts)
 
 
-def controllers(task: Task) -> ControllerManager:
-    """The task's controllers, for its robot and control period."""
+def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
+    """The task's controllers, for its robot (and its `kinematics`, if they are at hand) and control period."""
     file = task.controllers_file
     period = task.spec.simulation.control_period
     compat = task.robot_file.spec.compat
-    return build_controllers(file.spec, task.robot, period, place=lambda loc: file.place(*loc), compat=compat)
+    return build_controllers(
+        file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat
+    )
 
 
 def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None) -> None:
@@ -92,7 +95,6 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
     settings = EngineSettings(
         step=simulation.step,
         substeps=round(simulation.control_period / simulation.step),
-        interfaces=manager.interfaces,
         start=plan.start.position,
     )
     engine = ENGINES[simulation.engine].open(task.robot, task.scene, settings)
@@ -103,7 +105,6 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
                 scene=task.scene,
                 engine=engine,
                 manager=manager,
-                kinematics=plan.planner.kinematics,
                 period=simulation.control_period,
             )
             _settle(task, session)

@@ -11,6 +11,7 @@ from manipcli.core.errors import Finding
 from manipcli.flow.load import Task
 from manipcli.flow.plan import start_position
 from manipcli.model.kinematics import Kinematics
+from manipcli.spec.controllers import GripperSpec, JointTrajectorySpec
 
 
 def gain_findings(task: Task) -> tuple[Finding, ...]:
@@ -23,7 +24,7 @@ def gain_findings(task: Task) -> tuple[Finding, ...]:
     inertia = 1.0 / np.diag(np.linalg.inv(Kinematics(robot).mass_matrix(start_position(task))))
     findings: list[Finding] = []
     for name, spec in task.controllers.controllers.items():
-        if spec.command_interface != "effort":
+        if "effort" not in spec.interfaces or not isinstance(spec, JointTrajectorySpec | GripperSpec):
             continue
         for joint, gains in spec.gains.items():
             place = file.place("controllers", name, "gains", joint)

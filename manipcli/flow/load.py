@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from manipcli.control.factory import build_controllers
+from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.vocabulary import task_spec
@@ -122,8 +122,11 @@ def load_task(
     if task is not None:
         whole = task
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
+    told: tuple[Finding, ...] = ()
     if built:
-        misclaimed = _misclaimed(controllers_file, built[0], read.spec) if controllers_file else ()
+        claimed = _misclaimed(controllers_file, built[0], read.spec) if controllers_file else ()
+        misclaimed = [finding for finding in claimed if finding.severity == "error"]
+        told = tuple(finding for finding in claimed if finding.severity != "error")
         claims = None if misclaimed or not controllers_file else Claims.of(controllers_file.spec)
         gathered.findings += _unusable(read, built[0], scene or named_scene(read.spec), claims)
         gathered.findings += _refused(read, built[0])
@@ -137,7 +140,7 @@ def load_task(
         controllers_file=controllers_file,
         robot=robot,
         scene=scene,
-        findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes),
+        findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes, *told),
     )
 
 
@@ -252,9 +255,6 @@ def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
 
 
 def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
-    """What is wrong with who commands what."""
-    try:
-        build_controllers(file.spec, robot, task.simulation.control_period, place=lambda loc: file.place(*loc))
-    except InvalidInput as invalid:
-        return invalid.findings
-    return ()
+    """What is wrong with who commands what, and what is only to be told."""
+    period = task.simulation.control_period
+    return controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))

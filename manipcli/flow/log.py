@@ -53,7 +53,7 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
         path,
         robot=task.robot,
         scene=task.scene,
-        controllers=[ControllerChannel(c.name, c.joints, c.interface) for c in manager.controllers],
+        controllers=[ControllerChannel(c.name, c.joints, c.interfaces) for c in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
             (TASK, YAML, resolved(_portable_task(task.spec)).encode()),

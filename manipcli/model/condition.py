@@ -37,11 +37,15 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something in a spec that cannot be meant: `loc` inside the spec, what is wrong, a hint (the nearest name)."""
+    """Something in a spec that cannot be meant: `loc` inside the spec, what is wrong, a hint (the nearest name).
+
+    `code`: where the family of problems has codes of its own.
+    """
 
     loc: tuple[str | int, ...]
     message: str
     hint: str | None = None
+    code: str = ""
 
 
 @dataclass(frozen=True, slots=True)

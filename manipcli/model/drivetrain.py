@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import Actuator, RobotModel, TransmissionTag
 from manipcli.model.transmission import Maps, Transmission
 from manipcli.model.transmissions import BY_TYPE
 
@@ -37,26 +37,70 @@ class Drivetrain:
     """The a actuators of a robot, which drive as many of its joints.
 
     Attributes:
-        names: (a) of the actuators.
+        actuators: (a) what is known of each; ideal where nothing is.
         joints: (a) where the joints that they drive stand in a joint vector, in the order of `transmission`.
         transmission: from the actuators to those joints.
     """
 
-    names: tuple[str, ...]
+    actuators: tuple[Actuator, ...]
     joints: tuple[int, ...]
     transmission: BlockTransmission
 
     @staticmethod
     def of(robot: RobotModel) -> Drivetrain:
-        """In the order of `robot.transmissions`. Those of an unknown type, and of joints that nobody commands, are left
-        out, as the checks of the description tell."""
-        commanded = {joint.name for joint in robot.moving_joints if joint.independent}
-        tags = [tag for tag in robot.transmissions if tag.type in BY_TYPE and commanded.issuperset(tag.joints)]
+        """In the order of `robot.transmissions`.
+
+        Left out are those that the checks of descriptions tell of: of an unknown type or a wrong number of joints, of
+        joints that nobody commands, and a second one of the same joint (ROS 1 and ros2_control may both describe it).
+        """
+        known = {actuator.name: actuator for actuator in robot.actuators}
+        free = {joint.name for joint in robot.moving_joints if joint.independent}
+        tags: list[TransmissionTag] = []
+        for tag in robot.transmissions:
+            member = BY_TYPE.get(tag.type)
+            if (
+                member is not None
+                and len(tag.joints) == len(tag.actuators) == member.size
+                and free.issuperset(tag.joints)
+            ):
+                free.difference_update(tag.joints)
+                tags.append(tag)
         return Drivetrain(
-            names=tuple(name for tag in tags for name in tag.actuators),
+            actuators=tuple(known.get(name, Actuator(name)) for tag in tags for name in tag.actuators),
             joints=tuple(robot.indices(tuple(name for tag in tags for name in tag.joints))),
             transmission=BlockTransmission(tuple(BY_TYPE[tag.type].of(tag, robot.compat) for tag in tags)),
         )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(a) of the actuators."""
+        return tuple(actuator.name for actuator in self.actuators)
+
+    def state(self, position: Array, velocity: Array, effort: Array) -> list[Array]:
+        """Position, velocity and effort of the actuators, each (T, a), from those of all joints (T, n).
+
+        The effort is what reaches the gear: friction, losses and limits of the actuators are in it already.
+        """
+        to_actuator, columns = self.transmission.joint_to_actuator, list(self.joints)
+        return [
+            to_actuator("position", position[:, columns]),
+            to_actuator("velocity", velocity[:, columns]),
+            to_actuator("effort", effort[:, columns]),
+        ]
+
+
+def reflected_inertia(robot: RobotModel) -> Array:
+    """(n) [kg m2 or kg] what the rotors add to the inertia of each joint: the diagonal of T^T J T.
+
+    velocity_a = T velocity_j and J the rotors' own inertia; for a simple transmission reduction^2 J. What couples the
+    two joints of a pair (the rest of the matrix) is left out.
+    """
+    drivetrain = Drivetrain.of(robot)
+    inertia = np.zeros(len(robot.joint_names))
+    if drivetrain.actuators:
+        rotors = np.array([actuator.rotor_inertia for actuator in drivetrain.actuators])
+        inertia[list(drivetrain.joints)] = rotors @ drivetrain.transmission.maps.actuator_motion**2
+    return inertia
 
 
 def _diagonal(blocks: Sequence[Array]) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllersSpec, GripperSpec
+from manipcli.spec.controllers import ControllersSpec
 
 Loc = tuple[str | int, ...]
 
@@ -36,8 +36,8 @@ class Claims:
         """Those of a controllers file."""
         named = spec.controllers.items()
         return cls(
-            followers=tuple(Claim(name, one.joints) for name, one in named if not isinstance(one, GripperSpec)),
-            grippers=tuple(Claim(name, one.joints) for name, one in named if isinstance(one, GripperSpec)),
+            followers=tuple(Claim(name, one.joints) for name, one in named if one.role == "follower"),
+            grippers=tuple(Claim(name, one.joints) for name, one in named if one.role == "hand"),
         )
 
     @property

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import ControllerOutput
+from manipcli.control.controller import REFERENCE_ROWS, ControllerOutput
 from manipcli.core.geometry import Array
 from manipcli.model.batch_kinematics import relative_batch
 from manipcli.model.robot import RobotModel
@@ -19,6 +19,7 @@ from manipcli.record.actuators import ActuatorSide
 from manipcli.record.channels import Channel, ControllerChannel
 from manipcli.record.messages import WORLD
 from manipcli.record.rows import RowBlock, Times, controller_state_template, joint_state_template, tf_template
+from manipcli.spec.controllers import Interface
 
 PLOT_PERIOD = 0.01
 """[s] between two messages of the topics that only serve viewers (reference, error, actuators)."""
@@ -46,25 +47,31 @@ class ChunkContent:
     indexes: dict[int, Index]
 
 
+FIELDS: tuple[Interface, ...] = ("position", "velocity", "acceleration", "effort")
+"""The order of the fields of a message."""
+
+
 class _ControllerRows:
-    """What one controller put out on the ticks of a block."""
+    """What one controller put out on the ticks of a block: `rows` (capacity, 3 + k, n), as `ControllerOutput.rows`; NaN
+    where it was not active."""
 
     def __init__(self, channel: ControllerChannel, robot: RobotModel, capacity: int) -> None:
-        shape = (capacity, len(channel.joints))
-        self.position, self.velocity, self.acceleration, self.command = (np.zeros(shape) for _ in range(4))
+        self.rows = np.zeros((capacity, REFERENCE_ROWS + len(channel.interfaces), len(channel.joints)))
+        self._outputs = [REFERENCE_ROWS + channel.interfaces.index(f) for f in FIELDS if f in channel.interfaces]
         self._columns = robot.indices(channel.joints)
         self._endless = np.array([robot.joint(name).type == "continuous" for name in channel.joints], dtype=bool)
 
     def values(self, position: Array, velocity: Array, effort: Array) -> tuple[list[Array], list[Array]]:
         """Numbers of the controller's messages from all measured joints (T, n): of its state, and of its plots."""
-        T = len(position)
+        rows = self.rows[: len(position)]
         feedback, speed, force = (a[:, self._columns] for a in (position, velocity, effort))
-        reference, reference_speed = self.position[:T], self.velocity[:T]
+        reference, reference_speed, acceleration = rows[:, 0], rows[:, 1], rows[:, 2]
         error = reference - feedback
         # A joint without limits errs the short way round.
         error[:, self._endless] = np.remainder(error[:, self._endless] + np.pi, 2 * np.pi) - np.pi
         errors = [error, reference_speed - speed]
-        state = [reference, reference_speed, self.acceleration[:T], feedback, speed, force, *errors, self.command[:T]]
+        outputs = [rows[:, k] for k in self._outputs]
+        state = [reference, reference_speed, acceleration, feedback, speed, force, *errors, *outputs]
         return state, [reference, reference_speed, *errors]
 
 
@@ -93,7 +100,7 @@ class Block:
         self._body_position, self._body_quat = np.zeros((capacity, m, 3)), np.zeros((capacity, m, 4))
         self._controllers = [_ControllerRows(controller, robot, capacity) for controller in controllers]
         frames = [(joint.parent, joint.child) for joint in joints] + [(WORLD, body.name) for body in bodies]
-        states = [controller_state_template(ids[c.state_topic], c.joints, c.interface) for c in controllers]
+        states = [controller_state_template(ids[c.state_topic], c.joints, c.interfaces) for c in controllers]
         self._actuators = ActuatorSide(robot)
         plots = [
             joint_state_template(ids[topic], c.joints, effort=False)
@@ -109,7 +116,7 @@ class Block:
         self._fast_written = 0
         self._slow_written = 0
 
-    def add(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+    def add(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """Copies one tick; the caller may reuse its arrays. The block must not be full."""
         k = self.count
         self._ticks[k] = tick
@@ -118,11 +125,8 @@ class Block:
         self._effort[k] = state.effort
         self._body_position[k] = state.body_position
         self._body_quat[k] = state.body_quat_xyzw
-        for rows, output in zip(self._controllers, outputs, strict=True):
-            rows.position[k] = output.position
-            rows.velocity[k] = output.velocity
-            rows.acceleration[k] = output.acceleration
-            rows.command[k] = output.command
+        for of, output in zip(self._controllers, outputs, strict=True):
+            of.rows[k] = np.nan if output is None else output.rows
         self.count = k + 1
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:

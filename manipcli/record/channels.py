@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from manipcli.control.controller import Interface
 from manipcli.record import schemas
+from manipcli.spec.controllers import Interface
 
 ROBOT_DESCRIPTION = "/robot_description"
 TF_STATIC = "/tf_static"
@@ -30,11 +30,11 @@ TRANSIENT_LOCAL = (
 
 @dataclass(frozen=True, slots=True)
 class ControllerChannel:
-    """A controller whose reference, feedback, error and output are recorded; `interface`: what its output is."""
+    """A controller whose reference, feedback, error and output are recorded; `interfaces`: what its output is."""
 
     name: str
     joints: tuple[str, ...]
-    interface: Interface = "effort"
+    interfaces: tuple[Interface, ...] = ("effort",)
 
     @property
     def state_topic(self) -> str:

@@ -97,7 +97,7 @@ class Recorder:
         """The file while it is written."""
         return self._container.partial
 
-    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """The state of the world at `tick` and what the controllers put out; the arrays may be reused afterwards."""
         if self._block.count == self._block.capacity:
             self._send()

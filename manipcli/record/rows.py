@@ -18,9 +18,9 @@ from itertools import accumulate
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import Interface
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.spec.controllers import Interface
 
 Times = npt.NDArray[np.int64]
 Field = npt.NDArray[np.number]
@@ -68,17 +68,17 @@ def tf_template(channel: int, frames: Sequence[tuple[str, str]]) -> Template:
     return Template(channel=channel, data=writer.data, stamps=tuple(stamps), runs=tuple(runs))
 
 
-def controller_state_template(channel: int, joints: Sequence[str], interface: Interface) -> Template:
+def controller_state_template(channel: int, joints: Sequence[str], interfaces: Sequence[Interface]) -> Template:
     """control_msgs/JointTrajectoryControllerState.
 
     Runs: reference position, velocity, acceleration; feedback position, velocity, effort; error position, velocity;
-    output (in the field of the interface).
+    output, one run an interface, in the order of their fields: position, velocity, acceleration, effort.
     """
     n = len(joints)
     writer = CdrWriter()
     stamp = writer.header(0, "")
     writer.texts(joints)
-    output = {"position": "p", "velocity": "v", "effort": "e"}[interface]
+    output = "".join(interface[0] for interface in interfaces)
     runs = []
     for fields in ("pva", "pve", "pv", output):
         for field in "pvae":

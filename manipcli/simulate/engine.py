@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from manipcli.control.controller import Interface
+from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
@@ -20,14 +20,10 @@ from manipcli.model.state import Contact, WorldState
 
 @dataclass(frozen=True, slots=True)
 class EngineSettings:
-    """`step` [s]: one physics step; `substeps`: physics steps a control tick; `interfaces`: one a moving joint.
-
-    A joint that mimics another has interface None: nobody commands it.
-    """
+    """`step` [s]: one physics step; `substeps`: physics steps a control tick; `start` (n): where the joints begin."""
 
     step: float
     substeps: int
-    interfaces: tuple[Interface | None, ...]
     start: Array
 
 
@@ -46,9 +42,8 @@ class Engine(Protocol):
         """
         ...
 
-    def write(self, command: Array, position: Array, velocity: Array) -> None:
-        """Commands (n), each in its joint's interface, held until the next write; and the references (n) behind
-        them, which are only there for an ideal engine."""
+    def write(self, command: JointCommand) -> None:
+        """What the joints obey until the next write; an ideal engine makes the references in it come true."""
         ...
 
     def advance(self) -> None:

@@ -9,8 +9,8 @@ from typing import Final, Literal
 import numpy as np
 
 from manipcli.control.action import GoalHandle
-from manipcli.control.gripper import GripperController, GripperGoal
-from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.controllers.gripper import GripperController, GripperGoal
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
@@ -116,10 +116,8 @@ class Executor:
         if not others:
             return trajectory
         manager = self._session.manager
-        if manager.outputs:
-            wanted = dict(
-                zip(follower.joints, manager.outputs[manager.controllers.index(follower)].position, strict=True)
-            )
+        if manager.started:
+            wanted = dict(zip(follower.joints, follower.output.position, strict=True))
         else:  # nothing has been commanded yet
             wanted = dict(zip(self._session.robot.joint_names, self._session.engine.read().position, strict=True))
         stay = np.tile([wanted[name] for name in others], (len(trajectory.times), 1))

@@ -13,10 +13,10 @@ from typing import Final, Protocol
 import numpy as np
 
 from manipcli.control.controller import ControllerOutput
+from manipcli.control.limits import JointLimiter
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
-from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
@@ -38,8 +38,8 @@ FALLEN: Final = -10.0
 class Observer(Protocol):
     """Sees every tick before the physics moves on. The arrays are only valid during the call."""
 
-    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
-        """The state at the start of control tick `tick`, and what the controllers answered."""
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
+        """The state at the start of control tick `tick`, and what each loaded controller answered; None: not active."""
         ...
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
@@ -51,7 +51,7 @@ class Observer(Protocol):
 class Silent:
     """Observes nothing: for the time before the start."""
 
-    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None: ...
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None: ...
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None: ...
 
@@ -66,7 +66,6 @@ class Session:
         scene: Scene,
         engine: Engine,
         manager: ControllerManager,
-        kinematics: Kinematics,
         period: float,
     ) -> None:
         self.robot = robot
@@ -77,22 +76,16 @@ class Session:
         self.observer: Observer = Silent()
         self.ticks = 0
         self.state = engine.read()
-        self._limiter = manager.limiter([joint.limits for joint in robot.moving_joints])
-        self._kinematics = kinematics
-        self._dynamics = "inverse_dynamics" in manager.feed_forward
-        self._gravity = "gravity" in manager.feed_forward
+        self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints])
+        if engine.ideal:
+            manager.keep_references()
         n = len(robot.joint_names)
-        self._position, self._velocity, self._acceleration = np.zeros((3, n))
-        self._damping = np.array([joint.damping for joint in robot.moving_joints])
-        self._rate = np.zeros(n)
         self._contact_force = np.zeros(n)
         self._joint_of_part = _joint_of_part(robot)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
         self._touched: tuple[Contact, ...] = ()
         self._others: tuple[Contact, ...] = ()
-        self._indices = [manager.index(controller.name) for controller in manager.controllers]
-        self._accelerates = [controller.feed_forward == "inverse_dynamics" for controller in manager.controllers]
 
     @property
     def time(self) -> float:
@@ -120,34 +113,14 @@ class Session:
         time = self.ticks * self.period
         state.time[...] = time
         self._touch(state)
-        command = self.manager.update(time, state, self._wanted(state), self._contact_force)
-        outputs = self.manager.outputs
-        for index, output, accelerates in zip(self._indices, outputs, self._accelerates, strict=True):
-            if self.engine.ideal:
-                self._position[index] = output.position
-                self._velocity[index] = output.velocity
-            if accelerates:
-                self._acceleration[index] = output.acceleration
-                self._rate[index] = output.velocity
-        command = self._limiter.apply(command, state.position, state.velocity, self.period)
-        self.engine.write(command, self._position, self._velocity)
-        self.observer.tick(self.ticks, state, outputs)
+        manager = self.manager
+        command = manager.update(time, state, self._contact_force)
+        self._limiter.apply(command, state.position, state.velocity, self.period)
+        self.engine.write(command)
+        self.observer.tick(self.ticks, state, manager.outputs)
         self.engine.advance()
         self.ticks += 1
         return state
-
-    def _wanted(self, state: WorldState) -> Array | None:
-        """Feed-forward efforts (n): gravity at the measured position, or inverse dynamics along the reference,
-
-            M(q) a_r + C(q, v) v + g(q) + D v_r,
-
-        with the viscous damping D of the joints at the reference velocity: at the measured one it would undo a damping
-        that the loop is glad of.
-        """
-        if self._dynamics:
-            efforts = self._kinematics.inverse_dynamics(state.position, state.velocity, self._acceleration)
-            return efforts + self._damping * self._rate
-        return self._kinematics.gravity(state.position) if self._gravity else None
 
     def _touch(self, state: WorldState) -> None:
         """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""

@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Force, JointEffort, JointValue, JointVelocity, Time
+from manipcli.spec.quantity import Force, Frequency, JointEffort, JointValue, JointVelocity, Time
 from manipcli.spec.robot import Version
 
-Interface = Literal["position", "velocity", "effort"]
+Interface = Literal["position", "velocity", "acceleration", "effort"]
+Role = Literal["follower", "hand", "other"]
+"""What steps may ask of a controller: to follow trajectories, to close and open a hand, or nothing."""
+
+
+class ControllerSpec(Model):
+    """What every controller has."""
+
+    role: ClassVar[Role] = "other"
+
+    type: str
+    joints: tuple[str, ...] = Field((), description="The joints that it claims or reads.")
+    active: bool = Field(True, description="Whether it is active at the start. Default true.")
+    update_rate: Annotated[Frequency, Field(gt=0)] | None = Field(
+        None, description="How often it is updated [Hz]; divides the control rate. Default: at every control tick."
+    )
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return ()
 
 
 class GainsSpec(Model):
@@ -44,20 +64,31 @@ class ConstraintsSpec(Model):
     joints: dict[str, JointConstraintSpec] = Field({}, description="Tolerances by joint.")
 
 
-class JointTrajectorySpec(Model):
+class JointTrajectorySpec(ControllerSpec):
     """Follows joint trajectories: PID with feed-forward (effort, velocity), or passes the reference on (position)."""
+
+    role: ClassVar[Role] = "follower"
 
     type: Literal["joint_trajectory"] = Field(description="`joint_trajectory`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interface: Interface = Field("effort", description="What it commands. Default effort.")
+    command_interface: Literal["position", "velocity", "effort"] = Field(
+        "effort", description="What it commands. Default effort."
+    )
     gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
     gravity_compensation: bool = Field(False, description="Add the effort that holds against gravity. Default false.")
     inverse_dynamics: bool = Field(False, description="Add the effort that the reference needs. Default false.")
     constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
 
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return (self.command_interface,)
 
-class GripperSpec(Model):
+
+class GripperSpec(ControllerSpec):
     """Closes or opens a hand: each joint's reference moves at `speed`; a finger stops on contact or stall."""
+
+    role: ClassVar[Role] = "hand"
 
     type: Literal["gripper"] = Field(description="`gripper`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
@@ -77,12 +108,18 @@ class GripperSpec(Model):
     )
     default_force: Annotated[Force, Field(gt=0, description="Of a finger where no step says one. Default 5 N.")] = 5.0
 
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return (self.command_interface,)
 
-ControllerSpec = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]
+
+AnyController = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]
+"""One of the types of controllers; which, says `type`."""
 
 
 class ControllersSpec(Model):
     """The file as a whole, after ROS's own forms have been rewritten to this one."""
 
     version: Version = None
-    controllers: dict[str, ControllerSpec] = Field(description="The controllers, by name.")
+    controllers: dict[str, AnyController] = Field(description="The controllers, by name.")

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
 
-from manipcli.control.controller import Interface
+from manipcli.control.command import JointCommand, Mode
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.robot import (
@@ -33,7 +34,7 @@ from manipcli.simulate.engines import ENGINES
 
 STEP = 1e-3
 G = 9.81
-EFFORT: tuple[Interface | None, ...] = ("effort",)
+EFFORT: tuple[Mode, ...] = ("effort",)
 
 every_engine = pytest.mark.parametrize("member", list(ENGINES), ids=lambda member: member.name)
 with_physics = pytest.mark.parametrize(
@@ -114,6 +115,21 @@ FALLING = scene(body("ball", Sphere(0.05), (2.0, 0.0, 1.0)), body("brick", Box((
 Opens = Callable[..., Engine]
 
 
+COMMANDS: WeakKeyDictionary[Engine, JointCommand] = WeakKeyDictionary()
+"""What an engine is told, in the modes that it was opened for."""
+
+
+def write(engine: Engine, value: Array, position: Array | None = None, velocity: Array | None = None) -> None:
+    """Commands `value` in the mode of each joint; the references are `position` and `velocity`."""
+    command = COMMANDS[engine]
+    for k, mode in enumerate(command.modes):
+        if mode in ("position", "velocity", "effort"):
+            getattr(command, mode)[k] = value[k]
+    command.reference_position[:] = value if position is None else position
+    command.reference_velocity[:] = 0.0 if velocity is None else velocity
+    engine.write(command)
+
+
 @pytest.fixture
 def opens() -> Iterator[Opens]:
     """Opens engines that are closed after the test."""
@@ -124,17 +140,18 @@ def opens() -> Iterator[Opens]:
         model: RobotModel,
         world: Scene | None = None,
         *,
-        interfaces: tuple[Interface | None, ...] | None = None,
+        modes: tuple[Mode, ...] | None = None,
         start: Sequence[float] | None = None,
         substeps: int = 1,
     ) -> Engine:
         n = len(model.joint_names)
-        default = tuple(None if j.mimic is not None else "effort" for j in model.moving_joints)
-        settings = EngineSettings(
-            STEP, substeps, interfaces or default, np.zeros(n) if start is None else frozen(start)
-        )
-        opened.append(member.open(model, world or scene(), settings))
-        return opened[-1]
+        default: list[Mode] = ["free" if j.mimic is not None else "effort" for j in model.moving_joints]
+        settings = EngineSettings(STEP, substeps, np.zeros(n) if start is None else frozen(start))
+        engine = member.open(model, world or scene(), settings)
+        opened.append(engine)
+        COMMANDS[engine] = JointCommand(n)
+        COMMANDS[engine].obey(modes or default)
+        return engine
 
     yield open_engine
     for engine in opened:
@@ -158,7 +175,7 @@ def run(engine: Engine, ticks: int, control: Callable[[int, WorldState], Array] 
         state = engine.read()
         states.append(copied(state))
         command = np.zeros(len(state.position)) if control is None else control(k, state)
-        engine.write(command, command, np.zeros(len(command)))
+        write(engine, command)
         engine.advance()
     return states
 
@@ -228,10 +245,10 @@ def test_a_mimic_joint_follows_its_driver(member: EngineMember, opens: Opens) ->
 
 
 @every_interface
-def test_the_ideal_engine_makes_references_come_true_at_once(interface: Interface, opens: Opens) -> None:
-    engine = opens(ENGINES["kinematic"], pendulum(), FALLING, interfaces=(interface,))
+def test_the_ideal_engine_makes_references_come_true_at_once(interface: Mode, opens: Opens) -> None:
+    engine = opens(ENGINES["kinematic"], pendulum(), FALLING, modes=(interface,))
     before = copied(engine.read())
-    engine.write(np.array([7.0]), np.array([0.4]), np.array([-1.5]))
+    write(engine, np.array([7.0]), np.array([0.4]), np.array([-1.5]))
     engine.advance()
     state = engine.read()
     assert (state.position[0], state.velocity[0]) == (0.4, -1.5)
@@ -279,9 +296,9 @@ def test_effort_accelerates_by_the_inertia(member: EngineMember, opens: Opens, t
 
 @with_physics
 @every_interface
-def test_joints_do_not_jump(member: EngineMember, opens: Opens, interface: Interface) -> None:
+def test_joints_do_not_jump(member: EngineMember, opens: Opens, interface: Mode) -> None:
     """Position changes are velocities times the step, whatever is commanded."""
-    engine = opens(member, pendulum(), interfaces=(interface,))
+    engine = opens(member, pendulum(), modes=(interface,))
     states = run(engine, 500, lambda k, _: np.array([(-1.0) ** (k // 100) * 2.0]))
     q = np.array([s[0][0] for s in states])
     w = np.array([s[1][0] for s in states])
@@ -291,7 +308,7 @@ def test_joints_do_not_jump(member: EngineMember, opens: Opens, interface: Inter
 
 @with_physics
 def test_a_velocity_interface_reaches_its_velocity_within_the_effort_limit(member: EngineMember, opens: Opens) -> None:
-    engine = opens(member, pendulum(effort=4.0), scene(gravity=0.0), interfaces=("velocity",))
+    engine = opens(member, pendulum(effort=4.0), scene(gravity=0.0), modes=("velocity",))
     states = run(engine, 1000, lambda *_: np.array([1.0]))
     w = np.array([s[1][0] for s in states])
     assert w[-1] == pytest.approx(1.0, abs=1e-3)
@@ -305,7 +322,7 @@ def test_a_velocity_interface_reaches_its_velocity_within_the_effort_limit(membe
 def test_a_position_interface_reaches_its_position_within_velocity_and_effort(
     member: EngineMember, opens: Opens
 ) -> None:
-    engine = opens(member, pendulum(), scene(gravity=0.0), interfaces=("position",))
+    engine = opens(member, pendulum(), scene(gravity=0.0), modes=("position",))
     states = run(engine, 2000, lambda *_: np.array([1.2]))
     assert states[-1][0][0] == pytest.approx(1.2, abs=1e-3)
     assert max(abs(s[1][0]) for s in states) <= 5.0 * 1.05
@@ -315,8 +332,8 @@ def test_a_position_interface_reaches_its_position_within_velocity_and_effort(
 @with_physics
 def test_a_joint_held_by_too_weak_a_motor_sinks(member: EngineMember, opens: Opens) -> None:
     """Gravity asks 2 kg * 9.81 * 0.5 m = 9.8 N m."""
-    weak = run(opens(member, pendulum(effort=5.0), interfaces=("velocity",)), 300)
-    strong = run(opens(member, pendulum(effort=20.0), interfaces=("velocity",)), 300)
+    weak = run(opens(member, pendulum(effort=5.0), modes=("velocity",)), 300)
+    strong = run(opens(member, pendulum(effort=20.0), modes=("velocity",)), 300)
     assert weak[-1][0][0] > 0.1
     assert abs(strong[-1][0][0]) < 1e-3
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.controller import JointState
-from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.flow.execute import controllers
 from manipcli.flow.load import load_task
 from manipcli.plan.trajectory import JointTrajectory

@@ -32,7 +32,7 @@ from manipcli.record.recorder import Recorder
 PERIOD = 0.001
 CONTROLLERS = (
     ControllerChannel("arm", ("shoulder", "slide")),
-    ControllerChannel("hand", ("spin",), interface="position"),
+    ControllerChannel("hand", ("spin",), interfaces=("position",)),
 )
 
 
@@ -98,6 +98,16 @@ class Run:
     def ticks(self) -> int:
         return len(self.states.time)
 
+    def outputs_at(self, tick: int) -> list[ControllerOutput]:
+        """What the controllers put out at a tick: position, velocity and acceleration of the reference, and command."""
+        found = []
+        for arrays in self.outputs:
+            rows = np.stack([a[tick] for a in arrays])
+            output = ControllerOutput.of(rows.shape[1], 1)
+            output.rows[:] = rows
+            found.append(output)
+        return found
+
     def recorder(self, path: Path, **changes: object) -> Recorder:
         arguments: dict[str, object] = {
             "robot": self.robot,
@@ -119,9 +129,7 @@ class Run:
                 )
             one = [a[k] for a in (s.time, s.position, s.velocity, s.effort, s.body_position, s.body_quat_xyzw)]
             zeros = np.zeros((2, 3))
-            recorder.tick(
-                k, WorldState(*one, zeros, zeros), [ControllerOutput(*(a[k] for a in o)) for o in self.outputs]
-            )
+            recorder.tick(k, WorldState(*one, zeros, zeros), self.outputs_at(k))
             recorder.contacts(k, self.contacts if (k // 100) % 2 else ())
 
     def write(self, path: Path) -> Path:

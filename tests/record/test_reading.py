@@ -17,7 +17,6 @@ from mcap.records import Chunk, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from manipcli.control.controller import ControllerOutput
 from manipcli.core.errors import ExitCode
 from manipcli.model.state import WorldState
 from manipcli.record import recorder as recorder_module
@@ -123,8 +122,7 @@ def test_going_through_a_recording_takes_memory_for_a_few_spans(tmp_path: Path, 
         for k in range(repeats):
             for tick in range(500):
                 one = run.states.map(lambda a, tick=tick: a[tick])
-                outputs = [ControllerOutput(*(a[tick] for a in o)) for o in run.outputs]
-                recorder.tick(500 * k + tick, one, outputs)
+                recorder.tick(500 * k + tick, one, run.outputs_at(tick))
         recorder.finish({})
         tracemalloc.start()
         ticks = sum(len(span.states.time) for span in open_recording(tmp_path / f"{repeats}.mcap").spans)

@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from manipcli.control.gripper import GripperController
-from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.command import JointCommand
+from manipcli.control.controllers.gripper import GripperController
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
@@ -78,8 +78,8 @@ class ScriptedEngine:
             self.script(self)
         return self.state
 
-    def write(self, command: Array, position: Array, velocity: Array) -> None:
-        self.written.append(command.copy())
+    def write(self, command: JointCommand) -> None:
+        self.written.append(command.effort.copy())
 
     def advance(self) -> None:
         self.tick += 1
@@ -111,13 +111,12 @@ def make_manager() -> ControllerManager:
 def make_session(engine: object = None) -> Session:
     """A session of the ideal engine, or of another one."""
     manager = make_manager()
-    settings = EngineSettings(PERIOD, 1, manager.interfaces, np.zeros(3))
+    settings = EngineSettings(PERIOD, 1, np.zeros(3))
     return Session(
         robot=ROBOT,
         scene=SCENE,
         engine=cast(Any, engine or KinematicEngine(ROBOT, SCENE, settings)),
         manager=manager,
-        kinematics=cast(Kinematics, None),  # nobody asks for feed-forward
         period=PERIOD,
     )
 

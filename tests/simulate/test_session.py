@@ -150,9 +150,9 @@ def test_a_joint_feels_what_touches_the_links_that_it_moves_last(session_of: Ses
     session = session_of(engine)
     update = session.manager.update
 
-    def listening(time: float, state: Any, feed_forward: Any, contact_force: Any) -> Any:
+    def listening(time: float, state: Any, contact_force: Any) -> Any:
         felt.append(contact_force.tolist())
-        return update(time, state, feed_forward, contact_force)
+        return update(time, state, contact_force)
 
     session.manager.update = listening  # type: ignore[method-assign]
     ticks(session, 3)

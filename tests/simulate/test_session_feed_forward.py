@@ -1,9 +1,10 @@
-"""What the session adds to an effort command, seen by a controller that commands it and nothing else."""
+"""What is added to an effort command, seen by a controller that commands it and nothing else."""
 
 import numpy as np
 import pytest
 
 from manipcli.control.controller import ControllerOutput
+from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.kinematics import Kinematics
@@ -35,19 +36,21 @@ def robot():
 
 
 class Echo:
-    """Commands the feed-forward; its reference moves at RATE."""
+    """Commands nothing itself; its reference moves at RATE."""
 
-    name, joints, interface = "echo", ("a", "b"), "effort"
+    name, joints, interfaces = "echo", ("a", "b"), ("effort",)
 
     def __init__(self, feed_forward):
         self.feed_forward = feed_forward
+        self.output = ControllerOutput.of(2, 1)
 
-    def update(self, time, period, measured, feed_forward=None, *, contact_force=None):
-        return ControllerOutput(
-            position=np.zeros(2), velocity=RATE, acceleration=ACCELERATION, command=np.array(feed_forward)
-        )
+    def update(self, time, period, measured, *, contact_force=None):
+        self.output.velocity[:] = RATE
+        self.output.acceleration[:] = ACCELERATION
+        self.output.command[:] = 0.0
+        return self.output
 
-    def deactivate(self, time):
+    def deactivate(self, time, reason=""):
         pass
 
 
@@ -66,8 +69,8 @@ class Standing:
     def read(self, *, velocities=True):
         return self.state
 
-    def write(self, command, position, velocity):
-        self.written = command.copy()
+    def write(self, command):
+        self.written = command.effort.copy()
 
     def advance(self):
         pass
@@ -87,17 +90,16 @@ def test_inverse_dynamics_also_overcomes_the_damping_of_the_joints_at_the_refere
     model = robot()
     kinematics = Kinematics(model)
     engine = Standing(q)
-    manager = ControllerManager([Echo(wants)], joints=model.joint_names, period=0.001)
+    law = ModelFeedForward(model, kinematics)
+    manager = ControllerManager([Echo(wants)], joints=model.joint_names, period=0.001, feed_forward=law)
     session = Session(
         robot=model,
         scene=Scene(bodies=(), frames=(), gravity=frozen([0.0, 0.0, -9.81])),
         engine=engine,
         manager=manager,
-        kinematics=kinematics,
         period=0.001,
     )
     session.tick()
-    session.tick()  # the reference of the first tick is known
     expected = kinematics.gravity(q).copy()
     if wants == "inverse_dynamics":
         expected += kinematics.mass_matrix(q) @ ACCELERATION + np.array(DAMPING) * RATE

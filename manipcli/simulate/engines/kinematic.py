@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding
-from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
@@ -26,6 +26,8 @@ class KinematicEngine:
             for k, joint in enumerate(robot.moving_joints)
             if joint.mimic is not None
         ]
+        self._version = -1
+        self._commanded = np.zeros(n, dtype=np.bool_)
         self._state = WorldState(
             time=np.zeros(()),
             position=np.array(settings.start),
@@ -40,12 +42,16 @@ class KinematicEngine:
     def read(self, *, velocities: bool = True) -> WorldState:
         return self._state
 
-    def write(self, command: Array, position: Array, velocity: Array) -> None:
-        self._state.position[:] = position
-        self._state.velocity[:] = velocity
+    def write(self, command: JointCommand) -> None:
+        if command.version != self._version:
+            self._version = command.version
+            self._commanded = np.array([mode not in ("brake", "free") for mode in command.modes])
+        position, velocity = self._state.position, self._state.velocity
+        np.copyto(position, command.reference_position, where=self._commanded)
+        velocity[:] = np.where(self._commanded, command.reference_velocity, 0.0)
         for follower, driver, multiplier, offset in self._followers:
-            self._state.position[follower] = multiplier * position[driver] + offset
-            self._state.velocity[follower] = multiplier * velocity[driver]
+            position[follower] = multiplier * position[driver] + offset
+            velocity[follower] = multiplier * velocity[driver]
 
     def advance(self) -> None:
         """Nothing moves by itself."""

@@ -10,8 +10,8 @@ from typing import Final, cast
 
 import numpy as np
 
+from manipcli.control.command import JointCommand, Mode
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
-from manipcli.core.geometry import Array
 from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
@@ -27,6 +27,9 @@ MAX_JOINTS: Final = 127
 """Moving and fixed; with one more `getJointState` fails, with thousands the process."""
 UNLIMITED_EFFORT: Final = 1e6
 """Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
+POSITION_TIME: Final = 0.01
+"""A position command is approached with this time constant [s], whatever the physics step; ros_gz's default gain of
+0.1 at 1 kHz is nearly that."""
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
 """What a mimic coupling may carry [N m or N]."""
@@ -80,6 +83,7 @@ class PybulletEngine:
             body_angular=np.zeros((m, 3)),
         )
         self._substeps = settings.substeps
+        self._stiffness = -math.expm1(-settings.step / POSITION_TIME)
 
     def _add_body(self, body: Body, folder: Path) -> int:
         p, client = self._p, self._client
@@ -179,13 +183,13 @@ class PybulletEngine:
         for joint in robot.moving_joints:
             if joint.mimic is not None:
                 self._couple(robot, joint.name, joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
-        efforts = [k for k, interface in enumerate(settings.interfaces) if interface == "effort"]
-        self._efforts_at: slice | list[int] = slice(None) if len(efforts) == len(self._joints) else efforts
-        self._effort_joints = [self._joints[k] for k in efforts]
-        self._applied = np.zeros(len(efforts))
-        self._motors = [
-            (k, self._joints[k], interface) for k, interface in enumerate(settings.interfaces) if interface != "effort"
-        ]
+        n = len(self._joints)
+        self._version = -1
+        self._torques_at: slice | list[int] = []
+        self._torque_joints: list[int] = []
+        self._motors: list[tuple[int, int, Mode]] = []
+        self._measures = False
+        self._applied = np.zeros(n)
         limits = [joint.limits for joint in robot.moving_joints]
         self._efforts = [UNLIMITED_EFFORT if limit.effort is None else limit.effort for limit in limits]
         self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
@@ -216,11 +220,14 @@ class PybulletEngine:
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
         states = p.getJointStates(self._robot, self._joints, client)
-        state.position[:] = [s[0] for s in states]
-        state.velocity[:] = [s[1] for s in states]
-        if self._motors:
-            state.effort[:] = [s[3] for s in states]
-        state.effort[self._efforts_at] = self._applied
+        positions, velocities_, _, efforts = zip(*states, strict=True) if states else ((), (), (), ())
+        state.position[:] = positions
+        state.velocity[:] = velocities_
+        if self._measures:
+            state.effort[:] = efforts
+            state.effort[self._torques_at] += self._applied[self._torques_at]
+        else:
+            state.effort[:] = self._applied
         for row, (k, offset, turned) in enumerate(self._movable):
             position, quat = p.getBasePositionAndOrientation(k, client)
             if turned is not None:
@@ -234,37 +241,68 @@ class PybulletEngine:
                 state.body_angular[row] = angular
         return state
 
-    def write(self, command: Array, position: Array, velocity: Array) -> None:
-        p = self._p
-        if self._effort_joints:
-            self._applied[:] = command[self._efforts_at]
+    def write(self, command: JointCommand) -> None:
+        if command.version != self._version:
+            self._obey(command)
+        p, client = self._p, self._client
+        if self._torque_joints:
+            at = self._torques_at
+            self._applied[at] = command.effort[at]
             p.setJointMotorControlArray(
-                self._robot,
-                self._effort_joints,
-                p.TORQUE_CONTROL,
-                forces=self._applied.tolist(),
-                physicsClientId=self._client,
-            )
-        for row, joint, interface in self._motors:
-            if interface == "velocity":
-                p.setJointMotorControl2(
-                    self._robot,
-                    joint,
-                    p.VELOCITY_CONTROL,
-                    targetVelocity=float(command[row]),
-                    force=self._efforts[row],
-                    physicsClientId=self._client,
-                )
-            elif interface == "position":
+                self._robot, self._torque_joints, p.TORQUE_CONTROL, forces=self._applied[at].tolist(),
+                physicsClientId=client,
+            )  # fmt: skip
+        for row, joint, mode in self._motors:
+            if mode == "position":
                 p.setJointMotorControl2(
                     self._robot,
                     joint,
                     p.POSITION_CONTROL,
-                    targetPosition=float(command[row]),
+                    targetPosition=float(command.position[row]),
+                    targetVelocity=float(command.velocity[row]),
+                    positionGain=self._stiffness,
                     force=self._efforts[row],
                     maxVelocity=self._velocities[row],
-                    physicsClientId=self._client,
+                    physicsClientId=client,
                 )
+            else:
+                p.setJointMotorControl2(
+                    self._robot,
+                    joint,
+                    p.VELOCITY_CONTROL,
+                    targetVelocity=float(command.velocity[row]),
+                    force=self._efforts[row],
+                    physicsClientId=client,
+                )
+
+    def _obey(self, command: JointCommand) -> None:
+        """What each joint obeys has changed: motors on or off. A motor is Bullet's own constraint on a joint's speed,
+        with the joint's effort as its limit; where efforts are commanded it has none."""
+        p = self._p
+        self._version = command.version
+        modes = command.modes
+        torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
+        self._torques_at = slice(None) if len(torques) == len(modes) else torques
+        self._torque_joints = [self._joints[k] for k in torques]
+        self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
+        self._measures = bool(self._motors) or "brake" in modes
+        self._applied[:] = 0.0
+        for k, mode in enumerate(modes):
+            if mode == "brake":
+                self._brake(k)
+        released = [self._joints[k] for k, mode in enumerate(modes) if mode in ("effort", "free")]
+        if released:
+            none = [0.0] * len(released)
+            p.setJointMotorControlArray(
+                self._robot, released, p.VELOCITY_CONTROL, forces=none, physicsClientId=self._client
+            )
+
+    def _brake(self, k: int) -> None:
+        p, joint = self._p, self._joints[k]
+        p.setJointMotorControl2(
+            self._robot, joint, p.VELOCITY_CONTROL, targetVelocity=0.0, force=self._efforts[k],
+            physicsClientId=self._client,
+        )  # fmt: skip
 
     def advance(self) -> None:
         for _ in range(self._substeps):

@@ -17,21 +17,22 @@ because they are what the joint shall have when the next tick measures it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle
-from manipcli.control.controller import ControllerOutput, FeedForward, Interface, JointState
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.gains import build_pid, idle_gains, joint_gains, strangers
 from manipcli.control.pid import Compat
 from manipcli.control.tolerances import Tolerances
 from manipcli.control.trajectory_goal import JointFacts, check_goal, lead_in, outside_limits, stopping
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointLimits, JointType
+from manipcli.model.condition import Problem
+from manipcli.model.robot import JointLimits, JointType, RobotModel
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, JointTrajectorySpec
 
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2  # the rows of a reference (3, n)
 
@@ -79,7 +80,7 @@ class JointTrajectoryController:
     ) -> None:
         self.name = name
         self.joints = tuple(joints)
-        self.interface: Interface = interface
+        self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
         if n == 0 or len(set(self.joints)) != n:
@@ -92,14 +93,9 @@ class JointTrajectoryController:
         self._pid = None if interface == "position" else build_pid(name, self.joints, chosen, compat)
         self._velocity_scale = np.array([each.ff_velocity_scale for each in chosen])
 
-        self._buffer = np.zeros((3, n))
-        self._command = np.zeros(n)
-        self._output = ControllerOutput(
-            position=self._buffer[POSITION],
-            velocity=self._buffer[VELOCITY],
-            acceleration=self._buffer[ACCELERATION],
-            command=self._command,
-        )
+        self._output = ControllerOutput.of(n, 1)
+        self._buffer = self._output.rows[:3]
+        self._command = self._output.command
         self._measured = np.zeros(n)
         self._error, self._error_rate = np.zeros((2, n))
         self._activated = False
@@ -137,11 +133,16 @@ class JointTrajectoryController:
         self._next = (handle, ordered, tolerances)
         return handle
 
-    def deactivate(self, time: float) -> None:
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Ends its goal as aborted and forgets its state; the next update activates it again."""
         for goal in (self._goal, self._next[0] if self._next is not None else None):
             if goal is not None:
-                goal.end("aborted", ErrorCode.INVALID_GOAL, "the controller was deactivated", time)
+                goal.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
         self._activated = False
         self._clear(time=time)
 
@@ -150,7 +151,6 @@ class JointTrajectoryController:
         time: float,
         period: float,
         measured: JointState,
-        feed_forward: Array | None = None,
         *,
         contact_force: Array | None = None,
     ) -> ControllerOutput:
@@ -158,7 +158,6 @@ class JointTrajectoryController:
 
         Args:
             measured: (n) of the controller's joints.
-            feed_forward: (n) added to an effort command; ignored on the other interfaces.
             contact_force: ignored.
         """
         self._time = time
@@ -192,10 +191,8 @@ class JointTrajectoryController:
             self._command[:] = self._table[ahead, POSITION]
             return self._output
         command = self._pid.update(self._error, period, self._error_rate)
-        if self.interface == "velocity":
+        if self.interfaces[0] == "velocity":
             command += self._velocity_scale * self._table[ahead, VELOCITY]
-        elif feed_forward is not None:
-            command += feed_forward
         self._command[:] = command
         return self._output
 
@@ -295,3 +292,38 @@ class JointTrajectoryController:
             desired=self._output.position.copy(),
             actual=self._measured.copy(),
         )
+
+
+def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryController:
+    """The controller of a spec."""
+    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
+    return JointTrajectoryController(
+        name=name,
+        joints=spec.joints,
+        interface=spec.command_interface,
+        gains=spec.gains,
+        constraints=spec.constraints,
+        limits=[joint.limits for joint in joints],
+        types=[joint.type for joint in joints],
+        feed_forward="inverse_dynamics" if spec.inverse_dynamics else wants,
+        compat=fit.compat,
+    )
+
+
+def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
+    """Gains and tolerances of joints that it does not have, gains all zero, an effort added where there is none."""
+    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    if spec.command_interface == "effort":
+        yield from idle_gains(spec.joints, spec.gains, "effort")
+        return
+    if spec.command_interface == "velocity":
+        yield from idle_gains(spec.joints, spec.gains, "velocity")
+    for key in ("gravity_compensation", "inverse_dynamics"):
+        if getattr(spec, key):
+            message = f"{key} adds an effort, but its interface is {spec.command_interface}"
+            yield Problem((key,), message, "use command_interface: effort, or leave it out", "CTRL147")
+
+
+MEMBER = ControllerMember(name="joint_trajectory", spec=JointTrajectorySpec, build=build, check=check)

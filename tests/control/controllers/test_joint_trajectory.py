@@ -7,7 +7,7 @@ import pytest
 
 from manipcli.control.action import ErrorCode
 from manipcli.control.controller import JointState
-from manipcli.control.joint_trajectory_controller import JointTrajectoryController
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
 from manipcli.model.robot import JointLimits
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint

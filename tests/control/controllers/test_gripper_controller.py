@@ -5,7 +5,7 @@ import pytest
 
 from manipcli.control.action import ErrorCode
 from manipcli.control.controller import JointState
-from manipcli.control.gripper import GripperController, GripperGoal
+from manipcli.control.controllers.gripper import GripperController, GripperGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.spec.controllers import GainsSpec
 

@@ -8,27 +8,37 @@
         speed: 1 rad/s
         max_effort: 2
 
-u = PID(e, de/dt) + feed-forward, clamped to the maximum effort. Where a finger stops, its reference stays: the spring
-of the gains keeps pressing with what it had built up.
+u = PID(e, de/dt), clamped to the maximum effort; what holds the fingers against gravity comes on top. Where a finger
+stops, its reference stays: the spring of the gains keeps pressing with what it had built up.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle
-from manipcli.control.controller import ControllerOutput, FeedForward, Interface, JointState
-from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.gains import build_pid, idle_gains, joint_gains, strangers
 from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.spec.controllers import GainsSpec
+from manipcli.model.condition import Problem
+from manipcli.model.robot import Joint, RobotModel
+from manipcli.plan.hand import fingers
+from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface
 
+STALL_VELOCITY: Final = 0.02
+STALL_SPEED: Final = 0.001
+"""A finger joint slower than this is stalled, where nobody says [rad/s; m/s]."""
+GOAL_ANGLE: Final = 0.05
+GOAL_DISTANCE: Final = 0.002
+"""A finger joint this near to its target has arrived, where nobody says [rad; m]: far less than a hand's stroke."""
 REACHED = 1e-9
 """rad or m: a reference this close to its target has arrived."""
 
@@ -78,7 +88,7 @@ class GripperController:
         InvalidArgument: joints repeated, gains of an unknown joint or all zero, fingers that do not part the joints.
     """
 
-    interface: Interface = "effort"
+    interfaces: tuple[Interface, ...] = ("effort",)
 
     def __init__(
         self,
@@ -111,11 +121,13 @@ class GripperController:
         self._goal_tolerance: list[float] = np.broadcast_to(goal_tolerance, (n,)).tolist()
         self._stall_time, self._contact_time = stall_time, contact_time
 
-        self._reference, self._velocity, self._acceleration, self._command = np.zeros((4, n))
-        self._error, self._error_rate, self._step, self._measured = np.zeros((4, n))
-        self._output = ControllerOutput(
-            position=self._reference, velocity=self._velocity, acceleration=self._acceleration, command=self._command
+        self._output = ControllerOutput.of(n, 1)
+        self._reference, self._velocity, self._command = (
+            self._output.position,
+            self._output.velocity,
+            self._output.command,
         )
+        self._error, self._error_rate, self._step, self._measured = np.zeros((4, n))
         self._activated = False
         self._time = self._began = 0.0
         self._goal: GoalHandle | None = None
@@ -179,10 +191,15 @@ class GripperController:
         self._goal = GoalHandle(cancel=self._cancel, feedback=self._feedback)
         return self._goal
 
-    def deactivate(self, time: float) -> None:
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Ends its goal as aborted and forgets its state; the next update activates it again."""
         if self._goal is not None:
-            self._goal.end("aborted", ErrorCode.INVALID_GOAL, "the controller was deactivated", time)
+            self._goal.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
         self._goal = None
         self._activated = False
 
@@ -191,7 +208,6 @@ class GripperController:
         time: float,
         period: float,
         measured: JointState,
-        feed_forward: Array | None = None,
         *,
         contact_force: Array | None = None,
     ) -> ControllerOutput:
@@ -199,7 +215,6 @@ class GripperController:
 
         Args:
             measured: (n) of the controller's joints.
-            feed_forward: (n) added to the effort, before it is clamped.
             contact_force: (n) [N] on what each joint moves, up to the next joint; None: contact is not sensed.
         """
         self._time = time
@@ -221,8 +236,6 @@ class GripperController:
         np.subtract(self._reference, measured.position, out=self._error)
         np.subtract(self._velocity, measured.velocity, out=self._error_rate)
         command = self._pid.update(self._error, period, self._error_rate)
-        if feed_forward is not None:
-            command += feed_forward
         np.maximum(command, self._minus_effort, out=command)
         np.minimum(command, self._effort, out=self._command)
         return self._output
@@ -307,3 +320,37 @@ class GripperController:
 
     def _feedback(self) -> Feedback:
         return Feedback(elapsed=self._time - self._began, desired=self._reference.copy(), actual=self._measured.copy())
+
+
+def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
+    """The controller of a spec."""
+    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    own = math.inf if spec.max_effort is None else spec.max_effort
+    return GripperController(
+        name=name,
+        joints=spec.joints,
+        gains=spec.gains,
+        fingers=fingers(fit.robot, spec.joints),
+        speed=spec.speed,
+        max_effort=np.array([min(own, math.inf if j.limits.effort is None else j.limits.effort) for j in joints]),
+        stall_velocity=_each(joints, spec.stall_velocity, turning=STALL_VELOCITY, sliding=STALL_SPEED),
+        stall_time=spec.stall_time,
+        goal_tolerance=_each(joints, spec.goal_tolerance, turning=GOAL_ANGLE, sliding=GOAL_DISTANCE),
+        feed_forward="gravity" if spec.gravity_compensation else "none",
+        compat=fit.compat,
+    )
+
+
+def _each(joints: Sequence[Joint], stated: float | None, *, turning: float, sliding: float) -> Array:
+    """(n) what was stated, or the default of each joint's type."""
+    defaults = [sliding if joint.type == "prismatic" else turning for joint in joints]
+    return np.array(defaults if stated is None else [stated] * len(joints))
+
+
+def check(spec: GripperSpec, robot: RobotModel) -> Iterator[Problem]:
+    """Gains of joints that it does not have, and gains all zero."""
+    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from idle_gains(spec.joints, spec.gains, "effort")
+
+
+MEMBER = ControllerMember(name="gripper", spec=GripperSpec, build=build, check=check)

@@ -1,0 +1,90 @@
+"""What the model of the robot adds to effort commands: gravity, or all the dynamics along the reference.
+
+Computed torque and gravity compensation: Siciliano et al., Robotics: Modelling, Planning and Control (2009), 8.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.controller import Controller
+from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
+
+if TYPE_CHECKING:
+    from manipcli.model.kinematics import Kinematics
+
+Index = slice | npt.NDArray[np.intp]
+
+
+class FeedForwardLaw(Protocol):
+    """Adds to the effort commands of controllers in place."""
+
+    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
+        """From now on these: where their joints stand in a joint vector, and ticks between two of their updates."""
+        ...
+
+    def add(self, tick: int, position: Array, velocity: Array) -> None:
+        """To the controllers that were updated at `tick`; at the measured joints (n)."""
+        ...
+
+
+class NoDynamics:
+    """Adds nothing: where no model of the robot is at hand."""
+
+    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
+        """Nobody is served."""
+
+    def add(self, tick: int, position: Array, velocity: Array) -> None:
+        """Nothing."""
+
+
+class ModelFeedForward:
+    """Gravity g(q) for controllers that want it; for those that want inverse dynamics
+
+        M(q) a + C(q, v) v + g(q) + D v_r
+
+    with the wanted acceleration a, and the viscous damping D of the joints at the reference velocity v_r: at the
+    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate.
+    """
+
+    def __init__(self, robot: RobotModel, kinematics: Kinematics) -> None:
+        self._kinematics = kinematics
+        self._damping = np.array([joint.damping for joint in robot.moving_joints])
+        self._acceleration, self._rate = np.zeros((2, len(robot.joint_names)))
+        self._served: list[tuple[Array, Index, int]] = []
+        self._driven: list[tuple[Index, Array, Array]] = []
+
+    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
+        """From now on these: where their joints stand in a joint vector, and ticks between two of their updates."""
+        wanting = [one for one in controllers if one[0].feed_forward != "none" and "effort" in one[0].interfaces]
+        self._served = [(c.output.commands[c.interfaces.index("effort")], i, every) for c, i, every in wanting]
+        self._driven = [
+            (index, c.output.wanted_acceleration, c.output.velocity)
+            for c, index, _ in wanting
+            if c.feed_forward == "inverse_dynamics"
+        ]
+        self._acceleration[:] = 0.0
+        self._rate[:] = 0.0
+
+    def add(self, tick: int, position: Array, velocity: Array) -> None:
+        """To the controllers that were updated at `tick`; at the measured joints (n)."""
+        if not self._served:
+            return
+        if self._driven:
+            acceleration, rate = self._acceleration, self._rate
+            for index, wanted, reference in self._driven:
+                acceleration[index] = wanted
+                rate[index] = reference
+            efforts = self._kinematics.inverse_dynamics(position, velocity, acceleration)
+            np.multiply(self._damping, rate, out=rate)
+            efforts += rate
+        else:
+            efforts = self._kinematics.gravity(position)
+        for command, index, every in self._served:
+            if every == 1 or tick % every == 0:
+                command += efforts[index]
