@@ -9,6 +9,7 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
+from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.checks import CHECKS
 from manipcli.model.description import Description
 from manipcli.model.examine import examine
@@ -134,6 +135,8 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
     for k, pair in enumerate(spec.collision_ignore):
         for name in pair:
             _known_link(reporter, name, links, ("collision_ignore", k))
+    transmissions = build_transmissions(reporter, spec, joints, body.transmissions)
+    actuators = build_actuators(reporter, spec, transmissions)
     reporter.stop()
     return RobotModel(
         name=spec.robot,
@@ -142,13 +145,14 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
         joints=joints,
         groups=groups,
         poses=poses,
-        transmissions=tuple(body.transmissions),
+        transmissions=transmissions,
         X_WB=transform(spec.mount),
-        urdf=portable_urdf(spec.robot, links, joints, body.transmissions),
+        urdf=portable_urdf(spec.robot, links, joints, transmissions),
         tool=tool,
         collision_ignore=spec.collision_ignore,
         friction=spec.friction,
         compat=spec.compat,
+        actuators=actuators,
     )
 
 

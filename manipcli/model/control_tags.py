@@ -8,8 +8,9 @@ from typing import Final
 
 from manipcli.model.check import Subject
 from manipcli.model.located_xml import Element
+from manipcli.model.transmissions import TRANSMISSIONS
 
-TRANSMISSIONS: Final = {"SimpleTransmission": 1, "DifferentialTransmission": 2, "FourBarLinkageTransmission": 2}
+SIZES: Final = {member.type: member.size for member in TRANSMISSIONS}
 """Types, and how many joints and actuators each has."""
 
 

@@ -1,6 +1,7 @@
 """Kinematics and dynamics of a robot through Pinocchio.
 
-Joint vectors (n,) follow `RobotModel.moving_joints`; a mimic joint is an ordinary joint here. Frames: W world, L link,
+Joint vectors (n,) follow `RobotModel.moving_joints`; a mimic joint is an ordinary joint here. Inertia is that of the
+links and, on the diagonal, that of the actuators' rotors. Frames: W world, L link,
 T a frame fixed in a link. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse dynamics) and 6.
 """
 
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
 if TYPE_CHECKING:
@@ -57,6 +59,7 @@ class Kinematics:
             frame = pin.Frame(link.name, parent, 0, X, pin.FrameType.BODY)
             self._frames[link.name] = model.addFrame(frame, False)
             self._holders[link.name] = parent
+        model.armature = reflected_inertia(robot)
         self._data = model.createData()
         self._zero = np.zeros(model.nv)
 

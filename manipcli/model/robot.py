@@ -164,6 +164,30 @@ class TransmissionTag:
     actuator_reductions: tuple[float, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """A motor in front of its gear, in its own units: N m and rad, or N and m. The defaults are those of an ideal one.
+
+    Attributes:
+        effort: the most that it gives [N m or N]; None: unlimited.
+        velocity: beyond it nothing is left to drive with [rad/s or m/s]; None: unlimited.
+        rotor_inertia: of what turns with it [kg m2 or kg].
+        viscous_friction: [N m s/rad or N s/m].
+        coulomb_friction: [N m or N].
+        efficiency: share of its effort that reaches the joints while it drives them.
+        latency: control ticks from a command to its effort.
+    """
+
+    name: str
+    effort: float | None = None
+    velocity: float | None = None
+    rotor_inertia: float = 0.0
+    viscous_friction: float = 0.0
+    coulomb_friction: float = 0.0
+    efficiency: float = 1.0
+    latency: int = 0
+
+
 @dataclass(frozen=True)
 class RobotModel:
     """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
@@ -171,7 +195,7 @@ class RobotModel:
     `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
     `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact;
     `collision_ignore` are pairs of links that planning never checks against each other; `compat` says whose four-bar
-    linkages these are, where ROS 1 and ROS 2 differ.
+    linkages these are, where ROS 1 and ROS 2 differ. `actuators` are those of which something is known.
     """
 
     name: str
@@ -187,6 +211,7 @@ class RobotModel:
     collision_ignore: tuple[tuple[str, str], ...] = ()
     friction: float = 1.0
     compat: Literal["ros1", "ros2"] = "ros2"
+    actuators: tuple[Actuator, ...] = ()
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:

@@ -89,6 +89,75 @@ class LimitsSpec(Model):
         return self
 
 
+TransmissionType = Literal["simple", "differential", "four_bar"]
+
+
+class TransmissionSpec(Model):
+    """Actuators and the joints that they drive, in the order of their roles: one of each, or two.
+
+    It replaces what the description says about these joints.
+    """
+
+    type: TransmissionType = Field(
+        "simple", description="simple (1:1), differential or four_bar (2:2). Default simple."
+    )
+    joints: tuple[str, ...] = Field(description="The joint, or joint1 and joint2.")
+    actuators: tuple[str, ...] = Field(description="The actuator, or actuator1 and actuator2.")
+    actuator_reduction: tuple[float, ...] | None = Field(
+        None, description="Per actuator, not 0: its turns a turn of the joint; negative reverses. Default 1."
+    )
+    joint_reduction: tuple[float, ...] | None = Field(
+        None, description="Per joint, not 0: a second reduction, behind the coupling of a pair. Default 1."
+    )
+    joint_offset: tuple[JointValue, ...] | None = Field(
+        None, description="Per joint: its position where the actuators are at 0 [rad or m]. Default 0."
+    )
+
+    @model_validator(mode="after")
+    def _counted(self) -> TransmissionSpec:
+        count = 1 if self.type == "simple" else 2
+        for key in ("joints", "actuators", "actuator_reduction", "joint_reduction", "joint_offset"):
+            values = getattr(self, key)
+            if values is None:
+                continue
+            if len(values) != count:
+                message = f"a {self.type} transmission has {count} of each; {key} has {len(values)}"
+                raise problem("count", message, at=(key,))
+            if key.endswith("reduction"):
+                for k, value in enumerate(values):
+                    if value == 0.0:
+                        raise problem("range", "a reduction of 0 is not possible", at=(key, k))
+            elif len({*values}) < count and not key.startswith("joint_"):
+                raise problem("duplicate", f"{key} names '{values[0]}' twice", at=(key, 1))
+        return self
+
+
+class ActuatorSpec(Model):
+    """A motor in front of its gear, in its own units: N m and rad, or N and m where it moves in a line."""
+
+    effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
+        None, description="The most that it gives [N m or N], above 0. Default: unlimited."
+    )
+    velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Beyond it nothing is left to drive with [rad/s or m/s], above 0. Default: unlimited."
+    )
+    rotor_inertia: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="Of what turns with the motor [kg m^2 or kg]; at the joint reduction^2 times that. Default 0."
+    )
+    viscous_friction: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="Friction per velocity [N m s/rad or N s/m]. Default 0."
+    )
+    coulomb_friction: Annotated[JointEffort, Field(ge=0)] = Field(
+        0.0, description="Friction that does not depend on velocity [N m or N]. Default 0."
+    )
+    efficiency: Annotated[float, Field(gt=0, le=1)] = Field(
+        1.0, description="Share of its effort that reaches the joints while it drives them, in (0, 1]. Default 1."
+    )
+    latency: Annotated[int, Field(ge=0, le=1000)] = Field(
+        0, description="Control ticks from a command to its effort, 0 to 1000. Default 0."
+    )
+
+
 class AttachSpec(Model):
     """A further description welded onto this one: its root link at `pose` of the link `parent`."""
 
@@ -123,6 +192,12 @@ class RobotSpec(Model):
     poses: dict[str, dict[str, PosePart]] = Field({}, description="Named poses: per group, joint values or a name.")
     tool: ToolSpec | None = Field(None, description="The tool frame. Default: the tip of the first group.")
     limits: dict[str, LimitsSpec] = Field({}, description="Limits by joint: what URDF cannot say, or narrower ones.")
+    transmissions: dict[str, TransmissionSpec] = Field(
+        {}, description="Transmissions by name, beside those of the description or instead of them."
+    )
+    actuators: dict[str, ActuatorSpec] = Field(
+        {}, description="What the actuators of transmissions can do, by name. Default: anything."
+    )
     default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = Field(
         10.0, description="Limit of joints without their own [rad/s^2 or m/s^2], above 0. Default 10."
     )
@@ -131,5 +206,7 @@ class RobotSpec(Model):
         1.0, description="Coefficient of the robot's surfaces; the engine multiplies it by the other body's. Default 1."
     )
     compat: Literal["ros1", "ros2"] = Field(
-        "ros2", description="Whose PID the controllers have; in ROS 1 the integral acts a step earlier. Default ros2."
+        "ros2",
+        description="Whose PID (in ROS 1 the integral acts a step earlier) and whose four-bar efforts (in ROS 1 they "
+        "do not keep power). Default ros2.",
     )

@@ -80,6 +80,7 @@ from manipcli.model.checks.transmission_reduction import CHECK as TRANSMISSION_R
 from manipcli.model.checks.transmission_roles import CHECK as TRANSMISSION_ROLES
 from manipcli.model.checks.transmission_shared import CHECK as TRANSMISSION_SHARED
 from manipcli.model.checks.transmission_type import CHECK as TRANSMISSION_TYPE
+from manipcli.model.checks.transmission_unread import CHECK as TRANSMISSION_UNREAD
 from manipcli.model.checks.two_parents import CHECK as TWO_PARENTS
 from manipcli.model.checks.undefined_link import CHECK as UNDEFINED_LINK
 from manipcli.model.checks.undefined_material import CHECK as UNDEFINED_MATERIAL
@@ -190,6 +191,7 @@ _READINESS: tuple[Check, ...] = (
     TRANSMISSION_JOINT,
     TRANSMISSION_REDUCTION,
     TRANSMISSION_NAME,
+    TRANSMISSION_UNREAD,
     CONTROL_JOINT,
     CONTROL_MIMIC,
     CONTROL_PLUGIN,

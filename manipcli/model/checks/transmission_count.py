@@ -4,14 +4,14 @@ from collections.abc import Iterator
 
 from manipcli.core.errors import Finding
 from manipcli.model.check import Check, Subject
-from manipcli.model.control_tags import TRANSMISSIONS, transmissions
+from manipcli.model.control_tags import SIZES, transmissions
 from manipcli.model.samples import GEARED, MOTOR, one_joint, transmission
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
     """In ros2_control the actuator may be left out of a simple one."""
     for found in transmissions(subject):
-        count = TRANSMISSIONS.get(found.type)
+        count = SIZES.get(found.type)
         joints, actuators = len(found.joints), len(found.actuators)
         if count is None or joints == 0 or (joints == actuators == count):
             continue

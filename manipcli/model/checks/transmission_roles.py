@@ -4,14 +4,14 @@ from collections.abc import Iterator
 
 from manipcli.core.errors import Finding
 from manipcli.model.check import Check, Subject
-from manipcli.model.control_tags import TRANSMISSIONS, role, transmissions
+from manipcli.model.control_tags import SIZES, role, transmissions
 from manipcli.model.samples import INERTIAL, LIMIT, one_joint
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
     """ros2_control wants a role everywhere; ROS 1 only where there are two."""
     for found in transmissions(subject):
-        pairs = TRANSMISSIONS.get(found.type) == 2
+        pairs = SIZES.get(found.type) == 2
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
             roles = [role(element) for element in elements]
             how = "<role>{}1</role>" if found.ros1 else 'role="{}1"'

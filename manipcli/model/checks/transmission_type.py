@@ -5,16 +5,16 @@ from collections.abc import Iterator
 from manipcli.core.errors import Finding
 from manipcli.core.text import did_you_mean
 from manipcli.model.check import Check, Subject
-from manipcli.model.control_tags import TRANSMISSIONS, transmissions
+from manipcli.model.control_tags import SIZES, transmissions
 from manipcli.model.samples import one_joint, transmission
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
     for found in transmissions(subject):
-        if found.type not in TRANSMISSIONS:
+        if found.type not in SIZES:
             kind = found.element.first("type") or found.element.first("plugin") or found.element
             message = f"transmission '{found.name}' is of the unknown type '{found.type}'"
-            hint = did_you_mean(found.type, list(TRANSMISSIONS)) or "known: " + ", ".join(TRANSMISSIONS)
+            hint = did_you_mean(found.type, list(SIZES)) or "known: " + ", ".join(SIZES)
             yield Finding("URDF310", message, kind.place, hint, "warning")
 
 

@@ -1,0 +1,101 @@
+"""What drives the joints: the transmissions and actuators of a robot file, with those of its descriptions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from manipcli.core.text import did_you_mean
+from manipcli.model.robot import Actuator, Joint, TransmissionTag
+from manipcli.model.transmissions import BY_TYPE, TRANSMISSIONS
+from manipcli.spec.robot import RobotSpec, TransmissionSpec
+
+if TYPE_CHECKING:
+    from manipcli.model.build_robot import Reporter
+
+
+def build_transmissions(
+    reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], described: Sequence[TransmissionTag]
+) -> tuple[TransmissionTag, ...]:
+    """Those of the descriptions, then those of the robot file.
+
+    A transmission of the robot file replaces what descriptions say about its joints, and one of its own name; where
+    only one joint of a described pair is replaced, the pair is in contradiction to it.
+    """
+    driven = {joint.name: joint for joint in joints}
+    commanded = [joint.name for joint in joints if joint.independent]
+    owners: dict[str, str] = {}
+    own: dict[str, TransmissionTag] = {}
+    for name, each in spec.transmissions.items():
+        loc = ("transmissions", name)
+        for k, joint_name in enumerate(each.joints):
+            joint = driven.get(joint_name)
+            if joint is None:
+                message = f"transmission '{name}': joint '{joint_name}' is not in the robot"
+                hint = did_you_mean(joint_name, commanded)
+                reporter.error("ROBOT340", message, (*loc, "joints", k), hint=hint)
+            elif not joint.independent:
+                what = f"follows '{joint.mimic.joint}' (mimic)" if joint.mimic is not None else "is fixed"
+                message = f"transmission '{name}': joint '{joint_name}' {what}, so no actuator drives it"
+                reporter.error("ROBOT341", message, (*loc, "joints", k))
+        for key, names in (("joints", each.joints), ("actuators", each.actuators)):
+            for k, part in enumerate(names):
+                owner = owners.setdefault(f"{key} {part}", name)
+                if owner != name:
+                    message = f"transmission '{name}': {key[:-1]} '{part}' belongs to transmission '{owner}' already"
+                    reporter.error("ROBOT342", message, (*loc, key, k))
+        own[name] = _tag(name, each)
+    replaced = {joint for tag in own.values() for joint in tag.joints}
+    kept = []
+    for tag in described:
+        if tag.name in own or replaced.issuperset(tag.joints):
+            continue
+        shared = replaced.intersection(tag.joints)
+        if shared:
+            owner = owners[f"joints {min(shared)}"]
+            message = f"transmission '{owner}' takes joint '{min(shared)}' out of '{tag.name}' of the description"
+            hint = f"'{tag.name}' drives {' and '.join(tag.joints)}: let '{owner}' drive all of them"
+            reporter.error("ROBOT343", message, ("transmissions", owner, "joints"), hint=hint)
+        kept.append(tag)
+    return (*kept, *own.values())
+
+
+def build_actuators(
+    reporter: Reporter, spec: RobotSpec, transmissions: Sequence[TransmissionTag]
+) -> tuple[Actuator, ...]:
+    """The actuators of the robot file; each is one of a transmission."""
+    known = [name for tag in transmissions if tag.type in BY_TYPE for name in tag.actuators]
+    for name in spec.actuators:
+        if name not in known:
+            message = f"actuator '{name}' is not in a transmission of the robot"
+            hint = did_you_mean(name, known) or "say under `transmissions:` which joint it drives"
+            reporter.error("ROBOT344", message, ("actuators", name), hint=hint)
+    return tuple(
+        Actuator(
+            name=name,
+            effort=each.effort,
+            velocity=each.velocity,
+            rotor_inertia=each.rotor_inertia,
+            viscous_friction=each.viscous_friction,
+            coulomb_friction=each.coulomb_friction,
+            efficiency=each.efficiency,
+            latency=each.latency,
+        )
+        for name, each in spec.actuators.items()
+    )
+
+
+def _tag(name: str, spec: TransmissionSpec) -> TransmissionTag:
+    ones = (1.0,) * len(spec.joints)
+    actuators, joints = spec.actuator_reduction or ones, spec.joint_reduction or ones
+    if spec.type == "simple":
+        actuators, joints = (actuators[0] * joints[0],), ones
+    return TransmissionTag(
+        name=name,
+        type=TRANSMISSIONS[spec.type].type,
+        joints=spec.joints,
+        joint_reductions=joints,
+        joint_offsets=spec.joint_offset or (0.0,) * len(spec.joints),
+        actuators=spec.actuators,
+        actuator_reductions=actuators,
+    )
