@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.drivetrain import Drivetrain
@@ -229,27 +228,33 @@ class Actuation:
         m = np.abs(T @ np.linalg.solve(M, T.T)).sum(axis=1) * self._period
         return np.concatenate((STIFFNESS / m, self._viscous / (1.0 + self._viscous * m)))
 
-    def motor_effort_limits(self) -> npt.NDArray[np.float64]:
-        """(n) what an engine's own motor may apply to each joint [N m or N]; infinite where nothing limits it.
+    def motor_effort_limits(self) -> Array:
+        """(n) those of its robot; see the function of this name."""
+        return motor_effort_limits(self._robot)
 
-        The least of the joint's limit and of what its actuator gives while it drives, losses and Coulomb friction taken
-        off. The two joints of a pair get the largest multiple of what each could have alone that both can have at once.
-        """
-        limits = np.array(
-            [math.inf if joint.limits.effort is None else joint.limits.effort for joint in self._robot.moving_joints]
+
+def motor_effort_limits(robot: RobotModel) -> Array:
+    """(n) what an engine's own motor may apply to each joint [N m or N]; infinite where nothing limits it.
+
+    The least of the joint's limit and of what its actuator gives while it drives, losses and Coulomb friction taken
+    off. The two joints of a pair get the largest multiple of what each could have alone that both can have at once.
+    """
+    limits = np.array(
+        [math.inf if joint.limits.effort is None else joint.limits.effort for joint in robot.moving_joints],
+        dtype=np.float64,
+    )
+    drivetrain = Drivetrain.of(robot)
+    actuators, joints = list(drivetrain.actuators), list(drivetrain.joints)
+    for block in drivetrain.transmission.blocks:
+        own, actuators = actuators[: block.size], actuators[block.size :]
+        driven, joints = joints[: block.size], joints[block.size :]
+        if all(actuator.effort is None for actuator in own):
+            continue
+        net = np.array(
+            [max((_PLENTY if x.effort is None else x.effort) * x.efficiency - x.coulomb_friction, 0.0) for x in own]
         )
-        if not self.names:
-            return limits
-        net = np.maximum(np.minimum(self._effort, _PLENTY) * (1.0 - self._loss) - self._coulomb, 0.0)
-        maps = self.drivetrain.transmission.maps
-        at = 0
-        for block in self.drivetrain.transmission.blocks:
-            own = slice(at, at + block.size)
-            at += block.size
-            joints = list(self.drivetrain.joints[own])
-            alone = np.abs(maps.joint_effort[own, own]) @ net[own]
-            need = np.abs(maps.actuator_effort[own, own]) @ alone
-            share = float(np.min(net[own] / np.where(need > 0.0, need, 1.0)))
-            unlimited = not np.isfinite(self._effort[own]).any()
-            limits[joints] = np.minimum(limits[joints], math.inf if unlimited else share * alone)
-        return limits
+        alone = np.abs(block.maps.joint_effort) @ net
+        need = np.abs(block.maps.actuator_effort) @ alone
+        share = np.min(net / np.where(need > 0.0, need, 1.0))
+        limits[driven] = np.minimum(limits[driven], share * alone)
+    return limits

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from manipcli.control.controller import REFERENCE_ROWS, ControllerOutput
 from manipcli.core.geometry import Array
 from manipcli.model.batch_kinematics import relative_batch
+from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
-from manipcli.record.actuators import ActuatorSide
 from manipcli.record.channels import Channel, ControllerChannel
 from manipcli.record.messages import WORLD
 from manipcli.record.rows import RowBlock, Times, controller_state_template, joint_state_template, tf_template
@@ -101,7 +101,7 @@ class Block:
         self._controllers = [_ControllerRows(controller, robot, capacity) for controller in controllers]
         frames = [(joint.parent, joint.child) for joint in joints] + [(WORLD, body.name) for body in bodies]
         states = [controller_state_template(ids[c.state_topic], c.joints, c.interfaces) for c in controllers]
-        self._actuators = ActuatorSide(robot)
+        self._actuators = Drivetrain.of(robot)
         plots = [
             joint_state_template(ids[topic], c.joints, effort=False)
             for c in controllers
@@ -151,7 +151,7 @@ class Block:
             fast += state
             slow += [values[plotted] for values in plots]
         if self._actuators.names:
-            slow += self._actuators.values(position[plotted], velocity[plotted], effort[plotted])
+            slow += self._actuators.state(position[plotted], velocity[plotted], effort[plotted])
         self._fast.fill(times, self._fast_written + 1, fast)
         self._slow.fill(times[plotted], self._slow_written + 1, slow)
         self._fast_written += T

@@ -1,7 +1,7 @@
 """The stepping: one control tick at a time, in one order and no other.
 
-read engine -> controllers -> joint limits -> write -> observe -> physics. Whoever wants to see a tick (the recorder,
-the progress line) is an observer; nothing else happens in the loop.
+read engine -> controllers -> joint limits -> actuators -> write -> observe -> physics. Whoever wants to see a tick (the
+recorder, the progress line) is an observer; nothing else happens in the loop.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from manipcli.control.actuation import Actuation
+from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.limits import JointLimiter
 from manipcli.control.manager import ControllerManager
@@ -77,6 +79,9 @@ class Session:
         self.ticks = 0
         self.state = engine.read()
         self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints])
+        self.actuation = Actuation(robot, period)
+        self._obeyed = -1
+        self._asked = np.zeros(len(robot.joint_names))
         if engine.ideal:
             manager.keep_references()
         n = len(robot.joint_names)
@@ -102,6 +107,7 @@ class Session:
         self.ticks = 0
         self.observer = observer
         self._limiter.reset()
+        self.actuation.reset()
 
     def tick(self) -> WorldState:
         """One control period.
@@ -116,11 +122,29 @@ class Session:
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         self._limiter.apply(command, state.position, state.velocity, self.period)
-        self.engine.write(command)
+        if self.actuation.ideal or self.engine.ideal:
+            self.engine.write(command)
+        else:
+            self._drive(command, state)
         self.observer.tick(self.ticks, state, manager.outputs)
         self.engine.advance()
         self.ticks += 1
         return state
+
+    def _drive(self, command: JointCommand, state: WorldState) -> None:
+        """Writes what the actuators make of the command. What the controllers wrote stays: a slow one relies on it."""
+        actuation, effort = self.actuation, command.effort
+        if command.version != self._obeyed:
+            self._obeyed = command.version
+            actuation.select(command.modes)
+        applied = actuation.apply(effort, state.position, state.velocity)
+        if applied is effort:
+            self.engine.write(command)
+            return
+        self._asked[:] = effort
+        effort[:] = applied
+        self.engine.write(command)
+        effort[:] = self._asked
 
     def _touch(self, state: WorldState) -> None:
         """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""

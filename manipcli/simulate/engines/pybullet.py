@@ -10,6 +10,7 @@ from typing import Final, cast
 
 import numpy as np
 
+from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand, Mode
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.model.mesh_files import clean_mesh
@@ -20,6 +21,7 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines.pybullet_contacts import ContactMerger, Vector
 from manipcli.simulate.engines.pybullet_readback import differences
+from manipcli.simulate.engines.pybullet_rotors import add_rotors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
@@ -190,8 +192,9 @@ class PybulletEngine:
         self._motors: list[tuple[int, int, Mode]] = []
         self._measures = False
         self._applied = np.zeros(n)
+        add_rotors(p, client, robot, self._robot, self._joints)
         limits = [joint.limits for joint in robot.moving_joints]
-        self._efforts = [UNLIMITED_EFFORT if limit.effort is None else limit.effort for limit in limits]
+        self._efforts = [min(float(effort), UNLIMITED_EFFORT) for effort in motor_effort_limits(robot)]
         self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
 
     def _couple(self, robot: RobotModel, follower: str, driver: str, multiplier: float, offset: float) -> None:
