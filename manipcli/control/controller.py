@@ -77,6 +77,11 @@ class Controller(Protocol):
     feed_forward: FeedForward
 
     @property
+    def senses_contact(self) -> bool:
+        """Whether it asks for the forces of contacts at its next update."""
+        ...
+
+    @property
     def output(self) -> ControllerOutput:
         """What the last update wrote; the same object for the controller's life."""
         ...

@@ -4,7 +4,8 @@
     command = manager.update(time, state, contact_force)   # a JointCommand, before limits, until the next update
 
 where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState` will do),
-and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to the next joint.
+and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to the next joint;
+it need only be up to date while `senses_contact`.
 Goals go to the controllers: `manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` finds the active one
 that claims them.
 
@@ -138,6 +139,14 @@ class ControllerManager:
     def started(self) -> bool:
         """Whether there was an update."""
         return self._tick > 0
+
+    @property
+    def senses_contact(self) -> bool:
+        """Whether some active controller asks for the forces of contacts at the next update."""
+        for slot in self._active:  # noqa: SIM110  (a generator costs three times as much, every tick)
+            if slot.controller.senses_contact:
+                return True
+        return False
 
     @property
     def controllers(self) -> tuple[Controller, ...]:

@@ -50,6 +50,10 @@ class Engine(Protocol):
         """One control tick: `substeps` physics steps."""
         ...
 
+    def touches_changed(self) -> bool:
+        """Whether the robot touches other things than when `robot_contacts` was last asked; cheaper than to ask it."""
+        ...
+
     def robot_contacts(self) -> tuple[Contact, ...]:
         """What the robot touches now."""
         ...

@@ -91,6 +91,7 @@ class Session:
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
         self._touched: tuple[Contact, ...] = ()
         self._others: tuple[Contact, ...] = ()
+        self._watchful = 0  # the tick up to which contacts are looked at every time
 
     @property
     def time(self) -> float:
@@ -107,6 +108,7 @@ class Session:
         self.ticks = 0
         self.observer = observer
         self._limiter.reset()
+        self._watchful = 0
         self.actuation.reset()
 
     def tick(self) -> WorldState:
@@ -147,16 +149,21 @@ class Session:
         effort[:] = self._asked
 
     def _touch(self, state: WorldState) -> None:
-        """Contacts of the robot every tick, of everything every tenth; the force on what each joint moves."""
-        before = self._touched
-        slow = self.ticks % SLOW == 0
+        """What touches, and the force on what each joint moves.
+
+        Everything at every tenth tick; what the robot touches at once when that changes and for ten ticks then, so that
+        no short touch and no knock is lost, and at every tick while a controller asks for forces.
+        """
+        ticks = self.ticks
+        slow = ticks % SLOW == 0
         if slow:
             self._refuse_runaway(state)
-            everything = self.engine.contacts()
-            self._touched = tuple(c for c in everything if _of_robot(c))
-            self._others = tuple(c for c in everything if not _of_robot(c))
-        else:
-            self._touched = self.engine.robot_contacts()
+            self._others = tuple(c for c in self.engine.contacts() if not _of_robot(c))
+        if (slow or ticks >= self._watchful) and self.engine.touches_changed():
+            self._watchful = ticks + SLOW
+        elif not slow and ticks >= self._watchful and not self.manager.senses_contact:
+            return
+        before, self._touched = self._touched, self.engine.robot_contacts()
         if self._touched or before:
             forces = [0.0] * len(self._contact_force)
             for a, b, force, _ in self._touched:
@@ -167,9 +174,9 @@ class Session:
                 elif joint_b is None:
                     forces[joint_a] += force
             self._contact_force[:] = forces
-            self.observer.contacts(self.ticks, self._touched + self._others)
+            self.observer.contacts(ticks, self._touched + self._others)
         elif slow:
-            self.observer.contacts(self.ticks, self._others)
+            self.observer.contacts(ticks, self._others)
 
     def _refuse_runaway(self, state: WorldState) -> None:
         speeds = np.abs(state.velocity)

@@ -64,6 +64,7 @@ class ScriptedEngine:
     ideal: bool = False
     tick: int = 0
     touching: tuple[Contact, ...] = ()
+    seen: tuple[Contact, ...] = ()
     written: list[Array] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -83,6 +84,10 @@ class ScriptedEngine:
 
     def advance(self) -> None:
         self.tick += 1
+
+    def touches_changed(self) -> bool:
+        seen, self.seen = self.seen, self.robot_contacts()
+        return seen != self.seen
 
     def robot_contacts(self) -> tuple[Contact, ...]:
         return tuple(c for c in self.touching if "robot/" in c.a + c.b)

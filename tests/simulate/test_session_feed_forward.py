@@ -75,6 +75,9 @@ class Standing:
     def advance(self):
         pass
 
+    def touches_changed(self):
+        return False
+
     def robot_contacts(self):
         return ()
 

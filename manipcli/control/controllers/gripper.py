@@ -192,6 +192,11 @@ class GripperController:
         return self._goal
 
     @property
+    def senses_contact(self) -> bool:
+        """While a goal stops fingers by force."""
+        return self._goal is not None and self._force is not None
+
+    @property
     def output(self) -> ControllerOutput:
         """What the last update wrote."""
         return self._output

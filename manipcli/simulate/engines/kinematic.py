@@ -56,6 +56,9 @@ class KinematicEngine:
     def advance(self) -> None:
         """Nothing moves by itself."""
 
+    def touches_changed(self) -> bool:
+        return False
+
     def robot_contacts(self) -> tuple[Contact, ...]:
         return ()
 

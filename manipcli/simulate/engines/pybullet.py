@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 import tempfile
 from pathlib import Path
 from types import ModuleType
@@ -19,7 +20,7 @@ from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
-from manipcli.simulate.engines.pybullet_contacts import ContactMerger, Vector
+from manipcli.simulate.engines.pybullet_contacts import NONE, ContactMerger, Pair, Vector, touching_pairs
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
@@ -74,16 +75,20 @@ class PybulletEngine:
         ]
         self._start(robot, settings)
         n, m = len(self._joints), len(self._movable)
+        poses = np.zeros(2 * n + 7 * m)
+        bodies = poses[2 * n :].reshape(m, 7)
+        self._buffer, self._pack = poses.data.cast("B"), struct.Struct(f"{poses.size}d").pack_into
         self._state = WorldState(
             time=np.zeros(()),
-            position=np.zeros(n),
-            velocity=np.zeros(n),
+            position=poses[:n],
+            velocity=poses[n : 2 * n],
             effort=np.zeros(n),
-            body_position=np.zeros((m, 3)),
-            body_quat_xyzw=np.zeros((m, 4)),
+            body_position=bodies[:, :3],
+            body_quat_xyzw=bodies[:, 3:],
             body_linear=np.zeros((m, 3)),
             body_angular=np.zeros((m, 3)),
         )
+        self._pairs: set[Pair] = NONE
         self._substeps = settings.substeps
         self._stiffness = -math.expm1(-settings.step / POSITION_TIME)
 
@@ -222,25 +227,29 @@ class PybulletEngine:
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
+        # One list for all numbers, copied at once: a tick has no time for an array operation for each of them.
         states = p.getJointStates(self._robot, self._joints, client)
-        positions, velocities_, _, efforts = zip(*states, strict=True) if states else ((), (), (), ())
-        state.position[:] = positions
-        state.velocity[:] = velocities_
-        if self._measures:
-            state.effort[:] = efforts
-            state.effort[self._torques_at] += self._applied[self._torques_at]
-        else:
-            state.effort[:] = self._applied
-        for row, (k, offset, turned) in enumerate(self._movable):
+        numbers = [s[0] for s in states]
+        numbers += [s[1] for s in states]
+        for k, offset, turned in self._movable:
             position, quat = p.getBasePositionAndOrientation(k, client)
             if turned is not None:
                 _, quat = p.multiplyTransforms((0, 0, 0), quat, (0, 0, 0), turned)
-            arm = None if offset is None else _rotated(quat, offset)
-            state.body_position[row] = position if arm is None else _minus(position, arm)
-            state.body_quat_xyzw[row] = quat
-            if velocities:
+            numbers += position if offset is None else _minus(position, _rotated(quat, offset))
+            numbers += quat
+        self._pack(self._buffer, 0, *numbers)
+        if self._measures:
+            state.effort[:] = [s[3] for s in states]
+            state.effort[self._torques_at] += self._applied[self._torques_at]
+        else:
+            state.effort[:] = self._applied
+        if velocities:
+            for row, (k, offset, _) in enumerate(self._movable):
                 linear, angular = p.getBaseVelocity(k, client)
-                state.body_linear[row] = linear if arm is None else _minus(linear, _cross(angular, arm))
+                if offset is not None:
+                    arm = _rotated(tuple(state.body_quat_xyzw[row].tolist()), offset)
+                    linear = _minus(linear, _cross(angular, arm))
+                state.body_linear[row] = linear
                 state.body_angular[row] = angular
         return state
 
@@ -311,8 +320,14 @@ class PybulletEngine:
         for _ in range(self._substeps):
             self._p.stepSimulation(self._client)
 
+    def touches_changed(self) -> bool:
+        points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+        return (touching_pairs(points) if points else NONE) != self._pairs
+
     def robot_contacts(self) -> tuple[Contact, ...]:
-        return self._merge(self._p.getContactPoints(self._robot, physicsClientId=self._client))
+        points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+        self._pairs = touching_pairs(points)
+        return self._merge(points)
 
     def contacts(self) -> tuple[Contact, ...]:
         return self._merge(self._p.getContactPoints(physicsClientId=self._client))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from operator import attrgetter
+from typing import Final
 
 from manipcli.model.state import Contact
 
@@ -13,6 +14,13 @@ Pair = tuple[int, int, int, int]
 ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float]
 """What PyBullet says of a contact point, up to its distance and normal force."""
 _sides = attrgetter("a", "b")
+
+NONE: Final[set[Pair]] = set()
+
+
+def touching_pairs(points: tuple[ContactPoint, ...]) -> set[Pair]:
+    """The pairs of links that touch."""
+    return {point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0}
 
 
 class ContactMerger:
