@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Sequence
 from typing import TextIO
 
 from manipcli.core.text import escape
@@ -39,6 +40,18 @@ def result(text: str) -> None:
     _write(sys.stdout, f"{_dressed(text, sys.stdout)}\n")
 
 
+def painted(lines: Sequence[Sequence[tuple[str, str]]]) -> None:
+    """A result in colours: of each line its pieces, each a text and a colour by its number, "" for none."""
+    coloured = is_coloured()
+    text = "\n".join(
+        "".join(
+            f"\x1b[{colour}m{escape(text)}\x1b[0m" if colour and coloured else escape(text) for text, colour in line
+        )
+        for line in lines
+    )
+    _write(sys.stdout, f"{text}\n")
+
+
 def talk(text: str) -> None:
     """Everything else, to stderr."""
     _write(sys.stderr, f"{_dressed(text, sys.stderr)}\n")
@@ -51,24 +64,37 @@ def is_live() -> bool:
 
 def redraw(text: str) -> None:
     """Replaces the current line of a live terminal; `""` clears it."""
-    columns = _columns()
-    _write(sys.stderr, f"\r\x1b[K{escape(text)[: columns - 1]}")
+    _write(sys.stderr, f"\r\x1b[K{escape(text)[: _columns(sys.stderr) - 1]}")
 
 
-def _columns() -> int:
+def columns() -> int:
+    """Of the terminal that results go to; 100 where they go to a file."""
+    return _columns(sys.stdout, otherwise=100)
+
+
+def is_coloured() -> bool:
+    """Whether results go to a terminal that wants colours."""
+    return _is_coloured(sys.stdout)
+
+
+def _columns(stream: TextIO, otherwise: int = 80) -> int:
     try:
-        return os.get_terminal_size(sys.stderr.fileno()).columns or 80
-    except OSError:
-        return 80
+        return os.get_terminal_size(stream.fileno()).columns or otherwise
+    except (OSError, ValueError):
+        return otherwise
 
 
 def _is_terminal(stream: TextIO | None) -> bool:
     return stream is not None and not stream.closed and stream.isatty()
 
 
+def _is_coloured(stream: TextIO | None) -> bool:
+    return _is_terminal(stream) and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
 def _dressed(text: str, stream: TextIO | None) -> str:
     text = "\n".join(map(escape, text.split("\n")))
-    if not _is_terminal(stream) or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+    if not _is_coloured(stream):
         return text
     return _PAINTED.sub(lambda match: f"\x1b[{_COLOURS[match.group()]}m{match.group()}\x1b[0m", text)
 

@@ -97,7 +97,8 @@ class CdrReader:
 
     def __init__(self, data: bytes | memoryview) -> None:
         self._data = memoryview(data)
-        if bytes(self._data[:4]) != ENCAPSULATION:
+        # The last two bytes are options of whoever wrote it and change nothing.
+        if bytes(self._data[:2]) != ENCAPSULATION[:2] or len(self._data) < 4:
             raise CdrError("is not little-endian CDR")
         self.offset = 4
 
@@ -139,6 +140,15 @@ class CdrReader:
     def skip_f64(self, count: int) -> int:
         """The offset of `count` bare doubles."""
         return self._advance(8 * count, 8)
+
+    def skip(self, size: int, align: int) -> int:
+        """The offset of `size` bytes that are aligned to `align`."""
+        return self._advance(size, align)
+
+    def expect(self, size: int) -> None:
+        """Raises CdrError where fewer than `size` bytes are left."""
+        if size > len(self._data) - self.offset:
+            raise CdrError("ends too early")
 
     def header(self) -> str:
         """Skips the stamp; the frame."""

@@ -1,0 +1,116 @@
+"""`manipcli plot LOG... [TOPIC.FIELD...]`: curves of a log in the terminal, in a file or as a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.replay.curves import Chart
+
+LOG_ENDINGS = (".mcap", ".partial")
+
+
+def plot(
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="LOG... [TOPIC.FIELD]...",
+            help="MCAP logs of ROS 2 messages, and what of them: joint_states.position[joint_1], "
+            "tf[cup].translation.z, contacts.force; a panel each, or one for several with commas between. "
+            "An overview when absent.",
+            show_default=False,
+        ),
+    ],
+    *,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="A figure: .svg, .png or .pdf.", show_default=False),
+    ] = None,
+    csv: Annotated[
+        str | None, typer.Option("--csv", metavar="FILE", help="A table; - is stdout.", show_default=False)
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option("--from", metavar="T", help="Seconds, or the step with which it begins.")
+    ] = None,
+    end: Annotated[
+        str | None, typer.Option("--to", metavar="T", help="Seconds, or the step with which it ends.")
+    ] = None,
+    fields: Annotated[bool, typer.Option("--fields", help="List what the logs have to plot.")] = False,
+) -> ExitCode:
+    """Plot numbers of one log, or of several over each other.
+
+    In the terminal, with -o in a file, with --csv as a table. Any ROS 2 log will do.
+    """
+    logs = [Path(word) for word in words if _is_log(word)]
+    asked = [word for word in words if not _is_log(word)]
+    if not logs:
+        hint = "`manipcli plot LOG.mcap [TOPIC.FIELD]...`"
+        raise InvalidInput([Finding("USE060", f"no log is given: '{words[0]}' is no file", hint=hint)])
+    if fields:
+        _list_fields(logs)
+        return ExitCode.PASSED
+    kind = None
+    if output is not None:
+        from manipcli.replay.figure import KINDS
+
+        kind = next((known for known in KINDS if output.suffix.lower() == f".{known}"), None)
+        if kind is None:
+            message = f"'{output}': a figure is one of {', '.join(f'.{known}' for known in KINDS)}"
+            raise InvalidInput([Finding("USE061", message)])
+    from manipcli.flow.chart import open_chart
+
+    chart = open_chart(logs, asked, start=start, end=end)
+    for note in chart.notes:
+        console.talk(f"note: {note}")
+    if output is not None and kind is not None:
+        from manipcli.core.whole_file import write_whole
+        from manipcli.replay.figure import render
+
+        write_whole(output, render(chart, kind))
+        console.talk(f"drawn: {output}")
+    if csv is not None:
+        _write_table(chart, csv)
+    if output is None and csv is None:
+        from manipcli.replay import terminal_plot
+
+        lines = terminal_plot.render(chart, columns=console.columns(), colours=console.is_coloured())
+        console.painted([[(piece.text, piece.colour) for piece in line] for line in lines])
+    return ExitCode.PASSED
+
+
+def _is_log(word: str) -> bool:
+    """Whether a word names a file; a topic has no ending, and no field is called mcap."""
+    return word.endswith(LOG_ENDINGS) or Path(word).is_file()
+
+
+def _write_table(chart: Chart, csv: str) -> None:
+    from io import StringIO
+
+    from manipcli.core.whole_file import write_whole
+    from manipcli.replay.curve_table import write_table
+
+    stream = StringIO()
+    write_table(chart, stream)
+    if csv == "-":
+        console.result(stream.getvalue().removesuffix("\n"))
+    else:
+        write_whole(Path(csv), stream.getvalue().encode())
+        console.talk(f"written: {csv}")
+
+
+def _list_fields(logs: list[Path]) -> None:
+    from manipcli.flow.chart import field_lines
+    from manipcli.report.table import table
+
+    for log in logs:
+        lines = field_lines(log)
+        if len(logs) > 1:
+            console.result(f"{log}:")
+        rows = [[line.name, line.type, str(line.count)] for line in lines]
+        console.result(table(("field", "type", "messages"), rows, right=("messages",)) if rows else "nothing")

@@ -1,0 +1,335 @@
+"""Logs and words to curves: `TOPIC.FIELD` of any ROS 2 log, or what is worth a first look."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.text import did_you_mean, listed, shorten
+from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
+from manipcli.judge.steps import step_outcomes
+from manipcli.model.located_xml import parse_document
+from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
+from manipcli.record.definition import Array, Message, UnknownDefinition, read_definition
+from manipcli.record.faults import BadRecording
+from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, ways
+from manipcli.record.layout import Part
+from manipcli.record.reading import open_recording
+from manipcli.record.schemas import CONTROLLER_STATE, JOINT_STATE
+from manipcli.record.series import Series, Wanted, read_series
+from manipcli.record.topics import Topic, Topics, open_topics
+from manipcli.record.units import JointUnits, unit_of
+from manipcli.replay.curves import Chart, Curve, Interval, Panel
+
+MAX_CURVES = 400
+"""On one sheet: more are seen by nobody."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldLine:
+    """One line of what can be plotted: `name` as it is written, the type of its topic, how many messages there are."""
+
+    name: str
+    type: str
+    count: int
+
+
+def open_chart(
+    logs: Sequence[Path], words: Sequence[str], *, start: str | None = None, end: str | None = None
+) -> Chart:
+    """Curves of one log or of several over each other.
+
+    Args:
+        logs: MCAP files of ROS 2 messages, finished or not; each begins at its first message.
+        words: a panel each, `TOPIC.FIELD` or several with commas between; none: an overview.
+        start, end: seconds, a time with its unit, or the id of a step of the first log that has it: its begin, its end.
+
+    Raises:
+        InvalidInput: a log cannot be read, a field is not there, or there is nothing to show.
+    """
+    opened = [_Log(path, name) for path, name in zip(logs, _short_names(logs), strict=True)]
+    first, last = _time(start, opened, begin=True), _time(end, opened, begin=False)
+    if first >= last:
+        raise InvalidInput([Finding("PLOT003", f"nothing lies between --from {start} and --to {end}")])
+    asked = [tuple(_split(word)) for word in words] or _overview(opened)
+    if not asked:
+        found = [topic.name for one in opened for topic in one.topics.all.values() if topic.definition]
+        hint = f"say TOPIC.FIELD; topics: {listed(found)}" if found else "it has no topic of ROS 2 messages"
+        raise InvalidInput([Finding("PLOT001", "these logs have nothing that is shown by itself", hint=hint)])
+    panels = _Panels()
+    for one in opened:
+        for number, group in enumerate(asked):
+            one.read(group, number, panels, first, last)
+    shown = panels.all()
+    if not shown:
+        raise InvalidInput([Finding("PLOT004", f"there is no value of {listed(words)} in that time")])
+    steps = next((one.steps for one in opened if one.steps), ())
+    ends = [one.duration for one in opened]
+    return Chart(
+        title=", ".join(one.name for one in opened),
+        panels=shown,
+        steps=steps,
+        start=max(first, 0.0),
+        end=min(last, max(ends)) if max(ends) > max(first, 0.0) else max(first, 0.0) + 1.0,
+        notes=tuple(f"{one.name}: {one.topics.lost}" for one in opened if one.topics.lost is not None),
+    )
+
+
+def field_lines(path: Path) -> tuple[FieldLine, ...]:
+    """Everything in a log that can be plotted.
+
+    Raises:
+        InvalidInput: it cannot be read.
+    """
+    one = _Log(path, path.name)
+    lines = []
+    for topic in one.topics.all.values():
+        if topic.definition and topic.count:
+            message = one.message(topic)
+            lines += [
+                FieldLine(f"{topic.name.strip('/')}.{_short(message, name.split('.'))}", topic.type, topic.count)
+                for name in numbers(message)
+            ]
+    return tuple(lines)
+
+
+class _Panels:
+    """Panels on their way, by the word that asks for them, the field, and the unit."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[int, str, str], list[Curve]] = {}
+        self._heads: dict[tuple[int, str, str], tuple[str, str]] = {}
+        self._count = 0
+
+    def add(self, number: int, field: str, quantity: str, title: str, unit: str, curve: Curve) -> None:
+        self._count += 1
+        if self._count > MAX_CURVES:
+            raise InvalidInput(
+                [
+                    Finding(
+                        "PLOT005", f"these are more than {MAX_CURVES} curves", hint="say which in brackets: [joint_1]"
+                    )
+                ]
+            )
+        key = (number, field, unit)
+        self._heads.setdefault(key, (title, quantity))
+        self._found.setdefault(key, []).append(curve)
+
+    def all(self) -> tuple[Panel, ...]:
+        order = sorted(self._found, key=lambda key: key[0])
+        return tuple(Panel(*self._heads[key], key[2], tuple(self._found[key])) for key in order)
+
+
+class _Log:
+    """One log that is plotted."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.path = path
+        self.name = name
+        self.topics: Topics = open_topics(path)
+        self._messages: dict[str, Message] = {}
+        self._joints: JointUnits | None = None
+        self.steps = _steps(path)
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return (self.topics.end - self.topics.start) / 1e9
+
+    def message(self, topic: Topic) -> Message:
+        """The type of a topic.
+
+        Raises:
+            InvalidInput: its schema cannot be read.
+        """
+        if topic.name not in self._messages:
+            if not topic.definition:
+                message = (
+                    f"{topic.name} is written as {topic.encoding or 'nothing known'}, not as ROS 2 CDR with ros2msg"
+                )
+                raise self._refused("PLOT006", message)
+            try:
+                self._messages[topic.name] = read_definition(topic.type, topic.definition)
+            except UnknownDefinition as error:
+                raise self._refused("PLOT006", f"{topic.name}: the definition of {topic.type}: {error}") from error
+        return self._messages[topic.name]
+
+    def read(self, group: Sequence[str], number: int, panels: _Panels, start: float, end: float) -> None:
+        """The curves of one word of the command line.
+
+        Raises:
+            InvalidInput: a field is not there.
+        """
+        wanted: list[Wanted] = []
+        names: list[FieldName] = []
+        for text in group:
+            try:
+                name = parse_field(text)
+                topic = self._topic(name)
+                message = self.message(topic)
+                found = ways(message, name)
+            except UnknownField as error:
+                raise self._refused("PLOT002", str(error), error.hint) from error
+            wanted += [Wanted(topic.name, message, way) for way in found]
+            names += [name] * len(found)
+        everything = read_series(self.topics, wanted, start=start, end=end)
+        for one, name, series in zip(wanted, names, everything, strict=True):
+            if not series:
+                self._explain(one, name)
+            for each in series:
+                self._curve(one, each, number, panels, several=len(group) > 1)
+
+    def _curve(self, one: Wanted, each: Series, number: int, panels: _Panels, *, several: bool) -> None:
+        field = f"{one.topic.strip('/')}.{_short(one.message, [part.name for part in one.way.parts])}"
+        unit = unit_of(one.way, each.label, self._known_joints())
+        label = each.label.replace("+", " – ").replace("robot/", "")
+        if several:
+            label = f"{field} {label}".strip()
+        name = f"{field}[{each.label}]" if each.label else field
+        quantity = one.way.parts[-1].name
+        if len(quantity) == 1 and len(one.way.parts) > 1:
+            quantity = f"{one.way.parts[-2].name} {quantity}"
+        curve = Curve(name, label, self.name, each.times, each.values, each.held)
+        # Words with commas between share a panel, whatever they are of, as long as the unit is the same.
+        panels.add(number, "" if several else field, quantity, "" if several else field, unit, curve)
+
+    def _topic(self, name: FieldName) -> Topic:
+        topic = self.topics.all.get(name.topic)
+        if topic is None:
+            known = [one.strip("/") for one in self.topics.all]
+            hint = did_you_mean(name.topic.strip("/"), known, kind="topics")
+            raise UnknownField(f"{name.text}: the log has no topic '{name.topic}'", hint)
+        return topic
+
+    def _explain(self, one: Wanted, name: FieldName) -> None:
+        """Raises where the elements that were asked for are never there; a topic without messages is no mistake."""
+        keys = [part.key for part in one.way.parts if part.key is not None]
+        if not keys or not self.topics.all[one.topic].count:
+            return
+        bare = Way(tuple(Part(part.name) for part in one.way.parts), one.way.holder, one.way.many, one.way.is_time)
+        ((known),) = read_series(self.topics, [Wanted(one.topic, one.message, bare)])
+        labels = dict.fromkeys(word for series in known for word in (series.label, *series.label.split("+")))
+        words = [word for key in keys for word in key.words]
+        if not any(word in labels or set(word.split("+")) <= set(labels) for word in words):
+            hint = did_you_mean(words[0], labels, kind="there are")
+            raise self._refused("PLOT002", f"{name.text}: there is no '{shorten(', '.join(words))}' in it", hint)
+
+    def _known_joints(self) -> JointUnits:
+        if self._joints is None:
+            self._joints = joint_units(self._description())
+        return self._joints
+
+    def _description(self) -> bytes:
+        topic = self.topics.all.get(ROBOT_DESCRIPTION)
+        if topic is not None and topic.definition:
+            for _, data, places in self.topics.messages({ROBOT_DESCRIPTION}):
+                start, length = int(places.starts[0]), int(places.lengths[0])
+                try:
+                    return CdrReader(memoryview(data)[start : start + length]).text().encode()
+                except CdrError:
+                    return b""
+        return b""
+
+    def _refused(self, code: str, message: str, hint: str | None = None) -> InvalidInput:
+        return InvalidInput([Finding(code, message, Place(str(self.path), 0, 0), hint)])
+
+
+def joint_units(urdf: bytes) -> Mapping[str, str]:
+    """Unit of the position of each joint of a description; of none where it is no description."""
+    try:
+        joints = parse_document(urdf, "robot_description").getElementsByTagName("joint") if urdf else []
+    except InvalidInput:
+        return {}
+    units = {"prismatic": "m", "revolute": "rad", "continuous": "rad"}
+    # Those inside a <transmission> have no type.
+    return {
+        one.getAttribute("name"): units[one.getAttribute("type")] for one in joints if one.getAttribute("type") in units
+    }
+
+
+def _steps(path: Path) -> tuple[Interval, ...]:
+    """The steps of a log of manipcli; other logs have none."""
+    try:
+        recording = open_recording(path)
+    except BadRecording:
+        return ()
+    last = max((one.time for one in recording.events), default=0.0)
+    found = step_outcomes(recording, interrupted=False)
+    return tuple(
+        Interval(one.id, one.started, last if one.ended is None else one.ended, one.outcome == "done")
+        for one in found
+        if one.started is not None
+    )
+
+
+def _overview(logs: Sequence[_Log]) -> list[tuple[str, ...]]:
+    """Joints, how far they are from their references, contacts: of what the logs have."""
+    found: dict[str, None] = {}
+    for one in logs:
+        topics = one.topics.all
+        for field in ("position", "velocity", "effort"):
+            if _is(topics, JOINT_STATES, JOINT_STATE):
+                found[f"{JOINT_STATES}.{field}"] = None
+        for name, topic in topics.items():
+            if topic.type == CONTROLLER_STATE and topic.count:
+                found[f"{name}.error.positions"] = None
+        if topics.get(CONTACTS) is not None and topics[CONTACTS].count:
+            found[f"{CONTACTS}.force"] = None
+    # Every log must have what is asked of all.
+    return [(word,) for word in found if all(word.partition(".")[0] in one.topics.all for one in logs)]
+
+
+def _is(topics: Mapping[str, Topic], name: str, kind: str) -> bool:
+    return name in topics and topics[name].type == kind and topics[name].count > 0
+
+
+def _short(message: Message, parts: Sequence[str]) -> str:
+    """Without the first part where the message is one array: it is meant anyway."""
+    arrays = [
+        one.name for one in message.fields if isinstance(one.type, Array) and isinstance(one.type.element, Message)
+    ]
+    return ".".join(parts[1:] if len(parts) > 1 and arrays == [parts[0]] else parts)
+
+
+def _split(word: str) -> Iterator[str]:
+    """At the commas that stand in no brackets."""
+    depth, begin = 0, 0
+    for k, letter in enumerate(word):
+        depth += {"[": 1, "]": -1}.get(letter, 0)
+        if letter == "," and depth == 0:
+            yield word[begin:k]
+            begin = k + 1
+    yield word[begin:]
+
+
+def _time(text: str | None, logs: Sequence[_Log], *, begin: bool) -> float:
+    """[s]"""
+    if text is None:
+        return -math.inf if begin else math.inf
+    for one in logs:
+        for step in one.steps:
+            if step.name == text:
+                return step.start if begin else step.end
+    try:
+        quantity = parse_quantity(text)
+    except UnitError:
+        quantity = None
+    if quantity is not None and quantity.dimension in (NUMBER, TIME):
+        return quantity.value
+    steps = [step.name for one in logs for step in one.steps]
+    hint = did_you_mean(text, steps, kind="steps") or "these logs have no steps"
+    message = f"{'--from' if begin else '--to'}: '{shorten(text)}' is neither a time nor a step"
+    raise InvalidInput([Finding("PLOT003", message, hint=hint)])
+
+
+def _short_names(logs: Sequence[Path]) -> list[str]:
+    """The names of the files without what they end with; with folders where they would be the same."""
+    names = [path.name.removesuffix(".partial").removesuffix(".mcap") for path in logs]
+    if len(set(names)) == len(names):
+        return names
+    names = [str(path) for path in logs]
+    return [name if names.count(name) == 1 else f"{name} #{k + 1}" for k, name in enumerate(names)]

@@ -1,0 +1,192 @@
+"""Numbers of any ROS 2 log over time: every message of a topic through the layout of its type.
+
+Messages that have the same layout are read at once, one numpy index a number; layouts are remembered from chunk to
+chunk, so that a channel whose names never change is walked once.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.record.cdr import CdrError
+from manipcli.record.columns import Int, Places
+from manipcli.record.definition import Message
+from manipcli.record.faults import BadRecording
+from manipcli.record.fields import Way
+from manipcli.record.layout import MAX_LEAVES, Layout, layout
+from manipcli.record.schemas import CONTACTS
+from manipcli.record.topics import Topics
+
+MAX_VALUES = 100_000_000
+"""Of all series together: 800 MB."""
+REMEMBERED = 16
+"""Layouts of one topic that are tried before a message is walked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A field of a topic whose type is known."""
+
+    topic: str
+    message: Message
+    way: Way
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One number over time.
+
+    Attributes:
+        label: the elements of arrays that it belongs to (`joint_1`, `cup`); "" where there is none.
+        times: (T,) [s] since the first message of the log, by log time.
+        values: (T,); NaN where it is not there for a while.
+        held: each value holds until the next.
+    """
+
+    label: str
+    times: Array
+    values: Array
+    held: bool = False
+
+
+def read_series(
+    topics: Topics, wanted: Sequence[Wanted], *, start: float = -np.inf, end: float = np.inf
+) -> list[list[Series]]:
+    """For each field its series, by the order in which they first appear, or by number.
+
+    Args:
+        topics: of the log.
+        wanted: what to read, all of it in one pass over the file.
+        start, end: [s] only what lies between.
+
+    Raises:
+        BadRecording: a message does not fit its type, or there is more than fits into memory.
+    """
+    gathered = [_Gathered(one.way, one.message, held=topics.all[one.topic].type == CONTACTS) for one in wanted]
+    of: dict[str, list[_Gathered]] = {}
+    for one, into in zip(wanted, gathered, strict=True):
+        of.setdefault(one.topic, []).append(into)
+    begin = topics.start
+    total = 0
+    for topic, data, places in topics.messages(of):
+        seconds = (places.times - begin) / 1e9
+        inside = (seconds >= start) & (seconds <= end)
+        if not inside.any():
+            continue
+        kept = Places(places.times[inside], places.starts[inside], places.lengths[inside])
+        for into in of[topic]:
+            try:
+                total += into.add(data, kept, seconds[inside])
+            except CdrError as error:
+                raise BadRecording(topics.path, f"{topic}: a message of {into.type} {error}") from error
+        if total > MAX_VALUES:
+            raise BadRecording(
+                topics.path,
+                f"there are more than {MAX_VALUES} numbers",
+                hint="ask for fewer fields, or for a part of the time with --from and --to",
+            )
+    return [into.series() for into in gathered]
+
+
+class _Gathered:
+    """The series of one field on their way."""
+
+    def __init__(self, way: Way, message: Message, *, held: bool) -> None:
+        self._way = way
+        self._message = message
+        self._held = held
+        self._layouts: deque[tuple[int, Layout, Int, bytes]] = deque(maxlen=REMEMBERED)
+        self._parts: dict[str, list[tuple[Array, Array]]] = {}
+        self._seen: list[Array] = []
+
+    @property
+    def type(self) -> str:
+        return self._message.name
+
+    def add(self, data: bytes, places: Places, seconds: Array) -> int:
+        """Messages of one stretch; how many numbers they hold."""
+        rest = np.arange(len(seconds))
+        added = 0
+        if self._held:
+            self._seen.append(seconds)
+        while len(rest):
+            found, alike = self._alike(data, places, rest)
+            for leaf, values in _values(data, places.starts[alike], found):
+                if leaf not in self._parts and len(self._parts) >= MAX_LEAVES:
+                    raise CdrError(f"has more than {MAX_LEAVES} numbers there; say which ones in brackets")
+                self._parts.setdefault(leaf, []).append((seconds[alike], values))
+                added += len(values)
+            rest = np.setdiff1d(rest, alike, assume_unique=True)
+        return added
+
+    def _alike(self, data: bytes, places: Places, rest: Int) -> tuple[Layout, Int]:
+        """A layout, and those of the messages `rest` that have it, the first among them."""
+        first = int(rest[0])
+        start, length = int(places.starts[first]), int(places.lengths[first])
+        message = memoryview(data)[start : start + length]
+        own = np.frombuffer(message, np.uint8)
+        fitting = (one for one in self._layouts if one[0] == length and bytes(own[one[2]]) == one[3])
+        found = next(fitting, None)
+        if found is None:
+            made = layout(self._message, self._way.parts, message)
+            at = np.array(made.guards, dtype=np.int64)
+            found = (length, made, at, bytes(own[at]))
+            self._layouts.appendleft(found)
+        _, known, guards, letters = found
+        same = rest[places.lengths[rest] == length]
+        if len(guards):
+            bytes_of = np.frombuffer(data, np.uint8)
+            wanted = np.frombuffer(letters, np.uint8)
+            # A few megabytes at a time.
+            step = max(1, (1 << 22) // len(guards))
+            fits = [
+                (bytes_of[places.starts[some][:, None] + guards] == wanted).all(axis=1)
+                for some in (same[k : k + step] for k in range(0, len(same), step))
+            ]
+            same = same[np.concatenate(fits)]
+        return known, same
+
+    def series(self) -> list[Series]:
+        """What was gathered."""
+        labels = list(self._parts)
+        if all(label.isdecimal() for label in labels):
+            labels.sort(key=int)
+        return [self._one(label) for label in labels]
+
+    def _one(self, label: str) -> Series:
+        times, values = (np.concatenate(column) for column in zip(*self._parts[label], strict=True))
+        order = np.argsort(times, kind="stable")
+        times, values = times[order], values[order]
+        if self._held:
+            # Each message says all that touches: who is not in it touches no more.
+            every = np.unique(np.concatenate(self._seen))
+            whole = np.full(len(every), np.nan)
+            whole[np.searchsorted(every, times)] = values
+            times, values = every, whole
+        return Series(label, frozen(times), frozen(values), self._held)
+
+
+def _values(data: bytes, starts: Int, found: Layout) -> list[tuple[str, Array]]:
+    """The numbers of messages that begin at `starts`, each with its label; what has a label twice is numbered."""
+    result: list[tuple[str, Array]] = []
+    used: dict[str, int] = {}
+    for leaf in found.leaves:
+        values = _numbers(data, starts + leaf.offset, leaf.code)
+        if leaf.time:
+            values = values + _numbers(data, starts + leaf.offset + 4, "<u4") / 1e9
+        used[leaf.label] = used.get(leaf.label, 0) + 1
+        label = leaf.label if used[leaf.label] == 1 else f"{leaf.label} #{used[leaf.label]}"
+        result.append((label, values))
+    return result
+
+
+def _numbers(data: bytes, at: Int, code: str) -> Array:
+    """(T,) the numbers that begin at these bytes."""
+    kind = np.dtype(code)
+    every = np.ndarray((len(data) - kind.itemsize + 1,), dtype=kind, buffer=data, strides=(1,))
+    return every[at].astype(np.float64)

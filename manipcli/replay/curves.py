@@ -1,0 +1,155 @@
+"""Curves as they are drawn: panels over one axis of time, the steps behind them. Knows no log and no library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.replay.playback import PlotTable
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One number over time.
+
+    Attributes:
+        name: as a user writes it, `joint_states.position[joint_1]`.
+        label: what tells it from the others of its panel, `joint_1`.
+        log: which log it is from; "" where there is one only.
+        times: (T,) [s].
+        values: (T,) in the unit of the panel; NaN where there is none.
+        held: each value holds until the next, so that it is drawn as stairs.
+    """
+
+    name: str
+    label: str
+    log: str
+    times: Array
+    values: Array
+    held: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Curves with one axis of values. `quantity` and `unit` name it, `title` says where they are from."""
+
+    title: str
+    quantity: str
+    unit: str
+    curves: tuple[Curve, ...]
+
+    @property
+    def axis(self) -> str:
+        """`position [rad]`."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+    @property
+    def title_with_label(self) -> str:
+        """With the label in brackets where there is one only."""
+        only = self.labels[0] if len(self.labels) == 1 else ""
+        return f"{self.title}[{only}]" if only and self.title != only else self.title
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Each once."""
+        return tuple(dict.fromkeys(curve.label for curve in self.curves))
+
+    @property
+    def logs(self) -> tuple[str, ...]:
+        """Each once."""
+        return tuple(dict.fromkeys(curve.log for curve in self.curves))
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A step, from `start` to `end` [s]; `done` where it went as it should."""
+
+    name: str
+    start: float
+    end: float
+    done: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Everything that is drawn on one sheet.
+
+    Attributes:
+        title: of the whole.
+        panels: from top to bottom, at least one.
+        steps: behind all panels.
+        start, end: of the axis of time [s].
+        notes: what else there is to say, a sentence each.
+    """
+
+    title: str
+    panels: tuple[Panel, ...]
+    steps: tuple[Interval, ...]
+    start: float
+    end: float
+    notes: tuple[str, ...] = ()
+
+
+def table_panels(table: PlotTable) -> tuple[Panel, ...]:
+    """A table as panels, one a unit."""
+    panels = []
+    for unit in dict.fromkeys(table.units):
+        curves = tuple(
+            Curve(f"{table.name}[{name}]", name, "", table.times, table.values[:, k])
+            for k, (name, its) in enumerate(zip(table.columns, table.units, strict=True))
+            if its == unit
+        )
+        panels.append(Panel(table.name, table.name, unit, curves))
+    return tuple(panels)
+
+
+def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array, Array]:
+    """Few points that draw the same line: of each column of a picture the first, lowest, highest and last.
+
+    Args:
+        curve: any.
+        start, end: what the columns cover [s].
+        columns: how many there are.
+
+    Returns:
+        Times and values; a gap (NaN) stays one, and a value that is held stays until the end.
+    """
+    times, values = curve.times, curve.values
+    if curve.held and len(times) and times[-1] < end:
+        times, values = np.append(times, end), np.append(values, values[-1])
+    if len(times) <= 4 * columns or end <= start:
+        return times, values
+    column = np.clip(((times - start) / (end - start) * columns).astype(np.int64), -1, columns)
+    begins = np.flatnonzero(np.diff(column, prepend=column[0] - 1)).tolist()
+    kept: set[int] = set()
+    for first, stop in zip(begins, [*begins[1:], len(times)], strict=True):
+        # Of numbers with a NaN among them, argmin and argmax are the NaN.
+        lowest, highest = int(values[first:stop].argmin()), int(values[first:stop].argmax())
+        kept.update((first, first + lowest, first + highest, stop - 1))
+    order = np.array(sorted(kept))
+    return times[order], values[order]
+
+
+def span_of(curves: Iterable[Curve]) -> tuple[float, float]:
+    """Lowest and highest value; 0 and 1 where there is none."""
+    finite = [values for curve in curves if len(values := curve.values[np.isfinite(curve.values)])]
+    if not finite:
+        return 0.0, 1.0
+    return min(float(v.min()) for v in finite), max(float(v.max()) for v in finite)
+
+
+def ticks(low: float, high: float, most: int) -> Sequence[float]:
+    """At most `most` round numbers (1, 2 or 5 times a power of ten apart) from low to high."""
+    if not high > low:
+        return [low]
+    raw = (high - low) / max(most, 1)
+    power = 10.0 ** np.floor(np.log10(raw))
+    for factor in (1.0, 2.0, 5.0, 10.0, 20.0):
+        step = factor * power
+        first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+        if last - first + 1 <= most:
+            return [float(step * k) for k in np.arange(first, last + 1)]
+    return [low]

@@ -1,0 +1,195 @@
+"""Curves as a figure in a file: SVG, PNG or PDF, the same bytes every time. No window, no display."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Literal
+
+from manipcli.replay.curves import Chart, Interval, Panel, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Kind = Literal["svg", "png", "pdf"]
+KINDS: tuple[Kind, ...] = ("svg", "png", "pdf")
+
+WIDTH = 10.0
+"""[inch] of a figure."""
+HEIGHT = 2.3
+"""[inch] of a panel; a single one is twice as high."""
+DPI = 120
+COLUMNS = 2400
+"""Of a curve, more than any screen shows."""
+INK, FAINT = "#1e242c", "#6b7684"
+GRID = "#dfe4ea"
+BANDS = ("#f1f4f8", "#e6ebf2")
+FAILED = "#fbe3e0"
+# Ten that are told apart well, also by most who are colour-blind, then the same once more, lighter.
+COLOURS = (
+    "#2f6fb0", "#e07b28", "#3a9a5b", "#c8403f", "#7d5ba6", "#8a5a44", "#d26aa8", "#5f6b7a", "#a89a1d", "#27a3b4",
+    "#8fb8e0", "#f4bd8d", "#97d0aa", "#ea9f9e", "#bfabd8", "#c4a596", "#eab6d5", "#b3bcc7", "#d8ce73", "#8fd3dc",
+)  # fmt: skip
+DASHES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
+MOST_NAMED = 24
+"""Curves in one legend: beyond, it would be higher than its panel."""
+
+
+def render(chart: Chart, kind: Kind) -> bytes:
+    """The file of a chart."""
+    import matplotlib
+
+    stream = BytesIO()
+    # No date: the same chart is the same bytes.
+    metadata: dict[Kind, dict[str, str | None]] = {
+        "svg": {"Date": None, "Creator": "manipcli"},
+        "pdf": {"CreationDate": None, "Creator": "manipcli", "Producer": None},
+        "png": {"Software": "manipcli"},
+    }
+    style = matplotlib.rc_context(
+        {
+            "font.family": "DejaVu Sans",
+            "font.size": 9.0,
+            "axes.edgecolor": FAINT,
+            "axes.labelcolor": INK,
+            "axes.linewidth": 0.8,
+            "text.color": INK,
+            "text.parse_math": False,
+            "xtick.color": FAINT,
+            "ytick.color": FAINT,
+            "xtick.labelcolor": INK,
+            "ytick.labelcolor": INK,
+            "axes.formatter.useoffset": False,
+            "svg.fonttype": "path",
+            "svg.hashsalt": "manipcli",
+            "pdf.fonttype": 42,
+        }
+    )
+    with style:
+        _figure(chart).savefig(stream, format=kind, dpi=DPI, metadata=metadata[kind])
+    return stream.getvalue()
+
+
+def _figure(chart: Chart) -> Figure:
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    count = len(chart.panels)
+    height = HEIGHT * count if count > 1 else 2.0 * HEIGHT
+    figure = Figure(figsize=(WIDTH, height + 0.9), layout=ConstrainedLayoutEngine(h_pad=0.06, w_pad=0.08))
+    figure.suptitle(chart.title, x=0.01, ha="left", fontsize=12.0, fontweight="bold")
+    axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+    colours = _colours(chart)
+    before: object = None
+    for place, panel, of in zip(axes, chart.panels, colours, strict=True):
+        _panel(place, chart, panel, of)
+        named = (panel.labels if len(panel.labels) > 1 else (), panel.logs)
+        if named != before and len(panel.curves) > 1:
+            _legend(place, panel, of)
+        before = named
+    figure.align_ylabels(list(axes))
+    _step_names(axes[0], chart)
+    axes[-1].set_xlim(chart.start, chart.end)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _colours(chart: Chart) -> list[dict[tuple[str, str], str]]:
+    """For each panel the colour of (label, log): of each label the same in all panels; of one label, of each log."""
+    of: dict[str, str] = {}
+    found = []
+    for panel in chart.panels:
+        if len(panel.labels) == 1:
+            keys = {(panel.labels[0], log): COLOURS[k % len(COLOURS)] for k, log in enumerate(panel.logs)}
+            found.append(keys)
+            continue
+        fresh = [label for label in panel.labels if label not in of]
+        # Things of another kind begin with the first colour again.
+        first = 0 if len(fresh) == len(panel.labels) else len(of)
+        of.update((label, COLOURS[(first + k) % len(COLOURS)]) for k, label in enumerate(fresh))
+        found.append({(one.label, one.log): of[one.label] for one in panel.curves})
+    return found
+
+
+def _panel(place: Axes, chart: Chart, panel: Panel, colours: dict[tuple[str, str], str]) -> None:
+    for k, step in enumerate(chart.steps):
+        shade = BANDS[k % 2] if step.done else FAILED
+        place.axvspan(step.start, step.end, facecolor=shade, edgecolor="none", zorder=0.5)
+    place.grid(visible=True, color=GRID, linewidth=0.6)
+    place.set_axisbelow(True)
+    for side in ("top", "right"):
+        place.spines[side].set_visible(False)
+    logs = panel.logs
+    for curve in panel.curves:
+        times, values = thinned(curve, chart.start, chart.end, COLUMNS)
+        place.plot(
+            times,
+            values,
+            color=colours[curve.label, curve.log],
+            linestyle=DASHES[logs.index(curve.log) % len(DASHES)],
+            linewidth=1.2,
+            drawstyle="steps-post" if curve.held else "default",
+            marker="." if len(times) < 3 else None,
+        )
+    place.set_ylabel(panel.axis)
+    place.set_title(panel.title_with_label, loc="left", fontsize=8.5, color=FAINT, pad=3.0)
+    place.margins(y=0.08)
+
+
+def _legend(place: Axes, panel: Panel, colours: dict[tuple[str, str], str]) -> None:
+    from matplotlib.lines import Line2D
+
+    logs, labels = panel.logs, panel.labels
+    handles = []
+    if len(labels) > 1:
+        for label in labels[:MOST_NAMED]:
+            colour = next(colours[curve.label, curve.log] for curve in panel.curves if curve.label == label)
+            handles.append(Line2D([], [], color=colour, linewidth=1.6, label=label))
+        if len(labels) > MOST_NAMED:
+            handles.append(Line2D([], [], linestyle="none", label=f"and {len(labels) - MOST_NAMED} more"))
+    if len(logs) > 1:
+        for k, log in enumerate(logs):
+            colour = FAINT if len(labels) > 1 else colours[labels[0], log]
+            dash = DASHES[k % len(DASHES)]
+            handles.append(Line2D([], [], color=colour, linestyle=dash, linewidth=1.6, label=log))
+    place.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(1.005, 1.02),
+        borderaxespad=0.0,
+        frameon=False,
+        fontsize=7.5,
+        ncols=1 + (len(handles) > 12),
+        handlelength=1.4,
+        columnspacing=1.0,
+        labelspacing=0.25,
+    )
+
+
+def _step_names(place: Axes, chart: Chart) -> None:
+    """Above the first panel, each in its own stretch; turned where it is too short for its name."""
+    width = max(chart.end - chart.start, 1e-9)
+    for step in chart.steps:
+        start, end = max(step.start, chart.start), min(step.end, chart.end)
+        if end <= start:
+            continue
+        # [characters] that fit along the stretch, at about 150 on the whole width.
+        fits = len(step.name) <= (end - start) / width * 130.0
+        place.annotate(
+            _shown(step),
+            xy=((start + end) / 2.0, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0.0, 14.0),
+            textcoords="offset points",
+            ha="center" if fits else "left",
+            va="bottom",
+            rotation=0.0 if fits else 45.0,
+            rotation_mode="anchor",
+            fontsize=8.0,
+            color=INK if step.done else "#b3261e",
+            annotation_clip=False,
+        )
+
+
+def _shown(step: Interval) -> str:
+    return step.name if step.done else f"✗ {step.name}"

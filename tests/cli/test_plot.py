@@ -1,0 +1,110 @@
+"""`manipcli plot`: what it draws and writes, and what it says when it cannot."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from manipcli.cli.app import main
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run without physics: half a second of a move and a wait."""
+    folder = tmp_path_factory.mktemp("plot")
+    path = folder / "home.mcap"
+    words = ["run", str(ROOT / "tasks" / "home.yaml"), "--log", str(path), "--set", "simulation.engine=kinematic", "-q"]
+    assert main(words) in (0, 1)
+    return path
+
+
+def test_an_overview_comes_to_the_terminal(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(log)]) == 0
+    told = capsys.readouterr()
+    for word in ("joint_states.position  [rad]", "joint_states.effort", "error.positions", "joint_1"):
+        assert word in told.out
+    assert told.err == ""
+    assert "\x1b" not in told.out
+
+
+def test_a_table_to_stdout_and_to_a_file_is_the_same(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plot", str(log), "joint_states.position[joint_1,joint_4]", "--from", "0.1", "--to", "200 ms"]
+    assert main([*words, "--csv", "-"]) == 0
+    out = capsys.readouterr().out
+    assert main([*words, "--csv", str(tmp_path / "a.csv")]) == 0
+    assert (tmp_path / "a.csv").read_text() == out
+    head, *rows = csv.reader(out.splitlines())
+    assert head == ["time", "joint_states.position[joint_1]", "joint_states.position[joint_4]"]
+    assert (float(rows[0][0]), float(rows[-1][0])) == (0.1, 0.2)
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf", "PNG"])
+def test_a_figure_goes_to_a_file(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], ending: str) -> None:
+    path = tmp_path / f"a.{ending}"
+    path.write_bytes(b"old")
+    assert main(["plot", str(log), "joint_states.velocity", "-o", str(path)]) == 0
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", f"drawn: {path}\n")
+    assert path.stat().st_size > 5000
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+
+
+def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cut = tmp_path / "other.mcap.partial"
+    cut.write_bytes(log.read_bytes()[: log.stat().st_size * 4 // 5])
+    assert main(["plot", str(log), str(cut), "joint_states.position[joint_4]", "--csv", "-"]) == 0
+    told = capsys.readouterr()
+    assert "note: other: it was not finished" in told.err
+    assert {row.partition(",")[0] for row in told.out.splitlines()} == {"log", "home", "other"}
+
+
+def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(log), "--fields"]) == 0
+    out = capsys.readouterr().out
+    fields = [line.split()[0] for line in out.splitlines()[1:]]
+    assert "joint_states.position" in fields
+    assert "tf.transform.translation.x" in fields
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (["joint_state.position"], "PLOT002", "did you mean 'joint_states'?"),
+        (["joint_states.positions"], "PLOT002", "did you mean 'position'?"),
+        (["joint_states.position[jiont_1]"], "PLOT002", "did you mean 'joint_1'?"),
+        (["--from", "move_9"], "PLOT003", "neither a time nor a step"),
+        (["--from", "2 m"], "PLOT003", "neither a time nor a step"),
+        (["--from", "0.3", "--to", "0.2"], "PLOT003", "nothing lies between"),
+        (["joint_states.position", "--from", "500"], "PLOT004", "no value"),
+        (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
+        (["-o", "absent/a.svg"], "USE003", "'absent/a.svg': No such file or directory"),
+        (["gone.mcap"], "LOG300", "No such file"),
+    ],
+)
+def test_what_cannot_be_plotted_is_refused(
+    log: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    code: str,
+    says: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(log), *words]) == 4
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert f"error[{code}]" in told.err
+    assert says in told.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_log_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", "joint_states.position"]) == 4
+    assert "error[USE060]: no log is given" in capsys.readouterr().err

@@ -1,0 +1,259 @@
+"""Numbers over time from any ROS 2 log: the same that rosbags reads, and bounds on what a log may ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from manipcli.record.definition import read_definition
+from manipcli.record.faults import BadRecording
+from manipcli.record.fields import UnknownField, parse_field, ways
+from manipcli.record.series import Series, Wanted, read_series
+from manipcli.record.topics import open_topics
+from manipcli.record.units import unit_of
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = STORE.types
+MakeRun = Callable[[int], Any]
+
+
+def series(path: Path, text: str, **between: float) -> dict[str, Series]:
+    """The series of one field by their labels."""
+    topics, name = open_topics(path), parse_field(text)
+    topic = topics.all[name.topic]
+    message = read_definition(topic.type, topic.definition)
+    found = ways(message, name)
+    assert len(found) == 1
+    ((every),) = read_series(topics, [Wanted(topic.name, message, found[0])], **between)
+    return {one.label: one for one in every}
+
+
+def write(
+    path: Path, messages: Iterable[tuple[int, str, str, Any]], *, chunked: bool = True, store: Any = STORE
+) -> Path:
+    """A log as another ROS 2 program writes it: (time [ns], topic, type, message or its bytes)."""
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=chunked, chunk_size=4096, compression=CompressionType.LZ4)
+        writer.start(profile="ros2", library="somebody")
+        channels: dict[str, int] = {}
+        for ns, topic, kind, message in messages:
+            if topic not in channels:
+                text, _ = store.generate_msgdef(kind, ros_version=2)
+                schema = writer.register_schema(kind, "ros2msg", text.encode())
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            data = message if isinstance(message, bytes) else bytes(store.serialize_cdr(message, kind))
+            writer.add_message(channels[topic], ns, data, ns)
+        writer.finish()
+    return path
+
+
+def header(ns: int) -> Any:
+    stamp = TYPES["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+    return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+
+
+def joint_state(ns: int, names: list[str], position: list[float]) -> Any:
+    none = np.zeros(0)
+    kind = TYPES["sensor_msgs/msg/JointState"]
+    return kind(header=header(ns), name=names, position=np.array(position), velocity=none, effort=none)
+
+
+@pytest.fixture
+def log(tmp_path: Path, make_run: MakeRun) -> Path:
+    path: Path = make_run(703).write(tmp_path / "run.mcap")
+    return path
+
+
+def by_rosbags(path: Path, topic: str) -> list[tuple[float, Any]]:
+    store = get_typestore(Stores.EMPTY)
+    reader = McapReader(path)
+    reader.open()
+    mine = [one for one in reader.connections if one.topic == topic]
+    store.register(get_types_from_msg(mine[0].msgdef.data, mine[0].msgtype))
+    found = [(time / 1e9, store.deserialize_cdr(raw, c.msgtype)) for c, time, raw in reader.messages(mine)]
+    reader.close()
+    return found
+
+
+def test_joints_are_the_numbers_that_rosbags_reads(log: Path) -> None:
+    for field, take in (("position", lambda m: m.position), ("velocity", lambda m: m.velocity)):
+        ours = series(log, f"joint_states.{field}")
+        theirs = by_rosbags(log, "/joint_states")
+        assert list(ours) == list(theirs[0][1].name)
+        for k, one in enumerate(ours.values()):
+            assert one.times.tolist() == [time for time, _ in theirs]
+            assert one.values.tolist() == [take(message)[k] for _, message in theirs]
+
+
+def test_names_of_joints_stand_above_the_points_of_a_controller(log: Path) -> None:
+    ours = series(log, "arm/controller_state.reference.positions[slide]")
+    theirs = by_rosbags(log, "/arm/controller_state")
+    k = theirs[0][1].joint_names.index("slide")
+    assert list(ours) == ["slide"]
+    assert ours["slide"].values.tolist() == [message.reference.positions[k] for _, message in theirs]
+
+
+def test_an_element_is_found_by_its_name_and_fields_below_it_without_their_way(log: Path) -> None:
+    ours = series(log, "tf[cup].translation.z")
+    theirs = [
+        one.transform.translation.z
+        for _, message in by_rosbags(log, "/tf")
+        for one in message.transforms
+        if one.child_frame_id == "cup"
+    ]
+    assert ours["cup"].values.tolist() == theirs
+    assert series(log, "tf.transforms[cup].transform.translation.z")["cup"].values.tolist() == theirs
+    assert series(log, "tf.translation.z[cup]")["cup"].values.tolist() == theirs
+
+
+def test_who_touches_no_more_has_no_value(log: Path) -> None:
+    ours = series(log, "contacts.force")
+    theirs = by_rosbags(log, "/contacts")
+    assert set(ours) == {"cup+robot/wheel", "ball+cup"}
+    for label, one in ours.items():
+        expected = [
+            next(
+                (contact.force for contact in message.contacts if {contact.a, contact.b} == set(label.split("+"))), None
+            )
+            for _, message in theirs
+        ]
+        assert [None if np.isnan(value) else value for value in one.values.tolist()] == expected
+        assert None in expected
+    assert list(series(log, "contacts.force[cup+ball]")) == ["ball+cup"]
+    assert set(series(log, "contacts[cup].force")) == set(ours)
+
+
+def test_only_the_asked_time_is_read(log: Path) -> None:
+    whole = series(log, "joint_states.position[spin]")["spin"]
+    part = series(log, "joint_states.position[spin]", start=0.1, end=0.2)["spin"]
+    inside = (whole.times >= 0.1) & (whole.times <= 0.2)
+    assert part.values.tolist() == whole.values[inside].tolist()
+    assert 0 < len(part.values) < len(whole.values)
+
+
+def test_a_log_without_its_end_is_read_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:
+    whole = series(log, "joint_states.position[spin]")["spin"]
+    cut = tmp_path / "cut.mcap.partial"
+    cut.write_bytes(log.read_bytes()[: log.stat().st_size * 17 // 20])
+    assert open_topics(cut).lost is not None
+    part = series(cut, "joint_states.position[spin]")["spin"]
+    assert 0 < len(part.values) < len(whole.values)
+    assert part.values.tolist() == whole.values[: len(part.values)].tolist()
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_joints_that_come_in_another_order_each_time_keep_their_names(tmp_path: Path, chunked: bool) -> None:
+    rng = np.random.default_rng(3)
+    names = ["aa", "bb", "cc"]
+    messages, expected = [], []
+    for k in range(300):
+        order = rng.permutation(3)
+        values = rng.normal(size=3)
+        # Same length, other names: only the letters say which number is whose.
+        message = joint_state(k, [names[j] for j in order], [values[j] for j in order])
+        messages.append((5 * 10**9 + k * 10**7, "/robot/joint_states", "sensor_msgs/msg/JointState", message))
+        expected.append(values)
+    path = write(tmp_path / "log.mcap", messages, chunked=chunked)
+    ours = series(path, "robot/joint_states.position")
+    assert set(ours) == set(names)
+    for k, name in enumerate(names):
+        assert ours[name].values.tolist() == [values[k] for values in expected]
+        assert ours[name].times[:3].tolist() == [0.0, 0.01, 0.02]  # since the first message
+
+
+def test_other_types_of_ros_are_read_by_their_schema_alone(tmp_path: Path) -> None:
+    vector = TYPES["geometry_msgs/msg/Vector3"]
+    wrench = TYPES["geometry_msgs/msg/Wrench"]
+    kind = TYPES["geometry_msgs/msg/WrenchStamped"]
+    image = TYPES["sensor_msgs/msg/Image"]
+    messages = []
+    for k in range(20):
+        ns = 10**18 + k * 10**8
+        sample = wrench(force=vector(x=k, y=-k, z=0.5), torque=vector(x=0.1 * k, y=0, z=1))
+        messages.append((ns, "/wrench", "geometry_msgs/msg/WrenchStamped", kind(header=header(ns), wrench=sample)))
+        pixels = np.arange(6000, dtype=np.uint8) + k
+        shot = image(header=header(ns), height=60, width=100, encoding="mono8", is_bigendian=0, step=100, data=pixels)
+        messages.append((ns, "/camera", "sensor_msgs/msg/Image", shot))
+    path = write(tmp_path / "log.mcap", messages)
+    assert series(path, "wrench.force.y")[""].values.tolist() == [-float(k) for k in range(20)]
+    stamps = series(path, "wrench.header.stamp")[""].values
+    assert stamps == pytest.approx(1e9 + 0.1 * np.arange(20))
+    assert series(path, "camera.height")[""].values.tolist() == [60.0] * 20
+    assert series(path, "camera.data[-1]")["5999"].values.tolist() == [(5999 + k) % 256 for k in range(20)]
+    with pytest.raises(BadRecording, match="in brackets"):
+        series(path, "camera.data")
+
+
+def test_bytes_that_are_not_what_the_schema_says_are_refused(tmp_path: Path) -> None:
+    good = bytes(STORE.serialize_cdr(joint_state(0, ["a"], [1.0]), "sensor_msgs/msg/JointState"))
+    # Header: stamp 8, length 4, "base" and NUL 5, padding 3: the number of names is at 24.
+    huge = good[:24] + (2**31).to_bytes(4, "little") + good[28:]
+    for k, damaged in enumerate((good[:30], huge, b"\0\3\0\0" + good[4:], b"")):
+        message = (0, "/joint_states", "sensor_msgs/msg/JointState", damaged)
+        path = write(tmp_path / f"{k}.mcap", [message])
+        with pytest.raises(BadRecording, match=r"/joint_states: a message of sensor_msgs/JointState"):
+            series(path, "joint_states.position")
+
+
+def test_a_message_of_millions_of_parts_is_not_walked_to_its_end(tmp_path: Path) -> None:
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg("p/Nothing[] parts\nfloat64 x", "p/msg/Many"))
+    store.register(get_types_from_msg("", "p/msg/Nothing"))
+    data = b"\0\1\0\0" + (5_000_000).to_bytes(4, "little") + bytes(5_000_008)
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD, chunk_size=1 << 20)
+        writer.start(profile="ros2", library="somebody")
+        text = "p/Nothing[] parts\nfloat64 x\n" + "=" * 80 + "\nMSG: p/Nothing\n"
+        channel = writer.register_channel(
+            "/many", "cdr", writer.register_schema("p/msg/Many", "ros2msg", text.encode())
+        )
+        writer.add_message(channel, 0, data, 0)
+        writer.finish()
+    with pytest.raises(BadRecording, match=r"too many parts|declares"):
+        series(path, "many.x")
+
+
+@pytest.mark.parametrize(
+    ("text", "says", "hint"),
+    [
+        ("joint_states.positon", "no field 'positon'", "did you mean 'position'?"),
+        ("joint_states.position.x", "no field 'x'", "fields"),
+        ("tf.z", "several fields", "translation.z"),
+        ("task/events", "no number", "fields"),
+        ("joint_states.header.stamp[a]", "'stamp' is no array", None),
+        ("", "is no field", "TOPIC.FIELD"),
+        ("tf[", "is no field", "TOPIC.FIELD"),
+        ("tf[].x", "is no field", "TOPIC.FIELD"),
+        ("tf..x", "is no field", "TOPIC.FIELD"),
+    ],
+)
+def test_a_field_that_is_not_there_is_told(log: Path, text: str, says: str, hint: str | None) -> None:
+    with pytest.raises(UnknownField, match=says.replace("[", r"\[")) as told:
+        series(log, text)
+    assert (hint or "") in (told.value.hint or "")
+
+
+def test_units_follow_the_joint_and_the_place(log: Path) -> None:
+    topics = open_topics(log)
+    joints = {"slide": "m", "spin": "rad"}
+
+    def unit(text: str, label: str = "") -> str:
+        name = parse_field(text)
+        topic = topics.all[name.topic]
+        return unit_of(ways(read_definition(topic.type, topic.definition), name)[0], label, joints)
+
+    assert [unit("joint_states.position", one) for one in ("slide", "spin", "other")] == ["m", "rad", ""]
+    assert [unit("joint_states.effort", one) for one in ("slide", "spin")] == ["N", "N m"]
+    assert unit("arm/controller_state.reference.accelerations", "spin") == "rad/s²"
+    assert unit("tf[cup].translation.x") == "m"
+    assert unit("tf[cup].rotation.w") == ""
+    assert unit("contacts.force") == "N"
+    assert unit("joint_states.header.stamp") == "s"

@@ -1,0 +1,185 @@
+"""Curves: thinned without losing what is seen, in a terminal, in a figure, in a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from manipcli.replay import figure, terminal_plot
+from manipcli.replay.curve_table import write_table
+from manipcli.replay.curves import Chart, Curve, Interval, Panel, table_panels, thinned, ticks
+from manipcli.replay.playback import PlotTable
+
+TIMES = np.arange(10_001) / 1000.0
+SINE = Curve("a.b[one]", "one", "", TIMES, np.sin(TIMES))
+LINE = Curve("a.b[two]", "two", "", TIMES, 0.1 * TIMES)
+STEPS = (Interval("pick_1", 0.0, 4.0), Interval("place_1", 4.0, 9.0, done=False))
+CHART = Chart("the run", (Panel("a.b", "position", "rad", (SINE, LINE)),), STEPS, 0.0, 10.0)
+
+
+def test_what_is_left_out_lies_between_what_is_kept() -> None:
+    rng = np.random.default_rng(2)
+    noisy = replace(SINE, values=rng.normal(size=len(TIMES)))
+    times, values = thinned(noisy, 0.0, 10.0, 100)
+    assert len(times) <= 4 * 101
+    for column in range(100):
+        whole = noisy.values[(TIMES / 10.0 * 100).astype(int) == column]
+        part = values[(times / 10.0 * 100).astype(int) == column]
+        assert (part.min(), part.max()) == (whole.min(), whole.max())
+        assert (part[0], part[-1]) == (whole[0], whole[-1])
+
+
+def test_a_gap_stays_a_gap_and_few_points_stay_all() -> None:
+    gap = replace(SINE, values=np.where((TIMES > 3.0) & (TIMES < 3.5), np.nan, SINE.values))
+    times, values = thinned(gap, 0.0, 10.0, 200)
+    assert np.isnan(values[(times > 3.1) & (times < 3.4)]).all()
+    assert np.isfinite(values[(times < 2.9) | (times > 3.6)]).all()
+    assert thinned(SINE, 0.0, 10.0, 100_000)[1] is SINE.values
+
+
+def test_a_value_that_is_held_stays_until_the_end() -> None:
+    held = Curve("c", "", "", np.array([0.0, 1.0]), np.array([2.0, 3.0]), held=True)
+    times, values = thinned(held, 0.0, 10.0, 100)
+    assert (times.tolist(), values.tolist()) == ([0.0, 1.0, 10.0], [2.0, 3.0, 3.0])
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 14.55), (-3.2, 1e-3), (1e6, 1e6 + 1.0), (0.0, 0.0)])
+def test_ticks_are_few_and_round(low: float, high: float) -> None:
+    found = ticks(low, high, 8)
+    assert 1 <= len(found) <= 8
+    assert all(low - 1e-9 <= one <= high + 1e-9 for one in found)
+    if len(found) > 2:
+        apart = np.diff(found)
+        assert apart == pytest.approx(apart[0])
+        assert float(f"{apart[0]:.3g}") / 10.0 ** np.floor(np.log10(apart[0])) in (1.0, 2.0, 5.0)
+
+
+def test_a_table_is_one_panel_a_unit() -> None:
+    table = PlotTable("joint position", ("a", "b", "c"), ("rad", "m", "rad"), TIMES[:3], np.arange(9.0).reshape(3, 3))
+    first, second = table_panels(table)
+    assert (first.axis, first.labels) == ("joint position [rad]", ("a", "c"))
+    assert (second.axis, second.curves[0].values.tolist()) == ("joint position [m]", [1.0, 4.0, 7.0])
+
+
+def _lines(chart: Chart, *, columns: int = 91, colours: bool = True) -> list[str]:
+    return [
+        "".join(piece.text for piece in line) for line in terminal_plot.render(chart, columns=columns, colours=colours)
+    ]
+
+
+def _height(rows: list[str], column: int) -> float:
+    """Where the dots of a column of characters stand, from the top, in rows."""
+    seen = [k for k, row in enumerate(rows) if len(row) > column and row[column] not in " │"]
+    return float(np.mean(seen))
+
+
+def test_the_line_in_the_terminal_goes_where_the_numbers_go() -> None:
+    rows = [line[10:] for line in _lines(replace(CHART, panels=(replace(CHART.panels[0], curves=(SINE,)),)))][3:13]
+    width = 80
+    for time in (0.5, 1.57, 3.14, 4.71, 7.85, 9.5):
+        value = np.sin(time)
+        expected = (1.0 - value) / 2.0 * 9.5
+        assert _height(rows, round(time / 10.0 * (width - 1))) == pytest.approx(expected, abs=1.0)
+
+
+def test_the_terminal_tells_names_ranges_steps_and_what_failed() -> None:
+    text = "\n".join(_lines(CHART))
+    assert "a.b  [rad]" in text
+    assert re.search(r"━━ one +-1 to 1, last -0\.544", text)
+    assert re.search(r"━━ two +0 to 1, last 1", text)
+    assert "▏pick_1" in text
+    assert "▏✗place_1" in text
+    assert max(map(len, text.splitlines())) <= 100
+    colours = {piece.colour for line in terminal_plot.render(CHART, columns=91, colours=True) for piece in line}
+    assert len(colours - {""}) == 2
+    # Without colours each has a field of its own, and no mark.
+    plain = _lines(CHART, colours=False)
+    assert sum("│" in line for line in plain) == 2 * terminal_plot.LOW
+    assert not any("━" in line for line in plain)
+
+
+def test_a_name_cannot_harm_the_terminal() -> None:
+    bad = replace(SINE, label="\x1b[31mred\n")
+    chart = replace(CHART, title="\x1b]0;x\x07", panels=(Panel("t\x1b", "q", "", (bad, LINE)),))
+    assert "\x1b" not in "\n".join(_lines(chart))
+
+
+@pytest.mark.parametrize("columns", [1, 20, 400])
+def test_any_width_will_do(columns: int) -> None:
+    assert _lines(CHART, columns=columns)
+
+
+def test_one_value_and_none_are_drawn_too() -> None:
+    one = Curve("a", "", "", np.array([1.0]), np.array([5.0]))
+    none = Curve("b", "", "", np.array([1.0, 2.0]), np.array([np.nan, np.nan]))
+    chart = replace(CHART, panels=(Panel("a", "a", "", (one,)), Panel("b", "b", "", (none,))))
+    text = "\n".join(_lines(chart))
+    assert "5 to 5, last 5" in text
+    assert "no value" in text
+    assert figure.render(chart, "svg")
+
+
+def test_a_figure_is_the_kind_that_was_asked_for_and_the_same_bytes_each_time() -> None:
+    png = figure.render(CHART, "png")
+    with Image.open(io.BytesIO(png)) as image:
+        assert image.width == round(figure.WIDTH * figure.DPI)
+    assert figure.render(CHART, "pdf").startswith(b"%PDF-1.")
+    assert [figure.render(CHART, kind) for kind in ("svg", "pdf")] == [
+        figure.render(CHART, kind) for kind in ("svg", "pdf")
+    ]
+
+
+def _points(svg: str) -> list[np.ndarray]:
+    """The long lines of a figure, in its own coordinates, y up."""
+    paths = re.findall(r'<path d="([^"]+)"[^>]*clip-path', svg)
+    lines = [np.array(re.findall(r"[ML] ([\d.-]+) ([\d.-]+)", path), dtype=float) * (1.0, -1.0) for path in paths]
+    return [line for line in lines if len(line) > 40]
+
+
+def test_the_line_in_a_figure_has_the_shape_of_the_numbers() -> None:
+    chart = replace(CHART, panels=(Panel("a", "a", "", (SINE,)),))
+    (line,) = _points(figure.render(chart, "svg").decode())
+    # Any axis is a linear map: time to x, value to y.
+    x, y = line[:, 0], line[:, 1]
+    time = 10.0 * (x - x.min()) / np.ptp(x)
+    value = -1.0 + 2.0 * (y - y.min()) / np.ptp(y)
+    assert np.abs(value - np.sin(time)).max() < 0.02
+
+
+def test_a_dollar_in_a_name_is_a_dollar() -> None:
+    chart = replace(CHART, title="$\\frac$", panels=(Panel("$x_", "$", "%", (replace(SINE, label="a$b$"), LINE)),))
+    assert figure.render(chart, "png")
+
+
+def _table(chart: Chart) -> list[list[str]]:
+    stream = io.StringIO()
+    write_table(chart, stream)
+    return list(csv.reader(io.StringIO(stream.getvalue())))
+
+
+def test_a_table_reads_back_to_the_last_bit() -> None:
+    rng = np.random.default_rng(4)
+    times = np.sort(rng.uniform(0.0, 1.0, 50))
+    odd = np.concatenate([rng.normal(size=47) * 10.0 ** rng.integers(-300, 300, 47), [np.nan, np.inf, -0.0]])
+    half = Curve("x.y", "", "", times[::2], odd[::2])
+    head, *rows = _table(replace(CHART, panels=(Panel("p", "p", "", (Curve("a,b", "", "", times, odd), half)),)))
+    assert head == ["time", "a,b", "x.y"]
+    table = np.array([[float(cell) if cell else 0.125 for cell in row] for row in rows])
+    assert table[:, 0].tobytes() == times.tobytes()
+    assert table[:, 1].tobytes() == odd.tobytes()
+    assert [row[2] == "" for row in rows] == [k % 2 == 1 for k in range(50)]
+    assert table[::2, 2].tobytes() == odd[::2].tobytes()
+
+
+def test_several_logs_are_told_apart() -> None:
+    curves = tuple(Curve("a", "", log, TIMES[:3], TIMES[:3] + k) for k, log in enumerate(("one", "two")))
+    head, *rows = _table(replace(CHART, panels=(Panel("a", "a", "", curves),)))
+    assert head == ["log", "time", "a"]
+    assert [row[0] for row in rows] == ["one"] * 3 + ["two"] * 3
+    assert [float(row[2]) for row in rows] == [0.0, 0.001, 0.002, 1.0, 1.001, 1.002]
