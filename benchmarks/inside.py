@@ -19,6 +19,7 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.table import Row
+from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
 from manipcli.core.geometry import Array
 from manipcli.flow.load import load_task
@@ -62,9 +63,9 @@ class Watched(PybulletEngine):
         self._twin = PybulletEngine(robot, scene, settings)
         cost.paused += clock() - began
 
-    def write(self, command: Array, position: Array, velocity: Array) -> None:
-        super().write(command, position, velocity)
-        self._commands.append(command.copy())
+    def write(self, command: JointCommand) -> None:
+        super().write(command)
+        self._commands.append(command.effort.copy())
 
     def advance(self) -> None:
         super().advance()
@@ -79,9 +80,12 @@ class Watched(PybulletEngine):
     def _repeat(self) -> None:
         """The twin takes the steps since the last pause."""
         paused, bare = clock(), 0.0
-        step, client, none = self._twin._p.stepSimulation, self._twin._client, np.zeros(0)
-        for command in self._commands:
-            self._twin.write(command, none, none)
+        step, client = self._twin._p.stepSimulation, self._twin._client
+        command = JointCommand(len(self._commands[0]) if self._commands else 0)
+        command.modes, command.version = ("effort",) * len(command.effort), 1
+        for effort in self._commands:
+            command.effort[:] = effort
+            self._twin.write(command)
             for _ in range(self._twin._substeps):
                 began = clock()
                 step(client)
@@ -115,7 +119,7 @@ def recording(folder: Path) -> tuple[float, Cost]:
     spent = 0.0
     tick, contacts = Recorder.tick, Recorder.contacts
 
-    def timed_tick(self: Recorder, k: int, state: WorldState, outputs: Sequence[ControllerOutput]) -> None:
+    def timed_tick(self: Recorder, k: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         nonlocal spent
         began = clock()
         tick(self, k, state, outputs)
