@@ -15,7 +15,8 @@ from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Place
 from manipcli.core.text import did_you_mean
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllerSpec, ControllersSpec, Interface
+from manipcli.spec.controllers import ControllerSpec, Interface
+from manipcli.spec.controllers_file import ControllersSpec
 
 Where = Callable[[tuple[str | int, ...]], Place | None]
 """The place in the file of a value, by its keys from the top: ("controllers", "arm", "joints", 0)."""

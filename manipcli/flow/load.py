@@ -28,7 +28,7 @@ from manipcli.plan.claims import Claims
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
-from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec

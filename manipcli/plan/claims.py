@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.controllers_file import ControllersSpec
 
 Loc = tuple[str | int, ...]
 

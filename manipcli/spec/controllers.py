@@ -1,4 +1,4 @@
-"""The controllers file. One entry a controller; the key `type` says which (the short name, or ROS's long one)."""
+"""What users write of controllers: what all have, and those of joint trajectories and of grippers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pydantic import Field
 
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force, Frequency, JointEffort, JointValue, JointVelocity, Time
-from manipcli.spec.robot import Version
 
 Interface = Literal["position", "velocity", "acceleration", "effort"]
 Role = Literal["follower", "hand", "other"]
@@ -112,14 +111,3 @@ class GripperSpec(ControllerSpec):
     def interfaces(self) -> tuple[Interface, ...]:
         """What it commands of each of its joints."""
         return (self.command_interface,)
-
-
-AnyController = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]
-"""One of the types of controllers; which, says `type`."""
-
-
-class ControllersSpec(Model):
-    """The file as a whole, after ROS's own forms have been rewritten to this one."""
-
-    version: Version = None
-    controllers: dict[str, AnyController] = Field(description="The controllers, by name.")

@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import did_you_mean
 from manipcli.spec.base import Model
-from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import substitute
 from manipcli.spec.kind import refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate

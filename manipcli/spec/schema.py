@@ -6,7 +6,7 @@ import json
 
 from pydantic import BaseModel
 
-from manipcli.spec.controllers import ControllersSpec
+from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import Plain

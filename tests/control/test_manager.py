@@ -14,7 +14,8 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel
-from manipcli.spec.controllers import ControllersSpec, GainsSpec
+from manipcli.spec.controllers import GainsSpec
+from manipcli.spec.controllers_file import ControllersSpec
 
 
 def joint(name, parent, child, kind="revolute", mimic=None, effort=10.0):
