@@ -20,7 +20,7 @@ from manipcli.record.block import ChunkContent
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 
 if TYPE_CHECKING:
-    from mcap.records import AttachmentIndex, ChunkIndex, McapRecord, MetadataIndex, Schema
+    from mcap.records import Attachment, AttachmentIndex, ChunkIndex, McapRecord, MetadataIndex, Schema
     from mcap.records import Channel as ChannelRecord
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -46,13 +46,13 @@ class Summary:
 
 
 class Container:
-    """An MCAP file open for writing at `<path>.partial`; `finish` gives it its name."""
+    """An MCAP file open for writing at `<path><suffix>`; `finish` gives it its name."""
 
-    def __init__(self, path: Path, *, overwrite: bool = False) -> None:
+    def __init__(self, path: Path, *, overwrite: bool = False, suffix: str = PARTIAL) -> None:
         from zstandard import ZstdCompressor
 
         self.path = path
-        self.partial = path.with_name(path.name + PARTIAL)
+        self.partial = path.with_name(path.name + suffix)
         self._fd = _claim(path, self.partial, overwrite=overwrite)
         self._size = 0
         self._crc = 0
@@ -71,29 +71,50 @@ class Container:
         """[s] of the last message that is safely in the file."""
         return self._end_ns / 1e9
 
-    def begin(self, schemas: Sequence[Schema], channels: Sequence[ChannelRecord]) -> None:
+    def begin(
+        self,
+        schemas: Sequence[Schema],
+        channels: Sequence[ChannelRecord],
+        *,
+        profile: str = PROFILE,
+        library: str = LIBRARY,
+    ) -> None:
         """Magic, header, schemas, channels."""
         from mcap.records import Header
 
-        self._append(MAGIC + _records([Header(profile=PROFILE, library=LIBRARY), *schemas, *channels]))
+        self._append(MAGIC + _records([Header(profile=profile, library=library), *schemas, *channels]))
+        self._list(schemas, channels)
+
+    def declare(self, schemas: Sequence[Schema], channels: Sequence[ChannelRecord]) -> None:
+        """Schemas and channels, before the first message that needs them."""
+        self._append(_records([*schemas, *channels]))
+        self._list(schemas, channels)
+
+    def _list(self, schemas: Sequence[Schema], channels: Sequence[ChannelRecord]) -> None:
+        """For the summary."""
         self._summary.schemas.extend(schemas)
         self._summary.channels.extend(channels)
         self._summary.counts.update({channel.id: 0 for channel in channels})
 
     def attachment(self, name: str, media_type: str, data: bytes) -> None:
-        from mcap.records import Attachment, AttachmentIndex
+        from mcap.records import Attachment
 
-        record = Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        self.attach(Attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data))
+
+    def attach(self, record: Attachment) -> None:
+        """An attachment as it is."""
+        from mcap.records import AttachmentIndex
+
         offset, length = self._append(_records([record]))
         self._summary.attachments.append(
             AttachmentIndex(
                 offset=offset,
                 length=length,
-                log_time=0,
-                create_time=0,
-                data_size=len(data),
-                name=name,
-                media_type=media_type,
+                log_time=record.log_time,
+                create_time=record.create_time,
+                data_size=len(record.data),
+                name=record.name,
+                media_type=record.media_type,
             )
         )
 

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 RECORD = "recording"
 """Name of the metadata record."""
 
+REPAIR = "repair"
+"""Name of the metadata record of a file that was repaired: what it `lost`."""
+
 FORMAT = 1
 """Version of the layout of a recording."""
 

@@ -37,4 +37,5 @@ class BadRecording(InvalidInput):
     code = "LOG300"
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
+        self.cause = cause
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))

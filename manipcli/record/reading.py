@@ -17,7 +17,7 @@ from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.columns import indexed, singly, walked
-from manipcli.record.contents import RECORD, Contents, contents
+from manipcli.record.contents import RECORD, REPAIR, Contents, contents
 from manipcli.record.faults import BadRecording
 from manipcli.record.recording import Recording, TaskEvent
 from manipcli.record.scan import (
@@ -25,6 +25,7 @@ from manipcli.record.scan import (
     CHANNEL,
     CHUNK,
     HEADER,
+    MAX_NAMED,
     MESSAGE,
     MESSAGE_INDEX,
     METADATA,
@@ -40,9 +41,6 @@ from manipcli.record.spans import FileSpans
 
 if TYPE_CHECKING:
     from mcap.records import Attachment
-
-MAX_NAMED = 4096
-"""Channels, schemas, attachments and metadata records in one file."""
 
 MAX_ATTACHED = 1 << 30
 """[byte] of all attachments together."""
@@ -215,6 +213,9 @@ class _Reader:
                 raise BadRecording(self._path, f"{topic} is not of type {self._types[topic]}")
         if lost is not None and self._newest >= 0:
             lost = f"{lost}; recorded until t = {self._newest / 1e9:.3f} s"
+        if REPAIR in self._metadata:
+            repaired = f"it was repaired, and lacks what was lost {self._metadata[REPAIR].get('lost', '')}"
+            lost = repaired if lost is None else f"{repaired}; {lost}"
         return Recording(
             joint_names=known.joints,
             body_names=known.bodies,

@@ -19,6 +19,9 @@ from manipcli.record.cdr import CdrError
 from manipcli.record.container import MAGIC
 from manipcli.record.faults import BadRecording
 
+MAX_NAMED = 4096
+"""Channels, schemas, attachments and metadata records in one file."""
+
 MAX_RECORD = 1 << 28
 MAX_CHUNK = 1 << 26
 MAX_RATIO = 1000
@@ -73,16 +76,13 @@ class Scan:
 
     def __iter__(self) -> Iterator[Record]:
         try:
-            with self.path.open("rb") as file:
-                status = os.fstat(file.fileno())
-                if not stat.S_ISREG(status.st_mode):
-                    raise BadRecording(self.path, "is not a regular file")
-                yield from self._records(file, status.st_size)
+            with open_regular(self.path) as file:
+                yield from self._records(file, os.fstat(file.fileno()).st_size)
         except OSError as error:
             raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
 
     def _records(self, file: BinaryIO, size: int) -> Iterator[Record]:
-        finished = _is_finished(file, size)
+        finished = is_finished(file, size)
         file.seek(0)
         start = file.read(len(MAGIC))
         if start != MAGIC:
@@ -132,7 +132,21 @@ class Scan:
             raise BadRecording(self.path, "the checksum of its summary does not match: it was changed")
 
 
-def _is_finished(file: BinaryIO, size: int) -> bool:
+def open_regular(path: Path) -> BinaryIO:
+    """A file to read; opening a pipe would wait for whoever writes into it.
+
+    Raises:
+        BadRecording: it is none.
+        OSError: it cannot be opened.
+    """
+    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise BadRecording(path, "is not a regular file")
+    return file
+
+
+def is_finished(file: BinaryIO, size: int) -> bool:
     """Whether the file ends with a footer and the magic bytes."""
     tail = _FOOTER.size + len(MAGIC)
     if size < tail:

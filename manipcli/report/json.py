@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from manipcli.core.errors import Finding
-from manipcli.judge.verdict import Verdict, VerdictWord
+from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
 Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
@@ -87,18 +87,7 @@ def _object(
         "real_time_factor": _number(real_time_factor),
         "log": log,
         "timing": timing,
-        "steps": [
-            {
-                "id": step.id,
-                "verb": step.verb,
-                "outcome": step.outcome,
-                "started": _number(step.started),
-                "ended": _number(step.ended),
-                "planned_duration": _number(step.planned_duration),
-                "text": step.text,
-            }
-            for step in (judged.steps if judged is not None else ())
-        ],
+        "steps": [step_object(step) for step in (judged.steps if judged is not None else ())],
         "expectations": [
             {
                 "name": expectation.name,
@@ -111,6 +100,18 @@ def _object(
             for expectation in (judged.expectations if judged is not None else ())
         ],
         "errors": [finding_object(finding) for finding in errors],
+    }
+
+
+def step_object(step: StepOutcome) -> dict[str, Json]:
+    return {
+        "id": step.id,
+        "verb": step.verb,
+        "outcome": step.outcome,
+        "started": _number(step.started),
+        "ended": _number(step.ended),
+        "planned_duration": _number(step.planned_duration),
+        "text": step.text,
     }
 
 

@@ -69,7 +69,7 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
     if lines:
         lines.append("")
     if verdict.steps:
-        lines += [_steps(verdict.steps), ""]
+        lines += [steps_table(verdict.steps), ""]
     if verdict.expectations:
         lines += [_expectations(verdict.expectations), ""]
     mark = PASS if verdict.verdict == "passed" else FAIL
@@ -112,7 +112,7 @@ def _summary(verdict: Verdict) -> str:
     return f"{text}, {met} of {_count(len(verdict.expectations), 'expectation')} met"
 
 
-def _steps(steps: Sequence[StepOutcome]) -> str:
+def steps_table(steps: Sequence[StepOutcome]) -> str:
     rows = [
         (
             f"{PASS if step.outcome == 'done' else FAIL} {step.outcome.replace('_', ' ')}",

@@ -1,0 +1,45 @@
+"""A log to what can be told of it without judging it; also of logs that somebody else wrote, or that are damaged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from manipcli.judge.steps import step_outcomes
+from manipcli.judge.verdict import StepOutcome
+from manipcli.record import channels
+from manipcli.record.contents import RECORD
+from manipcli.record.faults import BadRecording
+from manipcli.record.inventory import inventory
+from manipcli.record.reading import open_recording
+from manipcli.report.log_info import LogInfo
+
+COMMON = (channels.ROBOT_DESCRIPTION, channels.JOINT_STATES, channels.TF)
+"""Topics that a log of any robot may hold, and that manipcli understands whoever wrote them."""
+
+
+def log_info(path: Path) -> LogInfo:
+    """
+    Raises:
+        BadRecording: the file is no MCAP file, or cannot be read.
+    """
+    found = inventory(path)
+    ours = RECORD in found.metadata
+    missing = list(found.faults)
+    steps: tuple[StepOutcome, ...] = ()
+    if ours:
+        try:
+            recording = open_recording(path)
+        except BadRecording as error:
+            missing += [] if found.faults else [error.cause]
+        else:
+            status = recording.metadata.get("run", {}).get("status", "")
+            steps = step_outcomes(recording, interrupted=status not in ("complete", "failed"))
+            if recording.lost is not None:
+                missing = [recording.lost]
+            if not status:
+                missing.append("the run did not come to its end: the log has no status and no verdict")
+    else:
+        missing.append("manipcli did not write it: it tells of no task, no steps and no verdict")
+        there = {topic.name for topic in found.topics if topic.messages}
+        missing += [f"there is no {topic}" for topic in COMMON if topic not in there]
+    return LogInfo(inventory=found, ours=ours, steps=steps, missing=tuple(missing))

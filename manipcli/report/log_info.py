@@ -1,0 +1,173 @@
+"""What a log holds, for people and for programs: verdict, steps, topics, attachments, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from manipcli.judge.verdict import StepOutcome
+from manipcli.record.inventory import Inventory
+from manipcli.record.recording import EMBEDDED
+from manipcli.report.json import Json, dumps, step_object
+from manipcli.report.table import table
+from manipcli.report.text import FAIL, PASS, steps_table
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """What can be told of a log without judging it.
+
+    Attributes:
+        inventory: the file as an MCAP file.
+        ours: whether manipcli wrote it.
+        steps: how they went; empty where the file does not say.
+        missing: what a log of a finished run has and this one lacks, or what is damaged; a sentence each.
+    """
+
+    inventory: Inventory
+    ours: bool
+    steps: tuple[StepOutcome, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def run(self) -> Mapping[str, str]:
+        """Task, seed, engine, period, status."""
+        return self.inventory.metadata.get("run", {})
+
+    @property
+    def verdict(self) -> Mapping[str, str]:
+        """The verdict that the run stored; empty where there is none."""
+        return self.inventory.metadata.get("verdict", {})
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Of manipcli and of the engine."""
+        return self.inventory.metadata.get("versions", {})
+
+    @property
+    def size_per_minute(self) -> float | None:
+        """[byte] a minute of the log; None where it has no length."""
+        return 60.0 * self.inventory.size / self.inventory.duration if self.inventory.duration > 0.0 else None
+
+
+def render_text(info: LogInfo) -> str:
+    """The verdict first, then the steps, then what there is."""
+    found = info.inventory
+    lines = [f"missing: {one}" for one in info.missing]
+    if lines:
+        lines.append("")
+    if info.steps:
+        lines += [steps_table(info.steps), ""]
+    rows = [
+        [topic.name, topic.type or topic.encoding, str(topic.messages), _rate(topic.rate), _seconds(topic.last, found)]
+        for topic in found.topics
+    ]
+    lines.append(table(["topic", "type", "messages", "rate", "until"], rows, right=["messages", "rate", "until"]))
+    if found.attachments:
+        lines += [
+            "",
+            table(["attachment", "size"], [[a.name, data_size(a.size)] for a in found.attachments], right=["size"]),
+        ]
+    meshes, embedded = len(found.metadata.get("meshes", {})), len(found.metadata.get(EMBEDDED, {}))
+    if meshes:
+        held = "all of them in the log" if embedded >= meshes else f"{embedded} of them in the log"
+        lines += ["", f"{meshes} meshes, {'none of them in the log' if not embedded else held}"]
+    lines += ["", _headline(info), _length(info)]
+    return "\n".join([*lines, f"log: {found.path}"])
+
+
+def render_json(info: LogInfo) -> str:
+    """The same as one object; numbers are SI, sizes bytes."""
+    found = info.inventory
+    return dumps(
+        {
+            "log": str(found.path),
+            "size": found.size,
+            "size_per_minute": _rounded(info.size_per_minute),
+            "start": _rounded(found.start),
+            "end": _rounded(found.end),
+            "duration": _rounded(found.duration),
+            "written_by": found.library,
+            "profile": found.profile,
+            "ours": info.ours,
+            "run": dict(info.run),
+            "versions": dict(info.versions),
+            "verdict": dict(info.verdict) or None,
+            "steps": [step_object(step) for step in info.steps],
+            "topics": [
+                {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "encoding": topic.encoding,
+                    "messages": topic.messages,
+                    "rate": _rounded(topic.rate),
+                    "first": _rounded(topic.first),
+                    "last": _rounded(topic.last),
+                }
+                for topic in found.topics
+            ],
+            "attachments": [
+                {"name": one.name, "media_type": one.media_type, "size": one.size} for one in found.attachments
+            ],
+            "meshes": _meshes(found),
+            "missing": list(info.missing),
+        }
+    )
+
+
+def _meshes(found: Inventory) -> Json:
+    embedded = found.metadata.get(EMBEDDED, {})
+    return [
+        {"uri": uri, "sha256": digest, "embedded": uri in embedded}
+        for uri, digest in found.metadata.get("meshes", {}).items()
+    ]
+
+
+def _headline(info: LogInfo) -> str:
+    if not info.ours:
+        return f"a log of {info.inventory.library or 'an unknown writer'}, profile '{info.inventory.profile}'"
+    task = info.run.get("task", "")
+    if not info.verdict:
+        return f"{FAIL} {task}: no verdict is stored"
+    word, why = info.verdict.get("verdict", ""), info.verdict.get("text", "")
+    stored = f"{task} {word}: {why}"
+    if info.missing:
+        return f"{FAIL} the verdict stored is that of the whole log: {stored}"
+    return f"{PASS if word == 'passed' else FAIL} {stored} (as stored; `manipcli judge` judges it again)"
+
+
+def _length(info: LogInfo) -> str:
+    found = info.inventory
+    parts = [f"{found.duration:.2f} s", data_size(found.size)]
+    if info.size_per_minute is not None:
+        parts.append(f"{data_size(round(info.size_per_minute))} a minute")
+    text = ", ".join(parts)
+    if info.ours:
+        run, versions = info.run, info.versions
+        engine = run.get("engine", "")
+        release = f" {versions[engine]}" if engine in versions else ""
+        text += f"; engine {engine}{release}, seed {run.get('seed', '')}, manipcli {versions.get('manipcli', '')}"
+    return text
+
+
+def data_size(size: int) -> str:
+    """`15.4 MB`, in powers of ten."""
+    value, unit = float(size), "B"
+    for unit in ("B", "kB", "MB", "GB"):
+        if value < 1000.0 or unit == "GB":
+            break
+        value /= 1000.0
+    return f"{size} B" if unit == "B" else f"{value:.1f} {unit}"
+
+
+def _rate(rate: float | None) -> str:
+    return "" if rate is None else f"{rate:.4g} Hz"
+
+
+def _seconds(time: float | None, found: Inventory) -> str:
+    """From the beginning of the log: others' logs count from 1970."""
+    return "" if time is None or found.start is None else f"{time - found.start:.2f} s"
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 9)
