@@ -81,17 +81,7 @@ def check_goal(trajectory: JointTrajectory, facts: JointFacts, *, allow_end_velo
             f"point {k} gives other things than point 0",
             hint="give velocities (and accelerations) at every point, or at none",
         )
-    order = [trajectory.names.index(name) for name in facts.joints]
-    if order == list(range(len(order))):
-        ordered = trajectory
-    else:
-        ordered = JointTrajectory(
-            names=facts.joints,
-            times=trajectory.times,
-            positions=trajectory.positions[:, order],
-            velocities=None if trajectory.velocities is None else trajectory.velocities[:, order],
-            accelerations=None if trajectory.accelerations is None else trajectory.accelerations[:, order],
-        )
+    ordered = trajectory.of_joints(facts.joints)
     _check_limits(ordered, facts)
     if ordered.velocities is not None and not allow_end_velocity:
         last = ordered.velocities[-1]
@@ -163,8 +153,8 @@ def lead_in(trajectory: JointTrajectory, reference: Array, facts: JointFacts) ->
         if positions is trajectory.positions:
             return trajectory
         rows = (positions, trajectory.velocities, trajectory.accelerations)
-        return JointTrajectory(trajectory.names, trajectory.times, *rows)
-    return JointTrajectory(
+        return JointTrajectory.of_arrays(trajectory.names, trajectory.times, *rows)
+    return JointTrajectory.of_arrays(
         names=trajectory.names,
         times=np.concatenate([[0.0], trajectory.times]),
         positions=np.vstack([reference[0], positions]),

@@ -127,7 +127,7 @@ class Draft:
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
         assert done.velocities is not None and done.accelerations is not None  # every drafted one but `follow` has both
-        trajectory = JointTrajectory(
+        trajectory = JointTrajectory.of_arrays(
             names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
             velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
         )  # fmt: skip
@@ -146,7 +146,7 @@ class Draft:
         times = np.append(np.arange(ticks) * period, points.duration)
         q, v, a = points.sample(times)
         smooth = bool(np.isfinite(limits.acceleration).all())
-        trajectory = JointTrajectory(
+        trajectory = JointTrajectory.of_arrays(
             names=points.names, times=times, positions=q, velocities=v, accelerations=a if smooth else None
         )
         with self._told(label):

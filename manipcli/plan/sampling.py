@@ -76,7 +76,7 @@ def on_ticks(
             f"the motion takes at least {least * period:.3f} s within its limits; {duration:.3f} s are asked for",
             hint="ask for a longer duration, or raise the velocity and acceleration limits",
         )
-    return JointTrajectory(
+    return JointTrajectory.of_arrays(
         names=limits.names, times=frozen(times), positions=frozen(q), velocities=frozen(v), accelerations=frozen(a)
     )
 

@@ -1,5 +1,8 @@
 """Joint trajectories: points in time, and what lies between them.
 
+    trajectory = JointTrajectory(["joint_1"], [TrajectoryPoint([1.0], time_from_start=2.0)], start=TrajectoryPoint([0]))
+    position, velocity, acceleration = trajectory.sample(0.5)
+
 Between two points the curve is linear, cubic or quintic by what *both* ends give: positions; positions and velocities;
 positions, velocities and accelerations. A planned trajectory is this same type with a point at every control tick, so
 that sampling at ticks returns the planned values themselves.
@@ -9,109 +12,147 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
+from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, TrajectoryPoint, Waypoint, read_points, seconds
+
+__all__ = ["CUBIC", "LINEAR", "QUINTIC", "JointTrajectory", "Samples", "TrajectoryPoint", "Waypoint"]
 
 Samples = tuple[Array, Array, Array]
 """Position, velocity, acceleration; each (n), or (T, n)."""
 
-LINEAR, CUBIC, QUINTIC = 0, 1, 2
+Interpolation = Literal["splines", "none"]
 
-SINGULAR = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration"}
-
-
-class Waypoint(Protocol):
-    """What a point of a trajectory has: trajectory_msgs/JointTrajectoryPoint. Not given is None or empty."""
-
-    @property
-    def positions(self) -> Sequence[float] | Array: ...
-    @property
-    def velocities(self) -> Sequence[float] | Array | None: ...
-    @property
-    def accelerations(self) -> Sequence[float] | Array | None: ...
-    @property
-    def time_from_start(self) -> float: ...
+SINGULAR = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration", "efforts": "effort"}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TrajectoryPoint:
-    """One point: `positions` (n) rad or m, its derivatives where given, `time_from_start` [s]."""
-
-    positions: Sequence[float] | Array
-    time_from_start: float = 0.0
-    velocities: Sequence[float] | Array | None = None
-    accelerations: Sequence[float] | Array | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class JointTrajectory:
-    """`names` (n); `times` (k,) [s] strictly increasing from the start of the goal; arrays (k, n), or None.
+    """A trajectory of single points, as ROS writes them.
+
+    Args:
+        names: (n) joints, in the order of every point's arrays.
+        points: `TrajectoryPoint`s or whatever has their fields; times strictly increasing from the start of the goal.
+            Points without positions have theirs integrated from their velocities, or accelerations, by the trapezoid
+            rule; without a `start` such a trajectory cannot be sampled until somebody says where it starts.
+        start: where the joints are at its own `time_from_start`; leads in to the first point. Velocities and
+            accelerations that it lacks and the first point has count as 0. Unused when the first point's time is
+            not later: the reference then steps to that point.
+        interpolation: `splines`; or `none`: between two points the later one holds at once (the lead-in holds `start`).
 
     Attributes:
-        orders: (k,) what each point gives: 0 positions, 1 velocities too, 2 accelerations too. None: what the arrays
+        names: (n).
+        times: (k) [s] strictly increasing.
+        positions: (k, n); displacements where `source` says that there is no start yet.
+        velocities, accelerations: (k, n), or None where no point gives them.
+        efforts: (k, n) N m or N, or None.
+        orders: (k) what each point gives: 0 positions, 1 velocities too, 2 accelerations too. None: what the arrays
             say, the same for all points. A value that a point does not give is 0 in its array and is not used.
+        interpolation: see above.
+        led_in: whether the first row is a start.
+        integrated: whether some positions were integrated.
+        source: the points, while a start is missing from which to integrate the first; else None.
 
     Raises:
-        InvalidArgument: no name, no point, a repeated name, a wrong shape, NaN or infinity, a negative first time,
-            times that do not increase, accelerations without velocities.
+        InvalidArgument: no name, no point, a repeated name, a wrong number of values, NaN or infinity, a negative first
+            time, times that do not increase, accelerations without velocities, efforts at some points only.
     """
 
     names: tuple[str, ...]
     times: Array
     positions: Array
-    velocities: Array | None = None
-    accelerations: Array | None = None
-    orders: npt.NDArray[np.int8] | None = None
+    velocities: Array | None
+    accelerations: Array | None
+    efforts: Array | None
+    orders: npt.NDArray[np.int8] | None
+    interpolation: Interpolation
+    led_in: bool
+    integrated: bool
+    source: tuple[Waypoint, ...] | None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "names", tuple(self.names))
-        for field in ("times", "positions", "velocities", "accelerations"):
-            value = getattr(self, field)
-            if value is not None:
-                # A view, so that a planned trajectory of many points is not copied; read-only to whom we hand it.
-                view = np.asarray(value, dtype=np.float64).view()
-                view.flags.writeable = False
-                object.__setattr__(self, field, view)
-        _validate(self)
+    def __init__(
+        self,
+        names: Sequence[str],
+        points: Sequence[Waypoint],
+        start: Waypoint | None = None,
+        *,
+        interpolation: Interpolation = "splines",
+    ) -> None:
+        read = read_points(points, start, len(names))
+        highest = int(read.orders.max())
+        self._set(
+            tuple(names), frozen(read.times), frozen(read.positions),
+            frozen(read.velocities) if highest >= CUBIC else None,
+            frozen(read.accelerations) if highest == QUINTIC else None,
+            None if read.efforts is None else frozen(read.efforts),
+            None if bool((read.orders == highest).all()) else read.orders,
+            interpolation, led_in=read.led_in, integrated=read.integrated,
+            source=tuple(points) if read.relative else None,
+        )  # fmt: skip
 
     @classmethod
-    def from_points(
-        cls, names: Sequence[str], points: Sequence[Waypoint], start: Waypoint | None = None
+    def of_arrays(
+        cls,
+        names: Sequence[str],
+        times: npt.ArrayLike,
+        positions: npt.ArrayLike,
+        velocities: npt.ArrayLike | None = None,
+        accelerations: npt.ArrayLike | None = None,
+        efforts: npt.ArrayLike | None = None,
+        *,
+        orders: npt.NDArray[np.int8] | None = None,
+        interpolation: Interpolation = "splines",
+        led_in: bool = False,
     ) -> JointTrajectory:
-        """A trajectory of single points, as ROS writes them.
-
-        Args:
-            names: (n) joints, in the order of every point's arrays.
-            points: each with `positions` and, if it likes, `velocities`, `accelerations` (None or empty: not given).
-            start: where the joints are at its own `time_from_start`; leads in to the first point. Velocities and
-                accelerations that it lacks and the first point has count as 0. Unused when the first point's time is
-                not later: the reference then steps to that point.
+        """A trajectory of arrays: `times` (k), the others (k, n) or None; arrays of float64 are not copied.
 
         Raises:
-            InvalidArgument: as the constructor, and for a point without positions or of a wrong length.
+            InvalidArgument: as the constructor.
         """
-        n = len(names)
-        if not points:
-            raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
-        rows = [_row(point, n, f"point {k}") for k, point in enumerate(points)]
-        if start is not None and start.time_from_start < points[0].time_from_start:
-            p, v, a, order, time = _row(start, n, "the start state")
-            rows.insert(0, (p, v, a, max(order, rows[0][3]), time))
-        orders = np.array([row[3] for row in rows], dtype=np.int8)
-        highest = int(orders.max())
-        return cls(
-            names=tuple(names),
-            times=frozen([row[4] for row in rows]),
-            positions=frozen([row[0] for row in rows]),
-            velocities=frozen([row[1] for row in rows]) if highest >= CUBIC else None,
-            accelerations=frozen([row[2] for row in rows]) if highest == QUINTIC else None,
-            orders=None if bool((orders == highest).all()) else orders,
-        )
+
+        def view(values: npt.ArrayLike | None) -> Array | None:
+            if values is None:
+                return None
+            array = np.asarray(values, dtype=np.float64).view()
+            array.flags.writeable = False
+            return array
+
+        made = object.__new__(cls)
+        t, p = view(times), view(positions)
+        assert t is not None and p is not None
+        made._set(
+            tuple(names), t, p, view(velocities), view(accelerations), view(efforts), orders, interpolation,
+            led_in=led_in, integrated=False, source=None,
+        )  # fmt: skip
+        return made
+
+    def _set(
+        self,
+        names: tuple[str, ...],
+        times: Array,
+        positions: Array,
+        velocities: Array | None,
+        accelerations: Array | None,
+        efforts: Array | None,
+        orders: npt.NDArray[np.int8] | None,
+        interpolation: Interpolation,
+        *,
+        led_in: bool,
+        integrated: bool,
+        source: tuple[Waypoint, ...] | None,
+    ) -> None:
+        values = (
+            names, times, positions, velocities, accelerations, efforts, orders, interpolation, led_in, integrated,
+            source,
+        )  # fmt: skip
+        for field, value in zip(self.__slots__, values, strict=True):
+            object.__setattr__(self, field, value)
+        _validate(self)
 
     @property
     def duration(self) -> float:
@@ -134,7 +175,7 @@ class JointTrajectory:
         c5 = (12 D - 6 (v1 + v0) T + (a1 - a0) T^2) / (2 T^5).
 
         At the time of a point its own values come back bit by bit, and where two segments meet the later one answers
-        for what the point does not give. After the last point: its position, at rest.
+        for what the point does not give. After the last point: that point, again and again.
 
         Args:
             time: a number, or (T,).
@@ -143,54 +184,119 @@ class JointTrajectory:
             Three arrays (n), or (T, n): rad or m, per second, per second squared.
 
         Raises:
-            InvalidArgument: a time that is NaN or before the first point (there is nothing to know there).
+            InvalidArgument: a time that is NaN or before the first point (there is nothing to know there), or a
+                trajectory of integrated points that has no start.
         """
         t = np.asarray(time, dtype=np.float64)
         flat = np.atleast_1d(t)
-        if not bool((flat >= self.times[0]).all()):
-            raise InvalidArgument(
-                "TRAJ110",
-                f"cannot sample at {float(flat.min()):.6g} s: the trajectory begins at {float(self.times[0]):.6g} s",
-            )
+        self._refuse(flat)
         samples = self._sample(flat)
         return samples if t.ndim else (samples[0][0], samples[1][0], samples[2][0])
 
+    def sample_effort(self, time: float | npt.ArrayLike) -> Array:
+        """Effort at `time`, linear between two points: (n), or (T, n); N m or N; 0 where no point gives any.
+
+        Raises:
+            InvalidArgument: as `sample`.
+        """
+        t = np.asarray(time, dtype=np.float64)
+        flat = np.atleast_1d(t)
+        self._refuse(flat)
+        if self.efforts is None:
+            efforts = np.zeros((len(flat), len(self.names)))
+        elif self.interpolation == "none":
+            efforts = self.efforts[self._held(flat)]
+        else:
+            efforts = np.stack([np.interp(flat, self.times, column) for column in self.efforts.T], axis=1)
+        return efforts if t.ndim else efforts[0]
+
+    def of_joints(self, names: Sequence[str]) -> JointTrajectory:
+        """The same for some of its joints, or for all in another order."""
+        if tuple(names) == self.names:
+            return self
+        order = [self.names.index(name) for name in names]
+
+        def columns(values: Array | None) -> Array | None:
+            return None if values is None else values[:, order]
+
+        if self.source is not None:
+            points = [_columns(point, order) for point in self.source]
+            return JointTrajectory(names, points, interpolation=self.interpolation)
+        made = JointTrajectory.of_arrays(
+            names, self.times, self.positions[:, order], columns(self.velocities), columns(self.accelerations),
+            columns(self.efforts), orders=self.orders, interpolation=self.interpolation, led_in=self.led_in,
+        )  # fmt: skip
+        object.__setattr__(made, "integrated", self.integrated)
+        return made
+
+    def with_spline_velocities(self) -> JointTrajectory:
+        """Where points give positions alone: with the velocities of the cubic spline that begins and ends at rest.
+
+        Velocity and acceleration are then continuous. Others come back as they are.
+        """
+        if self.velocities is not None or len(self.times) < 2:
+            return self
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(self.times, self.positions, bc_type="clamped")
+        return JointTrajectory.of_arrays(
+            self.names, self.times, self.positions, spline(self.times, 1), None, self.efforts,
+            interpolation=self.interpolation, led_in=self.led_in,
+        )  # fmt: skip
+
+    def _refuse(self, t: Array) -> None:
+        if self.source is not None:
+            hint = "give a start: JointTrajectory(names, points, start)"
+            raise InvalidArgument("TRAJ111", "the first point gives no positions, so they are unknown", hint=hint)
+        if not bool((t >= self.times[0]).all()):
+            raise InvalidArgument(
+                "TRAJ110",
+                f"cannot sample at {float(t.min()):.6g} s: the trajectory begins at {float(self.times[0]):.6g} s",
+            )
+
+    def _held(self, t: Array) -> npt.NDArray[np.intp]:
+        """The point that holds at each time where nothing is interpolated."""
+        index = np.minimum(np.searchsorted(self.times, t, side="right"), len(self.times) - 1)
+        if self.led_in:
+            index[t < self.times[min(1, len(self.times) - 1)]] = 0
+        return index
+
     def _sample(self, t: Array) -> Samples:
         k, n = self.positions.shape
+        if self.interpolation == "none":
+            held = self._held(t)
+            zero = np.zeros((len(t), n))
+            return (
+                self.positions[held],
+                zero.copy() if self.velocities is None else self.velocities[held],
+                zero if self.accelerations is None else self.accelerations[held],
+            )
         if self.order == QUINTIC and self.orders is None and np.array_equal(t, self.times):
             assert self.velocities is not None and self.accelerations is not None
             return self.positions.copy(), self.velocities.copy(), self.accelerations.copy()
         position, velocity, acceleration = np.empty((len(t), n)), np.zeros((len(t), n)), np.zeros((len(t), n))
-        index = np.searchsorted(self.times, t, side="right") - 1
-        after = t > self.times[-1]
-        position[after] = self.positions[-1]
-        within = ~after
-        if k == 1:
-            self._point(0, within, position, velocity, acceleration)
-            return position, velocity, acceleration
-        segment = np.minimum(index, k - 2)
-        orders = np.full(k, self.order, dtype=np.int8) if self.orders is None else self.orders
-        order = np.minimum(orders[segment], orders[segment + 1])
-        for kind, evaluate in ((LINEAR, self._linear), (CUBIC, self._cubic), (QUINTIC, self._quintic)):
-            rows = within & (order == kind)
-            if rows.any():
-                i = segment[rows]
-                tau = (t[rows] - self.times[i])[:, None]
-                length = (self.times[i + 1] - self.times[i])[:, None]
-                position[rows], velocity[rows], acceleration[rows] = evaluate(i, tau, length)
-        self._point(k - 1, t == self.times[-1], position, velocity, acceleration)
-        return position, velocity, acceleration
-
-    def _point(
-        self, k: int, rows: npt.NDArray[np.bool_], position: Array, velocity: Array, acceleration: Array
-    ) -> None:
-        """Writes what point `k` gives into `rows`: the end of a curve is the point itself, not its rounded curve."""
-        given = self.order if self.orders is None else int(self.orders[k])
-        position[rows] = self.positions[k]
+        within = t <= self.times[-1]
+        if k > 1 and within.any():
+            segment = np.minimum(np.searchsorted(self.times, t, side="right") - 1, k - 2)
+            orders = np.full(k, self.order, dtype=np.int8) if self.orders is None else self.orders
+            pairs = np.minimum(orders[:-1], orders[1:])
+            order = np.where(within, pairs[segment], -1)
+            for kind, evaluate in ((LINEAR, self._linear), (CUBIC, self._cubic), (QUINTIC, self._quintic)):
+                rows = order == kind
+                if rows.any():
+                    i = segment[rows]
+                    tau = (t[rows] - self.times[i])[:, None]
+                    length = (self.times[i + 1] - self.times[i])[:, None]
+                    position[rows], velocity[rows], acceleration[rows] = evaluate(i, tau, length)
+        # The end of a curve is the point itself, not its rounded curve; of what the point lacks, the curve knows more.
+        last = t >= self.times[-1]
+        given = self.order if self.orders is None else int(self.orders[-1])
+        position[last] = self.positions[-1]
         if given >= CUBIC and self.velocities is not None:
-            velocity[rows] = self.velocities[k]
+            velocity[last] = self.velocities[-1]
         if given >= QUINTIC and self.accelerations is not None:
-            acceleration[rows] = self.accelerations[k]
+            acceleration[last] = self.accelerations[-1]
+        return position, velocity, acceleration
 
     def _linear(self, i: npt.NDArray[np.intp], tau: Array, length: Array) -> Samples:
         p0 = self.positions[i]
@@ -225,23 +331,16 @@ class JointTrajectory:
         )
 
 
-def _row(point: Waypoint, n: int, what: str) -> tuple[Array, Array, Array, int, float]:
-    """Positions, velocities, accelerations (0 where not given), order and time of one point."""
-    values = []
-    given = 0
-    for k, field in enumerate(("positions", "velocities", "accelerations")):
-        value = getattr(point, field)
-        array = np.zeros(0) if value is None else np.asarray(value, dtype=np.float64)
-        if array.size == 0 and k > 0:
-            array = np.zeros(n)
-        elif array.shape != (n,):
-            raise InvalidArgument("TRAJ102", f"{what} has {array.size} {field}; expected {n}, one a joint")
-        elif given == k:
-            given = k + 1
-        else:
-            raise InvalidArgument("TRAJ103", f"{what} has accelerations but no velocities", hint="give velocities too")
-        values.append(array)
-    return values[0], values[1], values[2], given - 1, float(point.time_from_start)
+def _columns(point: Waypoint, order: Sequence[int]) -> TrajectoryPoint:
+    """The point for these of its joints."""
+
+    def chosen(field: str) -> Array | None:
+        values = getattr(point, field, None)
+        return None if values is None or len(values) == 0 else np.asarray(values, dtype=np.float64)[list(order)]
+
+    return TrajectoryPoint(
+        chosen("positions"), seconds(point), chosen("velocities"), chosen("accelerations"), chosen("effort")
+    )
 
 
 def _validate(trajectory: JointTrajectory) -> None:
@@ -254,7 +353,10 @@ def _validate(trajectory: JointTrajectory) -> None:
     if times.ndim != 1 or times.size == 0:
         raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
     shape = (times.size, len(names))
-    for field in ("positions", "velocities", "accelerations"):
+    if trajectory.interpolation not in ("splines", "none"):
+        message = f"interpolation '{trajectory.interpolation}'; expected 'splines' or 'none'"
+        raise InvalidArgument("TRAJ109", message)
+    for field in ("positions", "velocities", "accelerations", "efforts"):
         array: Array | None = getattr(trajectory, field)
         if array is None:
             continue

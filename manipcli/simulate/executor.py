@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.control.action import GoalHandle
-from manipcli.control.controllers.gripper import GripperController, GripperGoal
-from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.action import GoalHandle, GripperGoal
+from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
@@ -100,17 +99,17 @@ class Executor:
         manager = self._session.manager
         if motion.trajectory is not None:
             follower = manager.serving(motion.trajectory.names)
-            if not isinstance(follower, JointTrajectoryController):
+            if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             handles.append(follower.send_goal(self._completed(motion.trajectory, follower)))
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
-            if not isinstance(gripper, GripperController):
+            if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
             handles.append(gripper.send_goal(_gripper_goal(gripper, motion.grip)))
         return tuple(handles)
 
-    def _completed(self, trajectory: JointTrajectory, follower: JointTrajectoryController) -> JointTrajectory:
+    def _completed(self, trajectory: JointTrajectory, follower: Follower) -> JointTrajectory:
         """The trajectory with the other joints of its controller, which stay where they are wanted now."""
         others = tuple(name for name in follower.joints if name not in trajectory.names)
         if not others:
@@ -125,13 +124,11 @@ class Executor:
         def widened(values: Array | None, more: Array) -> Array | None:
             return None if values is None else np.hstack([values, more])
 
-        return replace(
-            trajectory,
-            names=(*trajectory.names, *others),
-            positions=np.hstack([trajectory.positions, stay]),
-            velocities=widened(trajectory.velocities, np.zeros_like(stay)),
-            accelerations=widened(trajectory.accelerations, np.zeros_like(stay)),
-        )
+        rest = np.zeros_like(stay)
+        return JointTrajectory.of_arrays(
+            (*trajectory.names, *others), trajectory.times, np.hstack([trajectory.positions, stay]),
+            widened(trajectory.velocities, rest), widened(trajectory.accelerations, rest),
+        )  # fmt: skip
 
     def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
         for handle in handles:
@@ -160,5 +157,5 @@ def _unreached(handles: tuple[GoalHandle, ...]) -> str:
     return f"the joint that is furthest from its reference misses it by {far:.3g}"
 
 
-def _gripper_goal(gripper: GripperController, grip: Grip) -> GripperGoal:
+def _gripper_goal(gripper: Hand, grip: Grip) -> GripperGoal:
     return GripperGoal(target=grip.target[[grip.joints.index(name) for name in gripper.joints]], force=grip.force)

@@ -224,7 +224,7 @@ def _robot() -> RobotModel:
 def _motion() -> SimpleNamespace:
     times = np.array([0.0, 1.0, 2.0])
     velocities = np.array([[0.0], [1.5], [0.0]])
-    trajectory = JointTrajectory(("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1)))
+    trajectory = JointTrajectory.of_arrays(("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1)))
     return SimpleNamespace(step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0)
 
 

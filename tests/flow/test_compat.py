@@ -27,7 +27,7 @@ def first_command(compat: str, gain: float) -> float:
     target = np.zeros((1, n))
     target[0, 0] = ERROR
     points = np.vstack([target, target])
-    arm.send_goal(JointTrajectory(names=arm.joints, times=np.array([0.0, 1.0]), positions=points))
+    arm.send_goal(JointTrajectory.of_arrays(names=arm.joints, times=np.array([0.0, 1.0]), positions=points))
     return float(arm.update(PERIOD, PERIOD, rest).command[0])
 
 

@@ -12,7 +12,7 @@ from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 
 
 def one_joint(*points, start=None):
-    return JointTrajectory.from_points(("j",), points, start)
+    return JointTrajectory(("j",), points, start)
 
 
 def at(position, time, velocity=None, acceleration=None):
@@ -113,7 +113,7 @@ def test_curves_meet_both_ends_and_their_derivatives_agree(ends, length, order):
 def dense():
     rng = np.random.default_rng(3)
     times = np.arange(501) * 0.001
-    return JointTrajectory(("a", "b", "c"), times, *rng.normal(size=(3, 501, 3)))
+    return JointTrajectory.of_arrays(("a", "b", "c"), times, *rng.normal(size=(3, 501, 3)))
 
 
 def test_points_come_back_bit_by_bit_all_at_once_and_one_by_one():
@@ -152,7 +152,7 @@ def test_sampling_does_not_hand_out_the_trajectory_itself():
 
 def arrays(**changes):
     fields = {"names": ("a", "b"), "times": [0.0, 1.0], "positions": [[0, 0], [1, 1]]} | changes
-    return JointTrajectory(**{k: v if k == "names" else np.array(v, dtype=float) for k, v in fields.items()})
+    return JointTrajectory.of_arrays(**{k: v if k == "names" else np.array(v, dtype=float) for k, v in fields.items()})
 
 
 @pytest.mark.parametrize(
@@ -192,4 +192,4 @@ def test_what_cannot_be_followed_is_refused(changes, text):
 )
 def test_points_of_the_wrong_length_are_refused(points, text):
     with pytest.raises(InvalidArgument, match=text):
-        JointTrajectory.from_points(("a", "b"), points)
+        JointTrajectory(("a", "b"), points)

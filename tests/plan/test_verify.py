@@ -22,7 +22,7 @@ def sine(*, velocities: bool = True, accelerations: bool = True) -> JointTraject
     def column(values: Array) -> Array:
         return np.asarray(values[:, None])
 
-    return JointTrajectory(
+    return JointTrajectory.of_arrays(
         ("j",),
         T,
         column(np.sin(2 * T)),
@@ -69,6 +69,6 @@ def test_velocities_alone_betray_their_acceleration() -> None:
 def test_points_that_understate_what_the_positions_do_are_refused() -> None:
     honest = sine()
     assert honest.velocities is not None
-    lying = JointTrajectory(("j",), T, honest.positions, 0.5 * honest.velocities, honest.accelerations)
+    lying = JointTrajectory.of_arrays(("j",), T, honest.positions, 0.5 * honest.velocities, honest.accelerations)
     with pytest.raises(NotPlannable, match="velocity 2 "):
         verify(lying, limits(velocity=1.5))

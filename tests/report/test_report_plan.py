@@ -20,7 +20,7 @@ def cosine() -> JointTrajectory:
     """q = 1 - cos(t) over one turn: velocity, acceleration and jerk all reach 1."""
     t = np.linspace(0.0, 2 * np.pi, 2001)
     columns = [values[:, None] for values in (1 - np.cos(t), np.sin(t), np.cos(t))]
-    return JointTrajectory(("j",), t, *columns)
+    return JointTrajectory.of_arrays(("j",), t, *columns)
 
 
 @pytest.mark.parametrize(
@@ -42,5 +42,5 @@ def test_the_nearest_limit_is_the_one_used_most(
 
 
 def test_points_without_derivatives_say_nothing_of_limits() -> None:
-    bare = JointTrajectory(("j",), np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))
+    bare = JointTrajectory.of_arrays(("j",), np.array([0.0, 1.0]), np.array([[0.0], [1.0]]))
     assert limiting(bare, robot(velocity=1.0, acceleration=1.0, jerk=1.0)) is None

@@ -21,7 +21,7 @@ SessionOf = Callable[..., Session]
 
 def move(to: float = 0.5, duration: float = 0.5, **changes: Any) -> Motion:
     """The slide from 0 to `to` [m]: one cubic, at rest at both ends."""
-    trajectory = JointTrajectory(("slide",), np.array([duration]), np.array([[to]]), np.array([[0.0]]), None)
+    trajectory = JointTrajectory.of_arrays(("slide",), np.array([duration]), np.array([[to]]), np.array([[0.0]]), None)
     return Motion("go", trajectory, None, duration, **changes)
 
 
@@ -161,6 +161,6 @@ def test_a_motion_for_which_there_is_no_controller_is_refused(session_of: Sessio
     both = Motion("both", None, Grip(("slide",), np.zeros(1), None, False), 0.1)
     with pytest.raises(InvalidArgument, match="'arm' is no gripper"):
         Executor(session_of()).run(both, until=None, deadline=None)
-    trajectory = JointTrajectory(("tip",), np.array([1.0]), np.zeros((1, 1)), None, None)
+    trajectory = JointTrajectory.of_arrays(("tip",), np.array([1.0]), np.zeros((1, 1)), None, None)
     with pytest.raises(InvalidArgument, match="'hand' does not follow trajectories"):
         Executor(session_of()).run(Motion("x", trajectory, None, 1.0), until=None, deadline=None)

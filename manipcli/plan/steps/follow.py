@@ -108,16 +108,17 @@ def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
         TrajectoryPoint(point.positions, point.seconds, point.velocities, point.accelerations) for point in spec.points
     ]
     if points[0].time_from_start <= 0.0:
-        off = np.abs(np.array(points[0].positions) - start)
+        first = spec.points[0].positions
+        off = np.abs(np.array(first) - start)
         worst = int(np.argmax(off))
         if off[worst] > HERE:
             raise NotPlannable(
-                f"the first point, at 0 s, has joint '{names[worst]}' at {points[0].positions[worst]:.4f}; "
+                f"the first point, at 0 s, has joint '{names[worst]}' at {first[worst]:.4f}; "
                 f"it is at {start[worst]:.4f} then",
                 hint="give the point a later time_from_start, or `move` there first",
             )
         points[0] = replace(points[0], positions=start)
-    trajectory = JointTrajectory.from_points(names, points, TrajectoryPoint(start))
+    trajectory = JointTrajectory(names, points, TrajectoryPoint(start))
     draft = Draft(planner, situation, verb="follow")
     draft.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
     return draft.plan()

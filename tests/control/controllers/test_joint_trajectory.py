@@ -41,7 +41,7 @@ def point(positions, time, velocities=None, accelerations=None):
 
 
 def trajectory(*points, names=JOINTS):
-    return JointTrajectory.from_points(names, points)
+    return JointTrajectory(names, points)
 
 
 def run(controller, measured, ticks, *, first=0):
@@ -260,7 +260,7 @@ def test_planned_points_are_the_references_bit_by_bit():
     p, v, a = (np.outer(x, [1.0, -0.5, 0.25]) for x in blend)
     v[-1] = 0.0
     controller = make(path=1e-9, goal=1e-9)
-    handle = controller.send_goal(JointTrajectory(JOINTS, times, p, v, a))
+    handle = controller.send_goal(JointTrajectory.of_arrays(JOINTS, times, p, v, a))
     offset = 4000  # far from 0, where k * period rounds
     for k in range(301):
         output = controller.update((offset + k) * PERIOD, PERIOD, state(p[k], v[k]))

@@ -1,0 +1,202 @@
+"""Points of joint trajectories, as ROS writes them, and from points to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+
+LINEAR, CUBIC, QUINTIC = 0, 1, 2
+"""What a point gives: positions; velocities too; accelerations too."""
+
+FIELDS: Final = ("positions", "velocities", "accelerations", "effort")
+
+Values = Sequence[float] | Array
+
+
+class RosDuration(Protocol):
+    """builtin_interfaces/Duration."""
+
+    @property
+    def sec(self) -> int: ...
+    @property
+    def nanosec(self) -> int: ...
+
+
+class Waypoint(Protocol):
+    """What a point has: trajectory_msgs/JointTrajectoryPoint. Not given is None or empty; `effort` may be absent."""
+
+    @property
+    def positions(self) -> Values | None: ...
+    @property
+    def velocities(self) -> Values | None: ...
+    @property
+    def accelerations(self) -> Values | None: ...
+    @property
+    def time_from_start(self) -> float | RosDuration: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrajectoryPoint:
+    """One point: `positions` (n) rad or m, its derivatives where given, `time_from_start` [s].
+
+    Positions may be left out where velocities or accelerations are given: they are integrated. `effort` (n) N m or N
+    is added to the command of an effort interface.
+    """
+
+    positions: Values | None = None
+    time_from_start: float = 0.0
+    velocities: Values | None = None
+    accelerations: Values | None = None
+    effort: Values | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointArrays:
+    """Points as arrays (k, n), 0 where a point does not give a value.
+
+    Attributes:
+        times: (k) [s].
+        orders: (k) what each point gives, as above.
+        efforts: (k, n), or None where no point gives any.
+        integrated: whether some positions were integrated.
+        relative: whether the first of them was, without a start: positions are displacements from wherever it will be.
+        led_in: whether the first row is the start.
+    """
+
+    times: Array
+    positions: Array
+    velocities: Array
+    accelerations: Array
+    efforts: Array | None
+    orders: npt.NDArray[np.int8]
+    integrated: bool
+    relative: bool
+    led_in: bool
+
+
+@dataclass(slots=True, eq=False)
+class _Row:
+    """One point while it is read; None: not given."""
+
+    time: float
+    position: Array | None
+    velocity: Array | None
+    acceleration: Array | None
+    effort: Array | None
+
+    @property
+    def order(self) -> int:
+        if self.velocity is None:
+            return LINEAR
+        return CUBIC if self.acceleration is None else QUINTIC
+
+
+def read_points(points: Sequence[Waypoint], start: Waypoint | None, n: int) -> PointArrays:
+    """Points of `n` joints, after `start` if there is one.
+
+    `start` leads in to a first point that is later. Velocities and accelerations that it lacks and the first point has
+    count as 0. Missing positions (velocities) are integrated from the point before by the trapezoid rule:
+
+        v1 = v0 + T (a0 + a1) / 2,  p1 = p0 + T (v0 + v1) / 2
+
+    Raises:
+        InvalidArgument: no point, a point that gives nothing or a wrong number of values, accelerations beside
+            positions but no velocities, efforts at some points and not at others.
+    """
+    if not points:
+        raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
+    rows = [_row(point, n, f"point {k}") for k, point in enumerate(points)]
+    begin = None if start is None else _row(start, n, "the start state")
+    if begin is not None and begin.position is None:
+        raise InvalidArgument("TRAJ102", "the start state has 0 positions; expected " + _one_a_joint(n))
+    integrated = any(row.position is None for row in rows)
+    relative = rows[0].position is None and begin is None
+    before = begin if begin is not None else _Row(0.0, np.zeros(n), None, None, None)
+    led_in = begin is not None and begin.time < rows[0].time
+    for row in rows:
+        if row.position is None:
+            _integrate(before, row)
+        before = row
+    if led_in:
+        assert begin is not None
+        if begin.velocity is None and rows[0].velocity is not None:
+            begin.velocity = np.zeros(n)
+        if begin.acceleration is None and rows[0].acceleration is not None:
+            begin.acceleration = np.zeros(n)
+        if rows[0].effort is None:
+            begin.effort = None
+        elif begin.effort is None:
+            begin.effort = np.zeros(n)
+        rows.insert(0, begin)
+    efforts = _efforts(rows, led_in)
+    zero = np.zeros(n)
+    return PointArrays(
+        times=np.array([row.time for row in rows]),
+        positions=np.array([zero if row.position is None else row.position for row in rows]),
+        velocities=np.array([zero if row.velocity is None else row.velocity for row in rows]),
+        accelerations=np.array([zero if row.acceleration is None else row.acceleration for row in rows]),
+        efforts=efforts,
+        orders=np.array([row.order for row in rows], dtype=np.int8),
+        integrated=integrated,
+        relative=relative,
+        led_in=led_in,
+    )
+
+
+def _row(point: Waypoint, n: int, what: str) -> _Row:
+    values: list[Array | None] = []
+    for field in FIELDS:
+        given = getattr(point, field, None)
+        array = np.zeros(0) if given is None else np.asarray(given, dtype=np.float64)
+        if array.size and array.shape != (n,):
+            message = f"{what} has {array.size} {'efforts' if field == 'effort' else field}; expected "
+            raise InvalidArgument("TRAJ102", message + _one_a_joint(n))
+        values.append(array if array.size else None)
+    position, velocity, acceleration, effort = values
+    if position is None and velocity is None and acceleration is None:
+        raise InvalidArgument("TRAJ102", f"{what} has 0 positions; expected {_one_a_joint(n)}")
+    if position is not None and velocity is None and acceleration is not None:
+        raise InvalidArgument("TRAJ103", f"{what} has accelerations but no velocities", hint="give velocities too")
+    return _Row(seconds(point), position, velocity, acceleration, effort)
+
+
+def seconds(point: Waypoint) -> float:
+    """Its `time_from_start` [s]."""
+    time = point.time_from_start
+    if isinstance(time, int | float | np.number):
+        return float(time)
+    return time.sec + 1e-9 * time.nanosec
+
+
+def _one_a_joint(n: int) -> str:
+    return f"{n}, one a joint"
+
+
+def _integrate(before: _Row, row: _Row) -> None:
+    """What `row` lacks, from the row before; what that lacks counts as 0."""
+    period = max(0.0, row.time - before.time)
+    v0 = 0.0 if before.velocity is None else before.velocity
+    a0 = 0.0 if before.acceleration is None else before.acceleration
+    if row.velocity is None:
+        assert row.acceleration is not None
+        row.velocity = v0 + 0.5 * period * (a0 + row.acceleration)
+    assert before.position is not None
+    row.position = before.position + 0.5 * period * (v0 + row.velocity)
+
+
+def _efforts(rows: Sequence[_Row], led_in: bool) -> Array | None:
+    given = [row.effort for row in rows if row.effort is not None]
+    if not given:
+        return None
+    if len(given) < len(rows):
+        k = next(k for k, row in enumerate(rows) if row.effort is None) - led_in
+        where = "the start state" if k < 0 else f"point {k}"
+        raise InvalidArgument("TRAJ108", f"{where} gives no efforts, but others do", hint="give them at every point")
+    return np.array(given)
