@@ -13,7 +13,7 @@ import typer
 from typer.exceptions import TyperException
 
 from manipcli import __version__
-from manipcli.cli import check, check_urdf, console, info, judge, plan, plot, repair, run, schema, view
+from manipcli.cli import check, check_urdf, console, info, judge, plan, plot, repair, replay, run, schema, view
 from manipcli.cli import list as list_
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 
@@ -41,6 +41,7 @@ app.command("info")(info.info)
 app.command("repair")(repair.repair)
 app.command("plot")(plot.plot)
 app.command("view")(view.view)
+app.command("replay")(replay.replay)
 app.command("list")(list_.list_)
 app.command("schema")(schema.schema)
 

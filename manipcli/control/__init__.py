@@ -1,8 +1,8 @@
 """Knows joints and references, not physics: controllers, their manager, PID, limits, and the goals they take."""
 
-from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalResult
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalResult, GripperGoal
 from manipcli.control.controller import Controller, ControllerOutput, JointState
-from manipcli.control.controllers.gripper import GripperController, GripperGoal
+from manipcli.control.controllers.gripper import GripperController
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.limits import JointLimiter, limit_effort, limit_position, limit_velocity
 from manipcli.control.manager import ControllerManager

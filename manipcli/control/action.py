@@ -94,3 +94,20 @@ class GoalHandle:
         """For the controller: the goal ends; the first end counts."""
         if self.result is None:
             self.result = GoalResult(status=status, code=code, text=text, time=time, fingers=fingers)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GripperGoal:
+    """Where the hand shall go, and what may stop it.
+
+    Attributes:
+        target: (n) rad or m, in the order of the controller's joints.
+        force: [N] at which a finger stops; None: contact does not stop it (to open).
+        max_effort: (n) N m or N, for this goal and after it; None: the controller's.
+        fingers: joint indices of each finger, every joint in exactly one; empty: each joint is a finger.
+    """
+
+    target: Array
+    force: float | None = None
+    max_effort: Array | None = None
+    fingers: tuple[tuple[int, ...], ...] = ()

@@ -17,7 +17,7 @@ from manipcli.control.pid import Compat
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import ControllerSpec, Interface
+from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 if TYPE_CHECKING:
     from manipcli.model.kinematics import Kinematics
@@ -75,6 +75,11 @@ class Controller(Protocol):
     joints: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     feed_forward: FeedForward
+
+    @property
+    def role(self) -> Role:
+        """What steps may ask of it; `roles.py` has the methods that it has then."""
+        ...
 
     @property
     def senses_contact(self) -> bool:

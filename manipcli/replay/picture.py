@@ -6,11 +6,14 @@ pixels smooths the edges.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
+import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
@@ -44,13 +47,15 @@ class Light:
 
 
 class Studio:
-    """A drawing in a Bullet client that only draws. A context manager: the client ends with it.
+    """A drawing in Bullet clients that only draw. A context manager: the clients end with it.
 
     Args:
         drawing: what there is.
         layers: which of it is shown.
         size: width and height of the pictures [pixel].
         light: the light.
+        still: frames that stand where they are in all pictures of one camera: they are drawn once, and of each
+            picture only the part that the others may cover.
     """
 
     def __init__(
@@ -60,26 +65,87 @@ class Studio:
         layers: tuple[Layer, ...] = ("visual",),
         size: tuple[int, int] = SIZE,
         light: Light = Light(),
+        still: frozenset[str] = frozenset(),
     ) -> None:
+        self._size = size
+        self._light = light
+        shown = [one for one in drawing.drawables if one.layer in layers and one.rgba[3] > 0.0]
+        self._still = _Client(drawing, [one for one in shown if one.frame in still])
+        self._moving = _Client(drawing, [one for one in shown if one.frame not in still])
+        self._before: tuple[Camera, _Raster, Image] | None = None
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._still.close()
+        self._moving.close()
+
+    def picture(self, poses: Poses, camera: Camera) -> Image:
+        """What the camera sees at one instant, with the sky behind."""
+        whole = Window(0, 0, FINER * self._size[0], FINER * self._size[1])
+        if self._before is None or self._before[0] != camera:
+            raster = self._still.render(poses, camera, self._light, whole, whole)
+            self._before = (camera, raster, _averaged(raster.rgb))
+        _, behind, image = self._before
+        window = self._moving.window(poses, camera, whole)
+        if window is None:
+            return image.copy()
+        front = self._moving.render(poses, camera, self._light, whole, window)
+        rows, columns = window.slices
+        nearer = front.seen & (front.depth <= behind.depth[rows, columns])
+        rgb = np.where(nearer[..., None], front.rgb, behind.rgb[rows, columns])
+        image = image.copy()
+        rows, columns = window.divided(FINER).slices
+        image[rows, columns] = _averaged(rgb)
+        return image
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Part of a picture, from `left` and `top` up to `right` and `bottom` [pixel]."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns."""
+        return slice(self.top, self.bottom), slice(self.left, self.right)
+
+    def divided(self, by: int) -> Window:
+        """The same in pixels that are larger."""
+        return Window(self.left // by, self.top // by, self.right // by, self.bottom // by)
+
+
+@dataclass(frozen=True, slots=True)
+class _Raster:
+    """Colours (h, w, 3), depth (h, w) as the graphics library counts it, and where anything is (h, w)."""
+
+    rgb: Image
+    depth: npt.NDArray[np.float32]
+    seen: npt.NDArray[np.bool_]
+
+
+class _Client:
+    """Some drawables in a client of Bullet."""
+
+    def __init__(self, drawing: Drawing, drawables: Sequence[Drawable]) -> None:
         from manipcli.simulate.quiet import silence
 
         with silence():  # its banner
             import pybullet
 
         self._bullet = pybullet
-        self._size = size
-        self._light = light
-        self._frames = {name: k for k, name in enumerate(drawing.frames)}
+        frames = {name: k for k, name in enumerate(drawing.frames)}
         self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._bodies: list[tuple[int, str]] = []
-        for one in drawing.drawables:
-            if one.layer in layers and one.rgba[3] > 0.0:
-                self._bodies += [(self._add(part, one), one.frame) for part in _parts(one.surface)]
+        self._bodies = [(self._add(part, one), frames[one.frame]) for one in drawables for part in _parts(one.surface)]
+        self._corners = [(frames[one.frame], one.surface.corners) for one in drawables if len(one.surface.vertices)]
 
-    def __enter__(self) -> Studio:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def close(self) -> None:
+        """Ends the client."""
         self._bullet.disconnect(self._client)
 
     def _add(self, part: Surface, drawable: Drawable) -> int:
@@ -94,36 +160,73 @@ class Studio:
         )
         return int(self._bullet.createMultiBody(0.0, -1, visual, physicsClientId=self._client))
 
-    def picture(self, poses: Poses, camera: Camera) -> Image:
-        """What the camera sees at one instant, with the sky behind."""
-        for body, frame in self._bodies:
-            k = self._frames[frame]
+    def window(self, poses: Poses, camera: Camera, whole: Window) -> Window | None:
+        """The part of a picture that the drawables may cover; None where they are outside of it."""
+        if not self._corners:
+            return None
+        points = np.concatenate([poses.X_WF(k).apply(corners) for k, corners in self._corners])
+        x, y, depth = camera.project(points, (whole.right, whole.bottom))
+        if depth.min() <= camera.near:
+            return whole
+        # A corner that is cut in half is none of the neighbour's: one large pixel around.
+        left, right = int(x.min()) // FINER - 1, int(x.max()) // FINER + 2
+        top, bottom = int(y.min()) // FINER - 1, int(y.max()) // FINER + 2
+        found = Window(
+            max(left * FINER, 0),
+            max(top * FINER, 0),
+            min(right * FINER, whole.right),
+            min(bottom * FINER, whole.bottom),
+        )
+        return found if found.left < found.right and found.top < found.bottom else None
+
+    def render(self, poses: Poses, camera: Camera, light: Light, whole: Window, part: Window) -> _Raster:
+        """A part of the whole picture."""
+        for body, k in self._bodies:
             self._bullet.resetBasePositionAndOrientation(
                 body, poses.position[k].tolist(), poses.quat_xyzw[k].tolist(), physicsClientId=self._client
             )
-        width, height = (FINER * pixels for pixels in self._size)
-        distance = float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
-        _, _, pixels, _, seen = self._bullet.getCameraImage(
+        width, height = part.right - part.left, part.bottom - part.top
+        up = camera.near * math.tan(math.radians(camera.field) / 2.0)
+        across = up * whole.right / whole.bottom
+        _, _, pixels, depth, seen = self._bullet.getCameraImage(
             width,
             height,
-            self._bullet.computeViewMatrix(camera.eye, camera.target, (0.0, 0.0, 1.0)),
-            self._bullet.computeProjectionMatrixFOV(
-                camera.field, self._size[0] / self._size[1], distance / 50.0, distance * 12.0
+            self._bullet.computeViewMatrix(camera.eye, camera.target, camera.up),
+            self._bullet.computeProjectionMatrix(
+                across * (2.0 * part.left / whole.right - 1.0),
+                across * (2.0 * part.right / whole.right - 1.0),
+                up * (1.0 - 2.0 * part.bottom / whole.bottom),
+                up * (1.0 - 2.0 * part.top / whole.bottom),
+                camera.near,
+                camera.far,
             ),
-            lightDirection=self._light.direction,
+            lightDirection=light.direction,
             lightColor=(1.0, 1.0, 1.0),
-            lightAmbientCoeff=self._light.ambient,
-            lightDiffuseCoeff=self._light.diffuse,
-            lightSpecularCoeff=self._light.specular,
+            lightAmbientCoeff=light.ambient,
+            lightDiffuseCoeff=light.diffuse,
+            lightSpecularCoeff=light.specular,
             shadow=0,
             renderer=self._bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
         )
+        there = np.asarray(seen).reshape(height, width) >= 0
         rgb = np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-        whole = np.where(np.asarray(seen).reshape(height, width, 1) < 0, sky(height), rgb)
-        small = whole.reshape(self._size[1], FINER, self._size[0], FINER, 3).mean(axis=(1, 3))
-        image: Image = small.round().astype(np.uint8)
-        return image
+        behind = sky(whole.bottom)[part.top : part.bottom]
+        return _Raster(
+            np.where(there[..., None], rgb, behind),
+            np.where(there, np.asarray(depth, dtype=np.float32).reshape(height, width), np.inf),
+            there,
+        )
+
+
+def _averaged(fine: Image) -> Image:
+    """FINER by FINER pixels to one."""
+    total = np.zeros((fine.shape[0] // FINER, fine.shape[1] // FINER, 3), dtype=np.uint16)
+    for row in range(FINER):
+        for column in range(FINER):
+            total += fine[row::FINER, column::FINER]
+    total += FINER * FINER // 2
+    return (total // (FINER * FINER)).astype(np.uint8)
 
 
 def _parts(whole: Surface) -> list[Surface]:

@@ -43,6 +43,14 @@ class Placing:
                     where[joint.child] = (last, X @ joint.X_PJ)
             self._links = [where[link.name] for link in robot.links]
 
+    @property
+    def still(self) -> frozenset[str]:
+        """The frames of the drawing that no state moves: the world, fixed bodies, links above all moving joints."""
+        links = self._robot.links if self._robot is not None else ()
+        bodies = self._scene.bodies if self._scene is not None else ()
+        fixed = [f"robot/{link.name}" for link, (last, _) in zip(links, self._links, strict=True) if last < 0]
+        return frozenset(["world", *fixed, *(body.name for body in bodies if body.fixed)])
+
     def start(self, q: Array | None = None) -> Poses:
         """Joints at `q` (n,), bodies where the scene starts."""
         movable = self._scene.movable if self._scene is not None else ()

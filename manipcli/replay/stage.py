@@ -13,6 +13,7 @@ from manipcli.core.geometry import Transform
 from manipcli.model.mesh_fault import Rgba
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
+from manipcli.replay.ground import ground_height
 from manipcli.replay.image import sky
 from manipcli.replay.placing import Poses
 
@@ -106,16 +107,7 @@ class Stage:
             self._solid.append((mesh, clear))
 
     def _ground(self, drawing: Drawing, poses: Poses, floors: frozenset[str]) -> None:
-        """A grid at z = 0, or under what stands lower."""
-        index = {name: k for k, name in enumerate(drawing.frames)}
-        lowest = min(
-            (
-                float(poses.X_WF(index[one.frame]).apply(one.surface.vertices)[:, 2].min())
-                for one in drawing.drawables
-                if one.layer == "visual" and one.frame not in floors and len(one.surface.vertices)
-            ),
-            default=0.0,
-        )
+        """A grid for the shadows."""
         self._server.scene.add_grid(
             "/ground",
             width=6.0,
@@ -125,7 +117,7 @@ class Stage:
             cell_color=(205, 210, 216),
             section_color=(165, 172, 180),
             shadow_opacity=0.25,
-            position=(0.0, 0.0, min(0.0, lowest)),
+            position=(0.0, 0.0, ground_height(drawing, poses, floors)),
         )
 
     def place(self, poses: Poses) -> None:

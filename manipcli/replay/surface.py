@@ -49,6 +49,12 @@ class Surface:
         length = np.linalg.norm(found, axis=1, keepdims=True)
         return np.where(length > 0.0, found / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
 
+    @property
+    def corners(self) -> Array:
+        """(8, 3) of the box around it, which is not empty."""
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        return np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
+
     def scaled(self, scale: tuple[float, float, float]) -> Surface:
         """Scaled along each axis; a mirrored surface is turned so that its outside stays outside."""
         faces = self.faces if math.prod(scale) >= 0.0 else self.faces[:, ::-1]

@@ -6,14 +6,12 @@ from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.replay.drawing import draw
+from manipcli.replay.ground import floors_of
 from manipcli.replay.panel import JointPanel, LayerSwitches
 from manipcli.replay.placing import Placing
 from manipcli.replay.posture import posture
 from manipcli.replay.server import LocalServer
 from manipcli.replay.stage import Stage
-
-FLOOR = "floor"
-"""The kind of body that everything stands on."""
 
 
 class View(LocalServer):
@@ -37,14 +35,11 @@ class View(LocalServer):
     ) -> None:
         drawing, placing = draw(robot, scene), Placing(robot, scene)
         position = posture(robot) if q is None else q
-        floors = (
-            frozenset(body.name for body in scene.bodies if body.kind == FLOOR) if scene is not None else frozenset()
-        )
         super().__init__(robot.name, port=port)
         self.robot = robot
         self.missing = drawing.missing
         try:
-            self.stage = Stage(self.viser, drawing, placing.start(position), floors=floors)
+            self.stage = Stage(self.viser, drawing, placing.start(position), floors=floors_of(scene))
             LayerSwitches(self.viser, self.stage)
             self.joints = JointPanel(self.viser, robot, self.stage, placing, position)
         except BaseException:

@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle
+from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.gains import build_pid, idle_gains, joint_gains, strangers
 from manipcli.control.pid import Compat
@@ -31,7 +30,7 @@ from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import Joint, RobotModel
 from manipcli.plan.hand import fingers
-from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface
+from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface, Role
 
 STALL_VELOCITY: Final = 0.02
 STALL_SPEED: Final = 0.001
@@ -44,23 +43,6 @@ REACHED = 1e-9
 
 UNTIL_CHANGED = 1 << 62
 """Ticks: more than any run has."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GripperGoal:
-    """Where the hand shall go, and what may stop it.
-
-    Attributes:
-        target: (n) rad or m, in the order of the controller's joints.
-        force: [N] at which a finger stops; None: contact does not stop it (to open).
-        max_effort: (n) N m or N, for this goal and after it; None: the controller's.
-        fingers: joint indices of each finger, every joint in exactly one; empty: each joint is a finger.
-    """
-
-    target: Array
-    force: float | None = None
-    max_effort: Array | None = None
-    fingers: tuple[tuple[int, ...], ...] = ()
 
 
 class GripperController:
@@ -88,6 +70,7 @@ class GripperController:
         InvalidArgument: joints repeated, gains of an unknown joint or all zero, fingers that do not part the joints.
     """
 
+    role: Role = "hand"
     interfaces: tuple[Interface, ...] = ("effort",)
 
     def __init__(

@@ -32,7 +32,7 @@ from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import JointLimits, JointType, RobotModel
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, JointTrajectorySpec
+from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, JointTrajectorySpec, Role
 
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2  # the rows of a reference (3, n)
 
@@ -63,6 +63,9 @@ class JointTrajectoryController:
     Raises:
         InvalidArgument: no or repeated joints, gains of an unknown joint, gains all zero where they are needed.
     """
+
+    role: Role = "follower"
+    senses_contact = False
 
     def __init__(
         self,

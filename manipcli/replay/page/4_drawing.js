@@ -1,0 +1,267 @@
+// The picture.
+
+const SOLID = [`#version 300 es
+in vec3 place; in vec3 normal;
+uniform mat4 all, model; uniform vec3 low, size;
+out vec3 n, at;
+void main() {
+  vec4 world = model * vec4(low + size * place, 1.0);
+  n = mat3(model) * normal; at = world.xyz;
+  gl_Position = all * world;
+}`, `#version 300 es
+precision highp float;
+in vec3 n, at; uniform vec4 colour; uniform vec3 eye; uniform float flat_;
+out vec4 shown;
+void main() {
+  if (flat_ > 0.5) { shown = vec4(colour.rgb * colour.a, colour.a); return; }
+  vec3 m = normalize(gl_FrontFacing ? n : -n), to = normalize(eye - at), sun = normalize(vec3(0.45, 0.25, 0.86));
+  float sky = 0.5 + 0.5 * m.z;
+  vec3 light = mix(vec3(0.46, 0.45, 0.46), vec3(0.74, 0.76, 0.79), sky) + 0.40 * max(dot(m, sun), 0.0)
+    + 0.10 * max(dot(m, to), 0.0);
+  float shine = 0.16 * pow(max(dot(m, normalize(sun + to)), 0.0), 36.0);
+  vec3 seen = min(colour.rgb * light + shine, vec3(1.0));
+  shown = vec4(seen * colour.a, colour.a);
+}`];
+const LINES = [`#version 300 es
+in vec3 a, b; uniform mat4 all; uniform vec2 window; uniform float width;
+void main() {
+  vec4 one = all * vec4(a, 1.0), other = all * vec4(b, 1.0);
+  vec2 way = (other.xy / other.w - one.xy / one.w) * window;
+  vec2 side = length(way) > 1e-6 ? normalize(vec2(-way.y, way.x)) : vec2(1.0, 0.0);
+  vec4 here = gl_VertexID < 2 ? one : other;
+  here.xy += side * (gl_VertexID % 2 == 0 ? 1.0 : -1.0) * width / window * here.w;
+  gl_Position = here;
+}`, `#version 300 es
+precision highp float;
+uniform vec4 colour; out vec4 shown;
+void main() { shown = vec4(colour.rgb * colour.a, colour.a); }`];
+const GRID = [`#version 300 es
+in vec3 place; uniform mat4 all; out vec2 at;
+void main() { at = place.xy; gl_Position = all * vec4(place, 1.0); }`, `#version 300 es
+precision highp float;
+in vec2 at; uniform vec4 colour; uniform vec2 middle; uniform float reach; out vec4 shown;
+void main() {
+  float a = colour.a * clamp(1.0 - length(at - middle) / reach, 0.0, 1.0);
+  shown = vec4(colour.rgb * a, a);
+}`];
+
+const GHOST = [0.16, 0.45, 0.95, 0.38], SUN = [0.45, 0.25, 0.86], PATH = [0.93, 0.42, 0.05];
+let gl = null, programs = {}, surfaces = [], arrow = {}, path = null, grid = null;
+
+function program([vertex, fragment]) {
+  const made = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(made, shader);
+  }
+  gl.linkProgram(made);
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made));
+  const at = { made };
+  for (let k = 0; k < gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS); k++) {
+    const { name } = gl.getActiveUniform(made, k);
+    at[name] = gl.getUniformLocation(made, name);
+  }
+  return at;
+}
+
+function buffer(data, target = gl.ARRAY_BUFFER) {
+  const made = gl.createBuffer();
+  gl.bindBuffer(target, made);
+  gl.bufferData(target, data, gl.STATIC_DRAW);
+  return made;
+}
+
+function attribute(of, name, size, type, normalised, stride, offset = 0, divisor = 0) {
+  const where = gl.getAttribLocation(of.made, name);
+  gl.enableVertexAttribArray(where);
+  gl.vertexAttribPointer(where, size, type, normalised, stride, offset);
+  gl.vertexAttribDivisor(where, divisor);
+}
+
+function surface(places, normals, faces, low, size) {
+  const vao = gl.createVertexArray(), small = places instanceof Uint16Array;
+  gl.bindVertexArray(vao);
+  buffer(places);
+  attribute(programs.solid, "place", 3, small ? gl.UNSIGNED_SHORT : gl.FLOAT, small, small ? 8 : 12);
+  buffer(normals);
+  attribute(programs.solid, "normal", 3, gl.BYTE, true, 4);
+  buffer(faces, gl.ELEMENT_ARRAY_BUFFER);
+  const type = faces instanceof Uint16Array ? gl.UNSIGNED_SHORT : gl.UNSIGNED_INT;
+  return { vao, count: faces.length, type, low, size };
+}
+
+// A shaft and a head along z, each of length and radius 1.
+function rounds(top) {
+  const places = [], normals = [], faces = [], N = 20;
+  for (let k = 0; k <= N; k++) {
+    const a = (2 * Math.PI * k) / N, x = Math.cos(a), y = Math.sin(a), z = top > 0 ? 0 : 0.5;
+    places.push(x, y, 0, x * top, y * top, 1);
+    for (let end = 0; end < 2; end++) normals.push(127 * x, 127 * y, 127 * z, 0);
+    if (k < N) faces.push(2 * k, 2 * k + 2, 2 * k + 1, 2 * k + 1, 2 * k + 2, 2 * k + 3);
+  }
+  const low = places.length / 3;
+  places.push(0, 0, 0);
+  normals.push(0, 0, -127, 0);
+  for (let k = 0; k < N; k++) faces.push(low, 2 * k + 2, 2 * k);
+  return surface(new Float32Array(places), new Int8Array(normals), new Uint16Array(faces), [0, 0, 0], [1, 1, 1]);
+}
+
+function furnish(canvas) {
+  gl = canvas.getContext("webgl2", { antialias: true, alpha: true, stencil: true });
+  if (!gl) throw new Error("This browser has no WebGL 2, which the picture needs.");
+  programs = { solid: program(SOLID), lines: program(LINES), grid: program(GRID) };
+  surfaces = run.surfaces.map((one) => surface(array(one.places), array(one.normals), array(one.faces), one.low, one.size));
+  arrow = { shaft: rounds(1), head: rounds(0) };
+  const lines = [], R = 4;
+  for (let k = -10 * R; k <= 10 * R; k++) {
+    const c = k / 10;
+    lines.push(c, -R, run.ground, c, R, run.ground, -R, c, run.ground, R, c, run.ground);
+  }
+  grid = { vao: gl.createVertexArray(), count: lines.length / 3 };
+  gl.bindVertexArray(grid.vao);
+  buffer(new Float32Array(lines));
+  attribute(programs.grid, "place", 3, gl.FLOAT, false, 12);
+  if (run.path) {
+    const points = array(run.path);
+    path = { vao: gl.createVertexArray(), count: points.length / 3 - 1 };
+    gl.bindVertexArray(path.vao);
+    buffer(points);
+    attribute(programs.lines, "a", 3, gl.FLOAT, false, 12, 0, 1);
+    attribute(programs.lines, "b", 3, gl.FLOAT, false, 12, 12, 1);
+  }
+}
+
+function solid(one, model, colour) {
+  const at = programs.solid;
+  gl.uniformMatrix4fv(at.model, false, model);
+  gl.uniform4fv(at.colour, colour);
+  gl.uniform3fv(at.low, one.low);
+  gl.uniform3fv(at.size, one.size);
+  gl.bindVertexArray(one.vao);
+  gl.drawElements(gl.TRIANGLES, one.count, one.type, 0);
+}
+
+function pointer(pose, length, radius, colour) {
+  const head = Math.min(4.5 * radius, 0.6 * length);
+  solid(arrow.shaft, matrix(pose, [radius, radius, length - head]), colour);
+  const tip = { p: add(pose.p, turn(pose.q, [0, 0, length - head])), q: pose.q };
+  solid(arrow.head, matrix(tip, [2.4 * radius, 2.4 * radius, head]), colour);
+}
+
+function draw(t) {
+  const canvas = gl.canvas, ratio = Math.min(window.devicePixelRatio || 1, 2);
+  const wide = Math.round(canvas.clientWidth * ratio), high = Math.round(canvas.clientHeight * ratio);
+  if (!wide || !high) return;
+  if (canvas.width !== wide || canvas.height !== high) { canvas.width = wide; canvas.height = high; }
+  const { eye, all } = projection(wide / high), now = poses(measured, t), models = now.map((pose) => matrix(pose));
+  gl.viewport(0, 0, wide, high);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+  gl.enable(gl.DEPTH_TEST);
+  gl.depthFunc(gl.LEQUAL);
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+
+  gl.useProgram(programs.grid.made);
+  gl.uniformMatrix4fv(programs.grid.all, false, all);
+  gl.uniform4f(programs.grid.colour, 0.5, 0.54, 0.6, 0.55);
+  gl.uniform2f(programs.grid.middle, camera.target[0], camera.target[1]);
+  gl.uniform1f(programs.grid.reach, 3);
+  gl.depthMask(false);
+  gl.bindVertexArray(grid.vao);
+  gl.drawArrays(gl.LINES, 0, grid.count);
+
+  const at = programs.solid;
+  gl.useProgram(at.made);
+  gl.uniformMatrix4fv(at.all, false, all);
+  gl.uniform3fv(at.eye, eye);
+  const opaque = run.drawables.filter((one) => one.rgba[3] >= 1), clear = run.drawables.filter((one) => one.rgba[3] < 1);
+
+  // Shadows: everything once more, along the light onto the ground; the stencil keeps overlaps from darkening twice.
+  gl.uniform1f(at.flat_, 1);
+  gl.enable(gl.STENCIL_TEST);
+  gl.stencilFunc(gl.EQUAL, 0, 255);
+  gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+  const [sx, sy] = [SUN[0] / SUN[2], SUN[1] / SUN[2]], g = run.ground;
+  const shadow = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, -sx, -sy, 0, 0, sx * g, sy * g, g, 1]);
+  for (const one of opaque) solid(surfaces[one.surface], product(shadow, models[one.frame]), [0.1, 0.13, 0.18, 0.13]);
+  gl.disable(gl.STENCIL_TEST);
+  gl.uniform1f(at.flat_, 0);
+
+  gl.depthMask(true);
+  for (const one of opaque) solid(surfaces[one.surface], models[one.frame], one.rgba);
+  if (shows.frames) {
+    const length = 0.045 * camera.distance;
+    for (const one of run.axes) {
+      const pose = axisPose(one, now);
+      for (let c = 0; c < 3; c++) {
+        const direction = turn(pose.q, [c === 0 ? 1 : 0, c === 1 ? 1 : 0, c === 2 ? 1 : 0]);
+        pointer(along(pose.p, direction), length, length / 26, [0.85 * (c === 0), 0.65 * (c === 1), 0.95 * (c === 2), 1]);
+      }
+    }
+  }
+  if (shows.forces && run.pushes) {
+    const k = moment(t)[0];
+    for (let j = pushFirst[k]; j < pushFirst[k + 1]; j++) {
+      const [x, y, z, dx, dy, dz, force] = pushes.subarray(7 * j, 7 * j + 7);
+      const length = Math.min(force * run.pushes.scale, 2 * run.pushes.longest), direction = [dx, dy, dz];
+      pointer(along(sub([x, y, z], times(direction, length)), direction), length, 0.0035, [0.86, 0.1, 0.2, 1]);
+    }
+  }
+  gl.depthMask(false);
+  for (const one of clear) solid(surfaces[one.surface], models[one.frame], one.rgba);
+  if (shows.ghost && wanted) {
+    const should = poses(wanted, t).map((pose) => matrix(pose)), robot = run.drawables.filter((one) => one.robot);
+    // Its nearest surface only, and behind what lies in the same place.
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(2, 2);
+    gl.depthMask(true);
+    gl.colorMask(false, false, false, false);
+    for (const one of robot) solid(surfaces[one.surface], should[one.frame], GHOST);
+    gl.colorMask(true, true, true, true);
+    for (const one of robot) solid(surfaces[one.surface], should[one.frame], GHOST);
+    gl.disable(gl.POLYGON_OFFSET_FILL);
+  }
+  if (shows.path && path && path.count > 0) {
+    const to = programs.lines;
+    gl.useProgram(to.made);
+    gl.uniformMatrix4fv(to.all, false, all);
+    gl.uniform2f(to.window, wide, high);
+    gl.bindVertexArray(path.vao);
+    gl.uniform1f(to.width, 1.2 * ratio);
+    gl.uniform4f(to.colour, ...PATH, 0.35);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, path.count);
+    gl.uniform1f(to.width, 3 * ratio);
+    gl.uniform4f(to.colour, ...PATH, 1);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, moment(t)[0]);
+  }
+  gl.depthMask(true);
+  label(all, now);
+}
+
+const axisPose = (one, now) => {
+  const frame = now[one.frame];
+  return one.p ? { p: add(frame.p, turn(frame.q, one.p)), q: mul(frame.q, one.q) } : frame;
+};
+
+function label(all, now) {
+  const tags = part("tags");
+  if (shows.frames && !tags.childElementCount) {
+    for (const one of run.axes) {
+      const tag = tags.appendChild(document.createElement("div"));
+      tag.className = "tag";
+      tag.textContent = one.name;
+    }
+  }
+  tags.hidden = !shows.frames;
+  if (!shows.frames) return;
+  const { clientWidth: wide, clientHeight: high } = gl.canvas;
+  run.axes.forEach((one, k) => {
+    const { p } = axisPose(one, now), at = [0, 1, 2, 3].map((c) => all[c] * p[0] + all[4 + c] * p[1] + all[8 + c] * p[2] + all[12 + c]);
+    const tag = tags.children[k];
+    tag.style.display = at[3] > 0 ? "" : "none";
+    tag.style.transform = `translate(${((at[0] / at[3]) * 0.5 + 0.5) * wide + 5}px, ${(0.5 - (at[1] / at[3]) * 0.5) * high + 3}px)`;
+  });
+}

@@ -1,0 +1,64 @@
+// Time: what is shown when, and playing.
+
+let stamps, measured, wanted, bodies, pushFirst, pushes;
+let time = run.start, playing = false, before = 0, waiting = false;
+const shows = { ghost: false, path: true, forces: true, frames: false };
+
+function stepAt(t) {
+  for (let k = run.steps.length - 1; k >= 0; k--)
+    if (run.steps[k].start <= t + 1e-9 && t <= run.steps[k].end) return run.steps[k];
+  return null;
+}
+
+function refresh() {
+  if (waiting) return;
+  waiting = true;
+  requestAnimationFrame((now) => {
+    waiting = false;
+    if (playing) {
+      time += ((now - before) / 1000) * Number(part("speed").value);
+      before = now;
+      if (time >= run.end) {
+        if (part("loop").checked) time = run.start;
+        else { time = run.end; play(false); }
+      }
+    }
+    if (gl) draw(time);
+    drawPlot();
+    tell();
+    if (playing) refresh();
+  });
+}
+
+function play(on) {
+  if (on && time >= run.end) time = run.start;
+  playing = on;
+  before = performance.now();
+  part("play").textContent = on ? "❚❚" : "▶";
+  part("play").setAttribute("aria-label", on ? "pause" : "play");
+  refresh();
+}
+
+function seek(t) {
+  time = Math.min(Math.max(t, run.start), run.end);
+  refresh();
+}
+
+function tell() {
+  const step = stepAt(time), phase = step && [...step.phases].reverse().find((one) => one.start <= time + 1e-9);
+  part("now").textContent = step ? step.label : run.name;
+  part("phase").textContent = phase ? phase.name : "";
+  part("clock").textContent = `${time.toFixed(2)} / ${run.end.toFixed(2)} s`;
+  const track = part("track");
+  part("head-line").style.left = `${(100 * (time - run.start)) / (run.end - run.start || 1)}%`;
+  track.setAttribute("aria-valuenow", time.toFixed(2));
+  for (const each of root.querySelectorAll("[data-step]"))
+    each.classList.toggle("now", step !== null && run.steps[Number(each.dataset.step)] === step);
+  const button = step && part("steps").children[run.steps.indexOf(step)];
+  if (button && button !== tell.last) {
+    tell.last = button;
+    const box = part("steps");
+    if (button.offsetTop < box.scrollTop + box.offsetTop || button.offsetTop + button.offsetHeight > box.scrollTop + box.offsetTop + box.clientHeight)
+      box.scrollTop = button.offsetTop - box.offsetTop - 4;
+  }
+}

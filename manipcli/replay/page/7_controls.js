@@ -1,0 +1,105 @@
+// What can be clicked; and the beginning.
+
+function element(parent, kind, name, text = "") {
+  const made = parent.appendChild(document.createElement(kind));
+  if (name) made.className = name;
+  made.textContent = text;
+  return made;
+}
+
+function scrub(box, at) {
+  const move = (event) => { if (event.buttons || event.type === "pointerdown") seek(at(event)); };
+  box.addEventListener("pointerdown", (event) => { box.setPointerCapture(event.pointerId); move(event); });
+  box.addEventListener("pointermove", move);
+}
+
+function build() {
+  const track = part("track"), length = run.end - run.start || 1, good = (step) => step.outcome === "done";
+  run.steps.forEach((step, k) => {
+    const piece = track.insertBefore(document.createElement("div"), part("head-line"));
+    piece.className = "step" + (good(step) ? "" : " bad");
+    piece.dataset.step = k;
+    piece.style.left = `${(100 * (step.start - run.start)) / length}%`;
+    piece.style.width = `${(100 * (step.end - step.start)) / length}%`;
+    piece.textContent = step.label;
+    piece.title = `${step.label}: ${step.outcome}${step.text ? "\n" + step.text : ""}`;
+    for (const phase of step.phases) {
+      const line = element(piece, "div", "phase");
+      line.style.left = `${(100 * (phase.start - step.start)) / (step.end - step.start || 1)}%`;
+    }
+    const button = element(part("steps"), "button");
+    button.type = "button";
+    button.dataset.step = k;
+    button.title = piece.title;
+    element(button, "span", "mark" + (good(step) ? "" : " bad"), good(step) ? "✓" : "✗");
+    element(button, "span", "", step.label);
+    element(button, "span", "phase", step.phases.map((one) => one.name).join(" · "));
+    element(button, "span", "when", `${step.start.toFixed(2)} s`);
+    button.addEventListener("click", () => seek(step.start));
+  });
+  scrub(track, (event) => {
+    const box = track.getBoundingClientRect();
+    return run.start + ((event.clientX - box.left) / box.width) * length;
+  });
+  scrub(part("plot"), (event) => plot.at(event.clientX - part("plot").getBoundingClientRect().left));
+  part("play").addEventListener("click", () => play(!playing));
+  for (const name of Object.keys(shows)) {
+    const box = part("show-" + name);
+    if (!box) continue;
+    box.checked = shows[name];
+    box.addEventListener("change", () => { shows[name] = box.checked; refresh(); });
+  }
+  const tables = part("table"), columns = part("column");
+  run.curves.forEach((table, k) => { element(tables, "option", "", table.name).value = k; });
+  const fill = () => {
+    plot.table = Number(tables.value);
+    const table = run.curves[plot.table], chosen = columns.value;
+    columns.textContent = "";
+    element(columns, "option", "", "all").value = -1;
+    if (table) table.columns.forEach((name, k) => { element(columns, "option", "", name).value = k; });
+    if (chosen && columns.options.length > Number(chosen) + 1) columns.value = chosen;
+    plot.column = Number(columns.value);
+    refresh();
+  };
+  tables.addEventListener("change", fill);
+  columns.addEventListener("change", () => { plot.column = Number(columns.value); refresh(); });
+  part("span").addEventListener("change", () => { plot.span = Number(part("span").value); refresh(); });
+  fill();
+  (root.dataset.page ? document : root).addEventListener("keydown", (event) => {
+    if (event.target.tagName === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " " && event.target.tagName !== "BUTTON") play(!playing);
+    else if (event.key === "ArrowRight" || event.key === "ArrowLeft")
+      seek(time + (event.key === "ArrowRight" ? 1 : -1) * (event.shiftKey ? 1 : 0.1));
+    else return;
+    event.preventDefault();
+  });
+  new ResizeObserver(refresh).observe(root);
+}
+
+function complain(text) {
+  element(root.querySelector(".view"), "div", "trouble", text);
+}
+
+async function begin() {
+  await unpack();
+  stamps = array(run.times);
+  measured = array(run.position);
+  wanted = run.reference ? array(run.reference) : null;
+  bodies = array(run.body);
+  if (run.pushes) [pushFirst, pushes] = [array(run.pushes.first), array(run.pushes.rows)];
+  for (const table of run.curves) table.values = array(table.values);
+  look();
+  try {
+    furnish(part("canvas"));
+    steer(part("canvas"));
+  } catch (error) {
+    gl = null;
+    complain(error.message);
+  }
+  build();
+  refresh();
+  // For scripts, and for whoever tests a page.
+  root.player = { run, seek, play, poses: (t) => poses(measured, t), get time() { return time; }, get playing() { return playing; } };
+}
+
+begin().catch((error) => complain("The run cannot be shown: " + error.message));

@@ -1,0 +1,258 @@
+"""A run as a page that plays by itself: one file, no server, nothing fetched.
+
+`player_html` is a piece of a page, to be put into a larger one; `player_page` a page of its own. The browser gets the
+triangles once and the joints at every time, and does the kinematics itself.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import zlib
+from dataclasses import dataclass, field
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Transform
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.replay.camera import framing
+from manipcli.replay.drawing import WORLD, Drawing, draw, link_frame
+from manipcli.replay.forces import LONGEST, Forces
+from manipcli.replay.ground import floors_of, ground_height
+from manipcli.replay.placing import Poses
+from manipcli.replay.playback import Playback
+from manipcli.replay.surface import Surface
+
+Json = dict[str, object]
+Reference = tuple[str, int, int]
+"""Kind of number, offset [byte] and count of an array in the pack."""
+
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+"""What a page of its own may do: nothing but itself."""
+LEVEL = 9
+
+
+@dataclass(slots=True)
+class _Pack:
+    """Arrays behind each other, each at a multiple of four bytes."""
+
+    parts: list[bytes] = field(default_factory=list)
+    length: int = 0
+
+    def add(self, values: npt.ArrayLike, kind: str) -> Reference:
+        """`kind`: f float32, H uint16, I uint32, b int8."""
+        array = np.ascontiguousarray(values, dtype={"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[kind])
+        data = array.tobytes()
+        reference = (kind, self.length, array.size)
+        data += bytes(-len(data) % 4)
+        self.parts.append(data)
+        self.length += len(data)
+        return reference
+
+    def text(self) -> str:
+        return base64.b64encode(zlib.compress(b"".join(self.parts), LEVEL)).decode()
+
+
+def player_html(playback: Playback, *, whole_page: bool = False) -> str:
+    """A run as an HTML element with its own style and script; several may stand in one page.
+
+    Args:
+        playback: the run.
+        whole_page: the element has the page to itself: it takes the keys, too.
+    """
+    head, data = _contents(playback)
+    page = files("manipcli.replay").joinpath("page")
+    script = "".join(
+        one.read_text("utf-8") for one in sorted(page.iterdir(), key=lambda one: one.name) if one.name.endswith(".js")
+    )
+    return (
+        f'<div class="mc-player"{" data-page=1" if whole_page else ""}>\n'
+        f"<style>\n{page.joinpath('player.css').read_text('utf-8')}</style>\n"
+        f"{page.joinpath('player.html').read_text('utf-8')}"
+        f'<script type="application/json" data-part="head">{head}</script>\n'
+        f'<script type="text/plain" data-part="data">{data}</script>\n'
+        f"<script>(function () {{\n{script}}})();</script>\n</div>\n"
+    )
+
+
+def player_page(playback: Playback) -> str:
+    """A whole page: what was run and how it went, and the run."""
+    verdict = playback.verdict
+    name = html.escape(playback.name)
+    said = []
+    if verdict is not None:
+        good = verdict.verdict == "passed"
+        word = f"{'✓' if good else '✗'} {verdict.verdict}"
+        said.append(f'<p><b class="{"good" if good else "bad"}">{word}</b> {html.escape(verdict.text)}</p>')
+    if playback.lost is not None:
+        said.append(f'<p class="bad">The log is not closed: {html.escape(playback.lost)}</p>')
+    said += [f'<p class="note">{html.escape(note)}</p>' for note in playback.notes]
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<title>{name}</title><link rel="icon" href="data:,">\n'
+        "<style>\nbody { margin: 0; padding: 12px 16px; background: #fff; color: #1d2733;"
+        ' font: 14px/1.4 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }\n'
+        "header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 2px 16px; margin-bottom: 10px; }\n"
+        "h1 { font-size: 20px; margin: 0; } p { margin: 0; } .good { color: #1a7f4b; } .bad { color: #c4342d; }\n"
+        ".note { color: #687686; }\n"
+        "@media (min-width: 761px) { body { height: 100vh; box-sizing: border-box; display: flex;"
+        " flex-direction: column; } body > .mc-player { flex: 1; height: auto; min-height: 0; } }\n"
+        f"</style></head><body>\n<header><h1>{name}</h1>{''.join(said)}</header>\n"
+        f"{player_html(playback, whole_page=True)}</body></html>\n"
+    )
+
+
+def _contents(playback: Playback) -> tuple[str, str]:
+    """What the script reads: the head as JSON that cannot end its element, and the arrays."""
+    pack = _Pack()
+    drawing = draw(playback.robot, playback.scene)
+    poses = playback.poses()
+    frames, order = _frames(drawing, playback.robot, playback.scene)
+    floors = floors_of(playback.scene)
+    index = {name: k for k, name in enumerate(drawing.frames)}
+    start = Poses(poses.position[0], poses.quat_xyzw[0])
+    camera = framing(drawing, start, leave_out=floors).further(1.2)
+    surfaces, drawables = _drawables(drawing, index, floors, pack)
+    path = playback.tool_path()
+    moved = (
+        playback.robot is not None and not np.isnan(playback.reference).all() and len(playback.robot.moving_joints) > 0
+    )
+    head: Json = {
+        "name": playback.name,
+        "start": playback.start,
+        "end": playback.end,
+        "steps": [
+            {
+                "label": step.label,
+                "start": step.start,
+                "end": step.end,
+                "outcome": step.outcome,
+                "text": step.text,
+                "phases": [{"name": phase.name, "start": phase.start, "end": phase.end} for phase in step.phases],
+            }
+            for step in playback.steps
+        ],
+        "camera": {"eye": camera.eye, "target": camera.target, "field": camera.field},
+        "ground": ground_height(drawing, start, floors),
+        "frames": frames,
+        "order": order,
+        "axes": _axes(drawing, index, floors),
+        "joints": playback.joint_names,
+        "bodies": playback.body_position.shape[1],
+        "surfaces": surfaces,
+        "drawables": drawables,
+        "times": pack.add(playback.times, "f"),
+        "position": pack.add(np.nan_to_num(playback.position), "f"),
+        "reference": pack.add(playback.reference_position(), "f") if moved else None,
+        "body": pack.add(np.concatenate([playback.body_position, playback.body_quat_xyzw], axis=2), "f"),
+        "path": pack.add(path, "f") if len(path) > 1 else None,
+        "pushes": _pushes(playback, poses, pack),
+        "curves": [
+            {"name": one.name, "columns": one.columns, "units": one.units, "values": pack.add(one.values, "f")}
+            for one in playback.curves()
+        ],
+    }
+    text = json.dumps(head, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    # In JSON these three stand in strings only; a name must not end the script element.
+    safe = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return safe, pack.text()
+
+
+def _frames(drawing: Drawing, robot: RobotModel | None, scene: Scene | None) -> tuple[list[Json], list[int]]:
+    """How each frame of a drawing moves, and an order in which each comes after the one that it hangs on."""
+    index = {name: k for k, name in enumerate(drawing.frames)}
+    found: list[Json] = [{"p": (0.0, 0.0, 0.0), "q": (0.0, 0.0, 0.0, 1.0)}]
+    order = [0]
+    if robot is not None:
+        above = {joint.child: joint for joint in robot.joints}
+        number = {name: k for k, name in enumerate(robot.joint_names)}
+        for link in robot.links:
+            joint = above.get(link.name)
+            if joint is None:
+                found.append(_pose(robot.X_WB))
+                continue
+            frame = {"parent": index[link_frame(joint.parent)], **_pose(joint.X_PJ)}
+            if joint.moves:
+                frame |= {"joint": number[joint.name], "axis": joint.axis.tolist()}
+                frame |= {"slides": True} if joint.type == "prismatic" else {}
+            found.append(frame)
+        order.append(index[link_frame(robot.root)])
+        order += [index[link_frame(joint.child)] for joint in robot.joints]
+    movable = 0
+    for body in scene.bodies if scene is not None else ():
+        order.append(index[body.name])
+        found.append(_pose(body.X_WO) if body.fixed else {"body": movable})
+        movable += not body.fixed
+    return found, order
+
+
+def _pose(X: Transform) -> Json:
+    return {"p": X.p.tolist(), "q": X.quat_xyzw.tolist()}
+
+
+def _axes(drawing: Drawing, index: dict[str, int], floors: frozenset[str]) -> list[Json]:
+    """What is shown as three axes with a name: every frame but the world, and the marks."""
+    shown: list[Json] = [
+        {"name": frame.removeprefix("robot/"), "frame": index[frame]}
+        for frame in drawing.frames
+        if frame != WORLD and frame not in floors
+    ]
+    return shown + [{"name": mark.name, "frame": index[mark.frame], **_pose(mark.X_FM)} for mark in drawing.marks]
+
+
+def _drawables(
+    drawing: Drawing, index: dict[str, int], floors: frozenset[str], pack: _Pack
+) -> tuple[list[Json], list[Json]]:
+    """Surfaces, each once however often it is drawn, and what is drawn."""
+    surfaces: list[Json] = []
+    known: dict[bytes, int] = {}
+    drawables: list[Json] = []
+    for one in drawing.layer("visual"):
+        if one.frame in floors or not len(one.surface.faces):
+            continue
+        key = one.surface.vertices.tobytes() + one.surface.faces.tobytes()
+        if key not in known:
+            known[key] = len(surfaces)
+            surfaces.append(_surface(one.surface, pack))
+        drawable: Json = {"surface": known[key], "frame": index[one.frame], "rgba": [round(c, 4) for c in one.rgba]}
+        drawables.append(drawable | ({"robot": True} if one.frame.startswith("robot/") else {}))
+    return surfaces, drawables
+
+
+def _surface(surface: Surface, pack: _Pack) -> Json:
+    """Vertices to a 65535th of their box (5 um of a link 0.3 m long), normals to a 127th, four numbers a row."""
+    low = surface.vertices.min(axis=0)
+    size = np.maximum(np.ptp(surface.vertices, axis=0), 1e-9)
+    count = len(surface.vertices)
+    places = np.zeros((count, 4))
+    places[:, :3] = np.round((surface.vertices - low) / size * 65535.0)
+    normals = np.zeros((count, 4))
+    normals[:, :3] = np.round(surface.normals * 127.0)
+    return {
+        "places": pack.add(places, "H"),
+        "normals": pack.add(normals, "b"),
+        "faces": pack.add(surface.faces, "H" if count <= 65535 else "I"),
+        "low": low.tolist(),
+        "size": size.tolist(),
+    }
+
+
+def _pushes(playback: Playback, poses: Poses, pack: _Pack) -> Json | None:
+    """Rows of point, direction, force, and for each time the first of its rows."""
+    forces = Forces(playback, poses)
+    if not forces.scale:
+        return None
+    each = [forces.at(k) for k in range(len(playback.times))]
+    rows = [[*push.point, *push.direction, push.force] for pushes in each for push in pushes]
+    return {
+        "first": pack.add(np.cumsum([0, *map(len, each)]), "I"),
+        "rows": pack.add(np.array(rows).reshape(-1, 7), "f"),
+        "scale": forces.scale,
+        "longest": LONGEST,
+    }
