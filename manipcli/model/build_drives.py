@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Actuator, Joint, TransmissionTag
 from manipcli.model.transmissions import BY_TYPE, TRANSMISSIONS
@@ -61,7 +63,7 @@ def build_transmissions(
 
 
 def build_actuators(
-    reporter: Reporter, spec: RobotSpec, transmissions: Sequence[TransmissionTag]
+    reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], transmissions: Sequence[TransmissionTag]
 ) -> tuple[Actuator, ...]:
     """The actuators of the robot file; each is one of a transmission."""
     known = [name for tag in transmissions if tag.type in BY_TYPE for name in tag.actuators]
@@ -70,6 +72,8 @@ def build_actuators(
             message = f"actuator '{name}' is not in a transmission of the robot"
             hint = did_you_mean(name, known) or "say under `transmissions:` which joint it drives"
             reporter.error("ROBOT344", message, ("actuators", name), hint=hint)
+    for tag in transmissions:
+        _compare_speeds(reporter, spec, joints, tag)
     return tuple(
         Actuator(
             name=name,
@@ -83,6 +87,23 @@ def build_actuators(
         )
         for name, each in spec.actuators.items()
     )
+
+
+def _compare_speeds(reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], tag: TransmissionTag) -> None:
+    """A note for each actuator that is too slow for its joints: plans know the joints' limits, not the actuators'."""
+    by_name = {joint.name: joint for joint in joints}
+    limits = [by_name[name].limits.velocity for name in tag.joints if name in by_name]
+    if tag.type not in BY_TYPE or len(limits) < len(tag.joints) or None in limits:
+        return
+    needed = np.abs(BY_TYPE[tag.type].of(tag, spec.compat).maps.actuator_motion) @ np.array(limits, dtype=np.float64)
+    for name, speed in zip(tag.actuators, needed, strict=True):
+        own = spec.actuators.get(name)
+        if own is None or own.velocity is None or speed <= own.velocity * (1.0 + 1e-9):
+            continue
+        message = f"actuator '{name}' reaches {own.velocity:.4g} rad/s or m/s, and would have to turn at {speed:.4g}"
+        message += f" with {' and '.join(tag.joints)} at their velocity limits"
+        hint = f"narrow them: limits: {{{tag.joints[0]}: {{velocity: ...}}}}"
+        reporter.note("ROBOT345", message, ("actuators", name, "velocity"), hint=hint)
 
 
 def _tag(name: str, spec: TransmissionSpec) -> TransmissionTag:

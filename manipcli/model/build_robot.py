@@ -136,7 +136,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
         for name in pair:
             _known_link(reporter, name, links, ("collision_ignore", k))
     transmissions = build_transmissions(reporter, spec, joints, body.transmissions)
-    actuators = build_actuators(reporter, spec, transmissions)
+    actuators = build_actuators(reporter, spec, joints, transmissions)
     reporter.stop()
     return RobotModel(
         name=spec.robot,

@@ -250,6 +250,8 @@ DESCRIPTIONS = {
     "arm7_hand3": "urdf/arm7_hand3.urdf.xacro",
     "panda": "package://pybullet_data/franka_panda/panda.urdf",
     "iiwa7": "package://pybullet_data/kuka_iiwa/model.urdf",
+    "differential_wrist": "differential_wrist.urdf",
+    "four_bar_finger": "four_bar_finger.urdf",
 }
 
 

@@ -218,6 +218,16 @@ def test_mistakes_in_a_robot_file_are_told_at_their_place(tmp_path: Path, more: 
     assert "robot.yaml:" in told
 
 
+def test_an_actuator_too_slow_for_its_joints_is_noted(tmp_path: Path) -> None:
+    """A differential's turns for both joints at once: 30 (2 + 2) rad/s, beyond the 100 that it has."""
+    own = OWN.replace("3000 deg/s", "100")
+    (note,) = [finding for finding in read(tmp_path, "", own)[1] if finding.code == "ROBOT345"]
+    assert note.severity == "note"
+    assert "actuator 'left' reaches 100 rad/s or m/s, and would have to turn at 120 with foo and bar" in str(note)
+    fast = read(tmp_path, "", own.replace("velocity: 100", "velocity: 120"))[1]
+    assert "ROBOT345" not in {finding.code for finding in fast}
+
+
 def test_half_of_a_described_pair_is_not_replaced(tmp_path: Path) -> None:
     told = refused(tmp_path, ros1("DifferentialTransmission", *ROLES1), SIMPLE.replace("t:", "u:"))
     assert "transmission 'u' takes joint 'foo' out of 't' of the description" in told
