@@ -62,6 +62,7 @@ class Actuation:
             return np.array(values, dtype=np.float64)
 
         self._effort = each([math.inf if x.effort is None else x.effort for x in actuators])
+        self._pull = -self._effort
         self._velocity = each([math.inf if x.velocity is None else x.velocity for x in actuators])
         self._coulomb = each([x.coulomb_friction for x in actuators])
         self._viscous = each([x.viscous_friction for x in actuators])
@@ -116,6 +117,7 @@ class Actuation:
             self._to_actuator[a:, n:][:, here] = maps.actuator_motion[:, by_effort]
         self._pass = np.ones(n)
         self._pass[here] = 0.0
+        self._passes = len(here) < n
 
     def reset(self) -> None:
         """Forgets past commands and the counts."""
@@ -157,8 +159,9 @@ class Actuation:
         if self._rubs:
             given = self._rubbed(given, speed, position)
         np.dot(self._to_joint, given, out=self._applied)
-        np.multiply(command, self._pass, out=self._passed)
-        np.add(self._applied, self._passed, out=self._applied)
+        if self._passes:
+            np.multiply(command, self._pass, out=self._passed)
+            np.add(self._applied, self._passed, out=self._applied)
         return self._applied
 
     def _delayed(self, wanted: Array) -> Array:
@@ -177,21 +180,20 @@ class Actuation:
 
     def _limited(self, wanted: Array, speed: Array) -> Array:
         """Cut to what the motors can give; counted where that is less than wanted."""
-        most, least, given = self._most, self._least, self._given
-        most[:] = self._effort
+        most, least, given = self._effort, self._pull, self._given
         if len(speed):
-            np.greater(speed, self._velocity, out=self._fast)
-            np.copyto(most, 0.0, where=self._fast)
-            np.negative(self._effort, out=least)
-            np.negative(speed, out=self._friction)
+            np.abs(speed, out=self._friction)
             np.greater(self._friction, self._velocity, out=self._fast)
-            np.copyto(least, 0.0, where=self._fast)
-        else:
-            np.negative(self._effort, out=least)
+            if np.count_nonzero(self._fast):
+                most, least = self._most, self._least
+                most[:], least[:] = self._effort, self._pull
+                np.copyto(most, 0.0, where=self._fast & (speed > 0.0))
+                np.copyto(least, 0.0, where=self._fast & (speed < 0.0))
         np.minimum(wanted, most, out=given)
         np.maximum(given, least, out=given)
         np.not_equal(given, wanted, out=self.saturated)
-        np.add(self.saturations, self.saturated, out=self.saturations)
+        if np.count_nonzero(self.saturated):
+            np.add(self.saturations, self.saturated, out=self.saturations)
         return given
 
     def _rubbed(self, given: Array, speed: Array, position: Array) -> Array:
