@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Literal, overload
 
 import numpy as np
@@ -14,7 +14,6 @@ from manipcli.core.geometry import Array
 
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 Compat = Literal["ros1", "ros2"]
-Step = Callable[[Array, float, Array | None], Array]
 
 
 class Pid:
@@ -33,13 +32,14 @@ class Pid:
         p, i, d: gains, numbers or (n).
         u_min, u_max: bounds of the command.
         i_min, i_max: bounds of the integral term; i_min <= 0 <= i_max.
-        antiwindup: see above.
+        antiwindup: see above; one word, or (n).
         tracking_time: [s] of back calculation; 0 chooses sqrt(d / i), or p / i where d is 0.
+        error_deadband: errors that are not larger are not integrated; rad or m, 0 or more.
         compat: see above.
 
     Raises:
-        InvalidArgument: a gain or bound that is NaN, u_min >= u_max, i_min > 0, i_max < 0, a negative tracking time,
-            back calculation with `ros1` (which has none).
+        InvalidArgument: a gain or bound that is NaN, u_min >= u_max, i_min > 0, i_max < 0, a negative tracking time or
+            deadband, back calculation with `ros1` (which has none).
     """
 
     def __init__(
@@ -52,19 +52,31 @@ class Pid:
         u_max: npt.ArrayLike = math.inf,
         i_min: npt.ArrayLike = -math.inf,
         i_max: npt.ArrayLike = math.inf,
-        antiwindup: AntiWindup = "none",
+        antiwindup: AntiWindup | Sequence[AntiWindup] = "none",
         tracking_time: npt.ArrayLike = 0.0,
+        error_deadband: npt.ArrayLike = 0.0,
         compat: Compat = "ros2",
     ) -> None:
-        if antiwindup not in ("none", "back_calculation", "conditional_integration"):
-            raise InvalidArgument("CTRL110", f"unknown anti-windup '{antiwindup}'")
-        if compat == "ros1" and antiwindup == "back_calculation":
+        words = np.atleast_1d(np.asarray(antiwindup))
+        for word in words:
+            if word not in ("none", "back_calculation", "conditional_integration"):
+                raise InvalidArgument("CTRL110", f"unknown anti-windup '{word}'")
+        if compat not in ("ros1", "ros2"):
+            raise InvalidArgument("CTRL110", f"compat = {compat!r}; expected 'ros1' or 'ros2'")
+        if compat == "ros1" and (words == "back_calculation").any():
             raise InvalidArgument("CTRL110", "back_calculation does not exist in ROS 1", hint="use compat='ros2'")
-        self._antiwindup = antiwindup
         self._ros1 = compat == "ros1"
         self._scalar = True
         self._size = 0
-        self.set_gains(p=p, i=i, d=d, u_min=u_min, u_max=u_max, i_min=i_min, i_max=i_max, tracking_time=tracking_time)
+        self.set_gains(
+            p=p, i=i, d=d, u_min=u_min, u_max=u_max, i_min=i_min, i_max=i_max, tracking_time=tracking_time,
+            error_deadband=error_deadband,
+        )  # fmt: skip
+        if words.size not in (1, self._size):
+            raise InvalidArgument("CTRL114", f"{words.size} kinds of anti-windup for gains of {self._size} joints")
+        words = np.broadcast_to(words, (self._size,))
+        self._tracks, self._conditional = words == "back_calculation", words == "conditional_integration"
+        self._any_tracks, self._any_conditional = bool(self._tracks.any()), bool(self._conditional.any())
 
     def set_gains(
         self,
@@ -77,43 +89,48 @@ class Pid:
         i_min: npt.ArrayLike = -math.inf,
         i_max: npt.ArrayLike = math.inf,
         tracking_time: npt.ArrayLike = 0.0,
+        error_deadband: npt.ArrayLike = 0.0,
     ) -> None:
         """Replaces all gains and bounds, or none of them when one is invalid; the integral is kept.
 
         Raises:
             InvalidArgument: as the constructor; also gains for another number of joints than before.
         """
-        raw = [np.asarray(v, dtype=np.float64) for v in (p, i, d, u_min, u_max, i_min, i_max, tracking_time)]
-        names = ("p", "i", "d", "u_min", "u_max", "i_min", "i_max", "tracking_time")
-        scalar = all(v.ndim == 0 for v in raw)
-        g = [np.array(v) for v in np.broadcast_arrays(*(np.atleast_1d(v) for v in raw))]
-        for name, value in zip(names, g, strict=True):
-            if np.isnan(value).any() or (name in ("p", "i", "d", "tracking_time") and not np.isfinite(value).all()):
-                raise InvalidArgument("CTRL110", f"{name} is {value.tolist()}; expected finite numbers")
-        if (g[3] >= g[4]).any():
-            raise InvalidArgument("CTRL111", f"u_min {g[3].tolist()} is not below u_max {g[4].tolist()}")
-        if (g[5] > 0.0).any() or (g[6] < 0.0).any():
-            raise InvalidArgument("CTRL112", f"i_min {g[5].tolist()}, i_max {g[6].tolist()}: 0 is not between")
-        if (g[7] < 0.0).any():
-            raise InvalidArgument("CTRL113", f"tracking_time {g[7].tolist()} is negative")
-        if self._size not in (0, g[0].size):
-            raise InvalidArgument("CTRL114", f"gains for {g[0].size} joints; this PID has {self._size}")
-        self._p, self._i, self._d, self._u_min, self._u_max, self._i_min, self._i_max, tracking = g
+        given = {
+            "p": p, "i": i, "d": d, "u_min": u_min, "u_max": u_max, "i_min": i_min, "i_max": i_max,
+            "tracking_time": tracking_time, "error_deadband": error_deadband,
+        }  # fmt: skip
+        raw = [np.asarray(value, dtype=np.float64) for value in given.values()]
+        scalar = all(value.ndim == 0 for value in raw)
+        g = dict(zip(given, map(np.array, np.broadcast_arrays(*map(np.atleast_1d, raw))), strict=True))
+        _check(g)
+        size = g["p"].size
+        if self._size not in (0, size):
+            raise InvalidArgument("CTRL114", f"gains for {size} joints; this PID has {self._size}")
+        self._i, self._deadband = g["i"], g["error_deadband"]
+        self._u_min, self._u_max, self._i_min, self._i_max = g["u_min"], g["u_max"], g["i_min"], g["i_max"]
         if self._size == 0:
-            self._scalar, self._size = scalar, g[0].size
-            self._term, self._integral, self._last_error, self._command, self._scratch = np.zeros((5, self._size))
+            self._scalar, self._size = scalar, size
+            self._term, self._integral, self._last_error, self._command = np.zeros((4, size))
+            self._scratch, self._unsaturated = np.zeros((2, size))
+            self._products = np.zeros((2, size))
+            self._proportional, self._derivative = self._products
             self._has_last = False
+        self._gains = np.stack([g["p"], g["d"]])
         integrates = self._i != 0.0
         safe_i = np.where(integrates, self._i, 1.0)
-        chosen = np.where(self._d != 0.0, np.sqrt(np.abs(self._d / safe_i)), np.abs(self._p / safe_i))
+        chosen = np.where(g["d"] != 0.0, np.sqrt(np.abs(g["d"] / safe_i)), np.abs(g["p"] / safe_i))
+        tracking = g["tracking_time"]
         self._tracking = np.where(tracking > 0.0, tracking, np.where(integrates, chosen, 0.0))
         tracks = self._tracking > 0.0
-        self._inverse_tracking = np.where(tracks, 1.0 / np.where(tracks, self._tracking, 1.0), 0.0)
+        self._inverse_tracking = np.where(tracks & integrates, 1.0 / np.where(tracks, self._tracking, 1.0), 0.0)
         self._integral_min = np.where(integrates, np.minimum(self._i_min / safe_i, self._i_max / safe_i), -np.inf)
         self._integral_max = np.where(integrates, np.maximum(self._i_min / safe_i, self._i_max / safe_i), np.inf)
-        self._has_i, self._has_d = bool(integrates.any()), bool(self._d.any())
+        self._has_i, self._has_d = bool(integrates.any()), bool(g["d"].any())
+        self._has_deadband = bool(self._deadband.any())
         self._clamps_u = bool(np.isfinite(self._u_min).any() or np.isfinite(self._u_max).any())
         self._clamps_i = bool(np.isfinite(self._i_min).any() or np.isfinite(self._i_max).any())
+        self._is_pd = not (self._has_i or self._clamps_u)
 
     @property
     def tracking_time(self) -> Array:
@@ -152,77 +169,104 @@ class Pid:
         Raises:
             InvalidArgument: a negative dt, or an error of another size than the gains.
         """
+        errors = np.zeros((2, self._size))
         if self._scalar:
-            e = np.array([error], dtype=np.float64)
-            rate = None if error_rate is None else np.array([error_rate], dtype=np.float64)
+            errors[0, 0] = error
+        elif np.shape(error) == (self._size,):
+            errors[0] = error
         else:
-            e, rate = np.asarray(error), None if error_rate is None else np.asarray(error_rate)
-        if e.shape != (self._size,):
             raise InvalidArgument("CTRL114", f"an error of shape {np.shape(error)} for gains of {self._size} joints")
         if not dt > 0.0:
             if dt != 0.0:
                 raise InvalidArgument("CTRL115", f"dt is {dt} s; expected a time that is not negative")
             return float(self._command[0]) if self._scalar else self._command.copy()
-        if rate is None and self._has_d:
-            rate = (e - self._last_error) / dt if self._has_last or not self._ros1 else np.zeros(self._size)
-        step = self._step_ros1 if self._ros1 else self._step
-        # Infinity times 0 is NaN too, so one product tells whether everything is finite; overflow is sorted out there.
-        finite = math.isfinite(e.dot(e if rate is None else rate))
-        command = step(e, dt, rate) if finite else self._masked(step, e, dt, rate)
-        return float(command[0]) if self._scalar else command
-
-    def _step(self, e: Array, dt: float, rate: Array | None) -> Array:
-        scratch = self._scratch
-        command = self._p * e
-        if rate is not None:
-            np.multiply(self._d, rate, out=scratch)
-            command += scratch
-        if self._has_i:
-            command += self._term
-        unsaturated = command
-        if self._clamps_u:
-            command = np.minimum(np.maximum(unsaturated, self._u_min), self._u_max)
-        if self._has_i:
-            np.multiply(self._i, e, out=scratch)
-            if self._antiwindup == "back_calculation":
-                scratch += (command - unsaturated) * self._inverse_tracking
-            elif self._antiwindup == "conditional_integration":
-                scratch[(command != unsaturated) & (e * unsaturated > 0.0)] = 0.0
-            scratch *= dt
-            term = self._term
-            term += scratch
-            if self._clamps_i:
-                np.maximum(term, self._i_min, out=term)
-                np.minimum(term, self._i_max, out=term)
-            if self._antiwindup == "back_calculation":
-                term[self._i == 0.0] = 0.0
-        return self._remember(e, command)
-
-    def _step_ros1(self, e: Array, dt: float, rate: Array | None) -> Array:
-        integral = self._integral
-        integral += dt * e
-        if self._antiwindup == "conditional_integration":
-            np.minimum(np.maximum(integral, self._integral_min), self._integral_max, out=integral)
-        np.minimum(np.maximum(self._i * integral, self._i_min), self._i_max, out=self._term)
-        command = self._p * e + self._term
-        if rate is not None:
-            command += self._d * rate
-        command = np.minimum(np.maximum(command, self._u_min), self._u_max)
-        return self._remember(e, command)
-
-    def _masked(self, step: Step, e: Array, dt: float, rate: Array | None) -> Array:
-        """NaN for the joints whose error is not finite, their state kept; the others as ever."""
-        bad = ~np.isfinite(e)
-        if rate is not None:
-            bad |= ~np.isfinite(rate)
-        kept = [self._term[bad], self._integral[bad], self._last_error[bad]]
-        command = step(np.where(bad, 0.0, e), dt, None if rate is None else np.where(bad, 0.0, rate)).copy()
-        self._term[bad], self._integral[bad], self._last_error[bad] = kept
-        command[bad] = np.nan
-        return command
-
-    def _remember(self, e: Array, command: Array) -> Array:
-        self._last_error[:] = e
+        if error_rate is not None:
+            errors[1] = error_rate
+        elif self._has_d and (self._has_last or not self._ros1):
+            errors[1] = (errors[0] - self._last_error) / dt
+        command = np.empty(self._size)
+        if np.isfinite(errors).all():
+            self.apply(errors, dt, command)
+            self._last_error[:] = errors[0]
+        else:
+            self._apply_finite(errors, dt, command)
         self._has_last = True
         self._command = command
-        return command
+        return float(command[0]) if self._scalar else command
+
+    def apply(self, errors: Array, dt: float, command: Array) -> None:
+        """`update` for loops, in place: no check, nothing remembered but the integral.
+
+        Args:
+            errors: (2, n) errors and their rates, all finite.
+            dt: [s] above 0.
+            command: (n) is overwritten.
+        """
+        np.multiply(self._gains, errors, self._products)
+        np.add(self._proportional, self._derivative, command)
+        if self._is_pd:
+            return
+        if self._ros1:
+            self._integrate_first(errors[0], dt)
+        if self._has_i:
+            command += self._term
+        unsaturated = self._unsaturated
+        unsaturated[:] = command
+        if self._clamps_u:
+            np.maximum(command, self._u_min, out=command)
+            np.minimum(command, self._u_max, out=command)
+        if self._has_i and not self._ros1:
+            self._integrate_afterwards(errors[0], dt, command, unsaturated)
+
+    def _integrate_first(self, e: Array, dt: float) -> None:
+        """ROS 1: backward Euler, on the integral of the error."""
+        integral = self._integral
+        integral += dt * self._counted(e)
+        if self._any_conditional:
+            bounded = np.minimum(np.maximum(integral, self._integral_min), self._integral_max)
+            integral[self._conditional] = bounded[self._conditional]
+        np.minimum(np.maximum(self._i * integral, self._i_min), self._i_max, out=self._term)
+
+    def _integrate_afterwards(self, e: Array, dt: float, command: Array, unsaturated: Array) -> None:
+        """ROS 2: forward Euler, on the term."""
+        scratch, term = self._scratch, self._term
+        np.multiply(self._i, self._counted(e), out=scratch)
+        if self._any_tracks:
+            scratch += self._tracks * (command - unsaturated) * self._inverse_tracking
+        if self._any_conditional:
+            scratch[self._conditional & (command != unsaturated) & (e * unsaturated > 0.0)] = 0.0
+        scratch *= dt
+        term += scratch
+        if self._clamps_i:
+            np.maximum(term, self._i_min, out=term)
+            np.minimum(term, self._i_max, out=term)
+
+    def _counted(self, e: Array) -> Array:
+        """The errors that are integrated."""
+        return np.where(np.abs(e) > self._deadband, e, 0.0) if self._has_deadband else e
+
+    def _apply_finite(self, errors: Array, dt: float, command: Array) -> None:
+        """NaN for the joints whose error is not finite, their state kept; the others as ever."""
+        bad = ~np.isfinite(errors).all(axis=0)
+        kept = self._term[bad], self._integral[bad], self._last_error[bad]
+        safe = np.where(bad, 0.0, errors)
+        self.apply(safe, dt, command)
+        self._last_error[:] = safe[0]
+        self._term[bad], self._integral[bad], self._last_error[bad] = kept
+        command[bad] = np.nan
+
+
+def _check(g: dict[str, Array]) -> None:
+    """Raises InvalidArgument for gains and bounds that say no law."""
+    for name, value in g.items():
+        bound = name in ("u_min", "u_max", "i_min", "i_max")
+        if np.isnan(value).any() or not (bound or np.isfinite(value).all()):
+            raise InvalidArgument("CTRL110", f"{name} is {value.tolist()}; expected finite numbers")
+    if (g["u_min"] >= g["u_max"]).any():
+        raise InvalidArgument("CTRL111", f"u_min {g['u_min'].tolist()} is not below u_max {g['u_max'].tolist()}")
+    if (g["i_min"] > 0.0).any() or (g["i_max"] < 0.0).any():
+        message = f"i_min {g['i_min'].tolist()}, i_max {g['i_max'].tolist()}: 0 is not between"
+        raise InvalidArgument("CTRL112", message)
+    for name in ("tracking_time", "error_deadband"):
+        if (g[name] < 0.0).any():
+            raise InvalidArgument("CTRL113", f"{name} {g[name].tolist()} is negative")

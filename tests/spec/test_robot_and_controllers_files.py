@@ -59,7 +59,7 @@ def test_the_listing_of_ros_1_loads_as_it_is() -> None:
     located = load_controllers_text(PAPER, "c.yaml")
     arm = located.spec.controllers["arm_controller"]
     assert isinstance(arm, JointTrajectorySpec)
-    assert (arm.joints, arm.command_interface) == (("joint1",), "effort")
+    assert (arm.joints, arm.interfaces) == (("joint1",), ("effort",))
     assert arm.constraints.goal_time == 5.0
     assert arm.constraints.joints["joint1"].goal == 0.05
     assert located.findings == ()
@@ -71,7 +71,7 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
     located = load_controllers_text(ROS2, "c.yaml")
     arm = located.spec.controllers["arm"]
     assert isinstance(arm, JointTrajectorySpec)
-    assert (arm.joints, arm.command_interface) == (("a", "b"), "effort")
+    assert (arm.joints, arm.interfaces) == (("a", "b"), ("effort",))
     assert (arm.gains["a"].p, arm.gains["a"].i_clamp) == (3.0, 1.0)
     assert (arm.constraints.joints["a"].goal, arm.constraints.joints["a"].trajectory) == (None, 0.1)
     assert list(located.spec.controllers) == ["arm"]

@@ -304,7 +304,7 @@ def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryCont
     return JointTrajectoryController(
         name=name,
         joints=spec.joints,
-        interface=spec.command_interface,
+        interface=spec.interfaces[0],
         gains=spec.gains,
         constraints=spec.constraints,
         limits=[joint.limits for joint in joints],
@@ -318,14 +318,14 @@ def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
     """Gains and tolerances of joints that it does not have, gains all zero, an effort added where there is none."""
     yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
-    if spec.command_interface == "effort":
+    if spec.interfaces[0] == "effort":
         yield from idle_gains(spec.joints, spec.gains, "effort")
         return
-    if spec.command_interface == "velocity":
+    if spec.interfaces[0] == "velocity":
         yield from idle_gains(spec.joints, spec.gains, "velocity")
     for key in ("gravity_compensation", "inverse_dynamics"):
         if getattr(spec, key):
-            message = f"{key} adds an effort, but its interface is {spec.command_interface}"
+            message = f"{key} adds an effort, but its interface is {spec.interfaces[0]}"
             yield Problem((key,), message, "use command_interface: effort, or leave it out", "CTRL147")
 
 
