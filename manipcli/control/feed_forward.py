@@ -21,11 +21,15 @@ if TYPE_CHECKING:
 Index = slice | npt.NDArray[np.intp]
 
 
+Served = tuple[Controller, Index, int, int]
+"""A controller, where its joints stand in a joint vector, ticks between two of its updates, the tick of the first."""
+
+
 class FeedForwardLaw(Protocol):
     """Adds to the effort commands of controllers in place."""
 
-    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
-        """From now on these: where their joints stand in a joint vector, and ticks between two of their updates."""
+    def serve(self, controllers: Sequence[Served]) -> None:
+        """From now on these."""
         ...
 
     def add(self, tick: int, position: Array, velocity: Array) -> None:
@@ -36,7 +40,7 @@ class FeedForwardLaw(Protocol):
 class NoDynamics:
     """Adds nothing: where no model of the robot is at hand."""
 
-    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
+    def serve(self, controllers: Sequence[Served]) -> None:
         """Nobody is served."""
 
     def add(self, tick: int, position: Array, velocity: Array) -> None:
@@ -56,16 +60,18 @@ class ModelFeedForward:
         self._kinematics = kinematics
         self._damping = np.array([joint.damping for joint in robot.moving_joints])
         self._acceleration, self._rate = np.zeros((2, len(robot.joint_names)))
-        self._served: list[tuple[Array, Index, int]] = []
+        self._served: list[tuple[Array, Index, int, int]] = []
         self._driven: list[tuple[Index, Array, Array]] = []
 
-    def serve(self, controllers: Sequence[tuple[Controller, Index, int]]) -> None:
-        """From now on these: where their joints stand in a joint vector, and ticks between two of their updates."""
+    def serve(self, controllers: Sequence[Served]) -> None:
+        """From now on these."""
         wanting = [one for one in controllers if one[0].feed_forward != "none" and "effort" in one[0].interfaces]
-        self._served = [(c.output.commands[c.interfaces.index("effort")], i, every) for c, i, every in wanting]
+        self._served = [
+            (c.output.commands[c.interfaces.index("effort")], index, every, first) for c, index, every, first in wanting
+        ]
         self._driven = [
             (index, c.output.wanted_acceleration, c.output.velocity)
-            for c, index, _ in wanting
+            for c, index, _, _ in wanting
             if c.feed_forward == "inverse_dynamics"
         ]
         self._acceleration[:] = 0.0
@@ -85,6 +91,6 @@ class ModelFeedForward:
             efforts += rate
         else:
             efforts = self._kinematics.gravity(position)
-        for command, index, every in self._served:
-            if every == 1 or tick % every == 0:
+        for command, index, every, first in self._served:
+            if every == 1 or (tick - first) % every == 0:
                 command += efforts[index]

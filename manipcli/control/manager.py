@@ -49,12 +49,13 @@ class _Slot:
     """A loaded controller, where its joints stand in a joint vector, and what is measured there.
 
     `measured` and `contact_force` are read-only parts of the vectors that the manager was given, or, where the joints
-    do not stand side by side, copies that are taken anew every tick (`gathered`: copy, vector).
+    do not stand side by side, copies that are taken anew every tick (`gathered`: copy, vector). It is updated at the
+    tick `first`, at which it was activated, and at every `every`-th one from there.
     """
 
     __slots__ = (
-        "contact_force", "controller", "copies", "every", "gathered", "index", "measured", "period", "scattered",
-        "state",
+        "contact_force", "controller", "copies", "every", "first", "gathered", "index", "measured", "period",
+        "scattered", "state",
     )  # fmt: skip
 
     def __init__(self, controller: Controller, index: Index, every: int, period: float) -> None:
@@ -62,6 +63,7 @@ class _Slot:
         self.index = index
         self.scattered = not isinstance(index, slice)
         self.every = every
+        self.first = 0
         self.period = every * period
         self.state: ControllerState = "unconfigured"
         none = np.zeros(0)
@@ -242,8 +244,20 @@ class ControllerManager:
             self._slots[name].state = "inactive"
         for name in request.activated:
             self._slots[name].state = "active"
+            self._slots[name].first = self._tick
         self._rearrange()
         return request
+
+    def switch_to(
+        self, names: Collection[str], *, strictness: Strictness = "strict", time: float = 0.0
+    ) -> SwitchResult:
+        """Has all of `names` active; whoever claims what they need is deactivated. Those that are active stay as they
+        are. See `switch`."""
+        wanted = [self._slots[name].controller for name in dict.fromkeys(names) if name in self._slots]
+        active = [slot.controller for slot in self._active]
+        in_the_way = [c.name for c in active if c.name not in names and conflicts([*wanted, c], self.joints)]
+        missing = [name for name in names if name not in [c.name for c in active]]
+        return self.switch(missing, in_the_way, strictness=strictness, time=time)
 
     def list(self) -> tuple[ControllerInfo, ...]:
         """All that are loaded, and what they claim."""
@@ -283,7 +297,7 @@ class ControllerManager:
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
         if tuple(modes) != self.command.modes:
             self.command.obey(modes)
-        self._feed_forward.serve([(slot.controller, slot.index, slot.every) for slot in self._active])
+        self._feed_forward.serve([(s.controller, s.index, s.every, s.first) for s in self._active])
         for slot in self._active:
             slot.copies = self._copies(slot)
         self._seen = self._felt = None
@@ -316,7 +330,7 @@ class ControllerManager:
     def update(self, time: float, state: JointVectors, contact_force: Array | None = None) -> JointCommand:
         """One control tick at `time` [s]; see the module for the vectors.
 
-        A controller that fails is deactivated, its goal aborted with the cause; its joints are braked. `faults` grows.
+        A controller that raises is deactivated, its goal aborted with the cause; its joints are braked. `faults` grows.
         """
         seen = self._seen
         if seen is None or seen[0] is not state.position or self._felt is not contact_force:
@@ -325,29 +339,45 @@ class ControllerManager:
         for slot in self._active:
             if slot.scattered:
                 slot.gather()
-            if slot.every == 1 or tick % slot.every == 0:
+            if slot.every == 1 or (tick - slot.first) % slot.every == 0:
                 try:
                     slot.controller.update(time, slot.period, slot.measured, contact_force=slot.contact_force)
-                except ManipcliError as error:
-                    self._fail(slot, error, time)
+                except Exception as error:  # noqa: BLE001  (whatever is wrong in one controller stops that one alone)
+                    self._fail(slot, _cause(error), time)
         self._feed_forward.add(tick, state.position, state.velocity)
         for slot in self._active:
             for target, index, source in slot.copies:
                 target[index] = source
         return self.command
 
-    def _fail(self, slot: _Slot, error: ManipcliError, time: float) -> None:
-        name = slot.controller.name
-        cause = f"controller '{name}' failed in its update: {error}"
-        self.faults += (Finding("CTRL162", cause),)
-        slot.controller.deactivate(time, cause)
+    def _fail(self, slot: _Slot, cause: str, time: float) -> None:
+        text = f"controller '{slot.controller.name}' failed in its update: {cause}"
+        self.faults += (Finding("CTRL162", text),)
+        slot.controller.deactivate(time, text)
         slot.state = "inactive"
         self._rearrange()
+
+    def stop_non_finite(self, time: float) -> None:
+        """Deactivates, as failed, the controllers that command what is no finite number; for whoever sees one."""
+        for slot in self._active:
+            for interface, command in zip(slot.controller.interfaces, slot.controller.output.commands, strict=True):
+                bad = np.flatnonzero(~np.isfinite(command))
+                if len(bad):
+                    joint = slot.controller.joints[bad[0]]
+                    self._fail(slot, f"it commands {joint}/{interface} to be {command[bad[0]]}", time)
+                    break
 
     def deactivate(self, time: float) -> None:
         """Ends all goals as aborted; the next update activates the controllers again."""
         for slot in self._active:
             slot.controller.deactivate(time)
+
+
+def _cause(error: Exception) -> str:
+    """What went wrong, on one line."""
+    if isinstance(error, ManipcliError):
+        return "; ".join(finding.message for finding in error.findings)
+    return f"{type(error).__name__}: {error}"
 
 
 def ticks_between(update_rate: float, period: float) -> int:
