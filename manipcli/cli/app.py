@@ -13,7 +13,7 @@ import typer
 from typer.exceptions import TyperException
 
 from manipcli import __version__
-from manipcli.cli import check, check_urdf, console, info, judge, plan, plot, repair, replay, run, schema, view
+from manipcli.cli import at, check, check_urdf, console, info, judge, plan, plot, repair, replay, run, schema, view
 from manipcli.cli import list as list_
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 
@@ -38,6 +38,7 @@ app.command("check-urdf")(check_urdf.check_urdf)
 app.command("plan")(plan.plan)
 app.command("judge")(judge.judge)
 app.command("info")(info.info)
+app.command("at")(at.at)
 app.command("repair")(repair.repair)
 app.command("plot")(plot.plot)
 app.command("view")(view.view)

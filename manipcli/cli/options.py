@@ -36,6 +36,22 @@ AllowOutside = Annotated[
 ]
 
 
+def seconds(word: str) -> float:
+    """A time as it is written on a command line: a number of seconds, or a number and a unit of time.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    from manipcli.core.units import TIME, UnitError, to_si
+
+    try:
+        value = float(word) if word.strip()[-1:].isdecimal() else to_si(word, TIME)
+    except (ValueError, UnitError) as error:
+        message = error.cause if isinstance(error, UnitError) else f"'{word}' is no time"
+        raise InvalidInput([Finding("USE046", message, hint="write 3.2, '3.2 s' or 250ms")]) from error
+    return value
+
+
 def xacro_arguments(words: list[str]) -> dict[str, str]:
     """`NAME:=VALUE` words by name.
 

@@ -31,6 +31,10 @@ class RecordingFailed(ManipcliError):
         )
 
 
+REPAIRABLE = "manipcli repair keeps what is sound of it"
+"""The hint where a file is damaged."""
+
+
 class BadRecording(InvalidInput):
     """A file that is no recording of manipcli, or one that was changed or damaged after it was written."""
 

@@ -17,7 +17,7 @@ from typing import BinaryIO, TypeVar
 
 from manipcli.record.cdr import CdrError
 from manipcli.record.container import MAGIC
-from manipcli.record.faults import BadRecording
+from manipcli.record.faults import REPAIRABLE, BadRecording
 
 MAX_NAMED = 4096
 """Channels, schemas, attachments and metadata records in one file."""
@@ -102,7 +102,9 @@ class Scan:
             body = file.read(length)
             if opcode == DATA_END:
                 if body not in (crc.to_bytes(4, "little"), _NO_CRC):
-                    raise BadRecording(self.path, "its checksum does not match: it was changed after it was written")
+                    raise BadRecording(
+                        self.path, "its checksum does not match: it was changed after it was written", hint=REPAIRABLE
+                    )
                 self._check_end(file, end, size, finished=finished)
                 return
             crc = zlib.crc32(body, zlib.crc32(head, crc))
@@ -115,7 +117,7 @@ class Scan:
 
     def _cut(self, offset: int, *, finished: bool) -> None:
         if finished:
-            raise BadRecording(self.path, f"the record at byte {offset} is damaged")
+            raise BadRecording(self.path, f"the record at byte {offset} is damaged", hint=REPAIRABLE)
         self.lost = f"it was not finished, and is cut within the record at byte {offset}"
 
     def _check_end(self, file: BinaryIO, start: int, size: int, *, finished: bool) -> None:
@@ -129,7 +131,7 @@ class Scan:
         footer = len(rest) - len(MAGIC) - _FOOTER.size
         summary_start, crc = _FOOTER.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
         if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + _FOOTER.size - 4])):
-            raise BadRecording(self.path, "the checksum of its summary does not match: it was changed")
+            raise BadRecording(self.path, "the checksum of its summary does not match: it was changed", hint=REPAIRABLE)
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -183,7 +185,7 @@ def guarded(path: Path, record: Record, read: Callable[[Record], R]) -> R:
         return read(record)
     except (McapError, CdrError, struct.error, UnicodeDecodeError) as error:
         cause = f": {error}" if isinstance(error, CdrError) else ""
-        raise BadRecording(path, f"the record at byte {record.offset} is damaged{cause}") from error
+        raise BadRecording(path, f"the record at byte {record.offset} is damaged{cause}", hint=REPAIRABLE) from error
 
 
 def message_index(record: Record) -> tuple[int, bytes]:
@@ -195,7 +197,8 @@ def message_index(record: Record) -> tuple[int, bytes]:
 
 
 def open_chunk(path: Path, record: Record) -> bytes:
-    """The decompressed message records of a chunk, bounded in size and verified by its checksum."""
+    """The decompressed message records of a chunk, bounded in size and verified by its checksum; 0 says that its writer
+    made none."""
     try:
         start_ns, end_ns, size, crc = _CHUNK_HEAD.unpack_from(record.body)
         (name_length,) = struct.unpack_from("<I", record.body, _CHUNK_HEAD.size)
@@ -203,11 +206,11 @@ def open_chunk(path: Path, record: Record) -> bytes:
         compression = record.body[_CHUNK_HEAD.size + 4 : name_end].decode("ascii", errors="replace")
         (length,) = struct.unpack_from("<Q", record.body, name_end)
     except struct.error as error:
-        raise BadRecording(path, f"the chunk at byte {record.offset} is damaged") from error
+        raise BadRecording(path, f"the chunk at byte {record.offset} is damaged", hint=REPAIRABLE) from error
     where = f"the chunk at byte {record.offset} (t = {start_ns / 1e9:.3f} to {end_ns / 1e9:.3f} s)"
     packed = memoryview(record.body)[name_end + 8 :]
     if len(packed) != length:
-        raise BadRecording(path, f"{where} is damaged")
+        raise BadRecording(path, f"{where} is damaged", hint=REPAIRABLE)
     if size > MAX_CHUNK or (size > _SMALL_CHUNK and size > MAX_RATIO * length):
         raise BadRecording(
             path,
@@ -215,8 +218,8 @@ def open_chunk(path: Path, record: Record) -> bytes:
             hint=f"at most {MAX_CHUNK} bytes, and {MAX_RATIO} times the packed size, are taken",
         )
     data = _decompress(compression, packed, size)
-    if data is None or len(data) != size or zlib.crc32(data) != crc:
-        raise BadRecording(path, f"{where} is damaged: its checksum does not match")
+    if data is None or len(data) != size or crc not in (0, zlib.crc32(data)):
+        raise BadRecording(path, f"{where} is damaged: its checksum does not match", hint=REPAIRABLE)
     return data
 
 

@@ -28,10 +28,10 @@ def render_run(report: RunReport) -> str:
             real_time_factor=report.real_time_factor,
             log=report.log,
             timing={
-                "load": _number(timing.load),
-                "plan": _number(timing.plan),
-                "simulate": _number(timing.simulate),
-                "judge": _number(timing.judge),
+                "load": number(timing.load),
+                "plan": number(timing.plan),
+                "simulate": number(timing.simulate),
+                "judge": number(timing.judge),
             },
             errors=report.verdict.errors,
         )
@@ -82,9 +82,9 @@ def _object(
         "text": judged.text if judged is not None else "",
         "seed": judged.seed if judged is not None else None,
         "engine": judged.engine if judged is not None else None,
-        "simulated_time": _number(judged.simulated_time) if judged is not None else None,
-        "wall_time": _number(wall_time),
-        "real_time_factor": _number(real_time_factor),
+        "simulated_time": number(judged.simulated_time) if judged is not None else None,
+        "wall_time": number(wall_time),
+        "real_time_factor": number(real_time_factor),
         "log": log,
         "timing": timing,
         "steps": [step_object(step) for step in (judged.steps if judged is not None else ())],
@@ -92,9 +92,9 @@ def _object(
             {
                 "name": expectation.name,
                 "outcome": expectation.outcome,
-                "margin": _number(expectation.margin),
+                "margin": number(expectation.margin),
                 "unit": expectation.unit,
-                "at": _number(expectation.at),
+                "at": number(expectation.at),
                 "text": expectation.text,
             }
             for expectation in (judged.expectations if judged is not None else ())
@@ -108,9 +108,9 @@ def step_object(step: StepOutcome) -> dict[str, Json]:
         "id": step.id,
         "verb": step.verb,
         "outcome": step.outcome,
-        "started": _number(step.started),
-        "ended": _number(step.ended),
-        "planned_duration": _number(step.planned_duration),
+        "started": number(step.started),
+        "ended": number(step.ended),
+        "planned_duration": number(step.planned_duration),
         "text": step.text,
     }
 
@@ -127,6 +127,6 @@ def finding_object(finding: Finding) -> dict[str, Json]:
     }
 
 
-def _number(value: float | None) -> float | None:
+def number(value: float | None) -> float | None:
     """Rounded to 1e-9, which drops the dust of binary fractions (4.2 instead of 4.200000000000001)."""
     return round(float(value), 9) if value is not None and math.isfinite(value) else None

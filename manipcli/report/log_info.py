@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from manipcli.judge.verdict import StepOutcome
 from manipcli.record.inventory import Inventory
 from manipcli.record.recording import EMBEDDED
-from manipcli.report.json import Json, dumps, step_object
+from manipcli.report.json import Json, dumps, number, step_object
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, steps_table
 
@@ -83,10 +83,10 @@ def render_json(info: LogInfo) -> str:
         {
             "log": str(found.path),
             "size": found.size,
-            "size_per_minute": _rounded(info.size_per_minute),
-            "start": _rounded(found.start),
-            "end": _rounded(found.end),
-            "duration": _rounded(found.duration),
+            "size_per_minute": number(info.size_per_minute),
+            "start": number(found.start),
+            "end": number(found.end),
+            "duration": number(found.duration),
             "written_by": found.library,
             "profile": found.profile,
             "ours": info.ours,
@@ -100,9 +100,9 @@ def render_json(info: LogInfo) -> str:
                     "type": topic.type,
                     "encoding": topic.encoding,
                     "messages": topic.messages,
-                    "rate": _rounded(topic.rate),
-                    "first": _rounded(topic.first),
-                    "last": _rounded(topic.last),
+                    "rate": number(topic.rate),
+                    "first": number(topic.first),
+                    "last": number(topic.last),
                 }
                 for topic in found.topics
             ],
@@ -167,7 +167,3 @@ def _rate(rate: float | None) -> str:
 def _seconds(time: float | None, found: Inventory) -> str:
     """From the beginning of the log: others' logs count from 1970."""
     return "" if time is None or found.start is None else f"{time - found.start:.2f} s"
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 9)

@@ -6,10 +6,15 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagWriter
+from rosbags.typesys import Stores, get_typestore
 
 from manipcli.cli.app import main
 from manipcli.pipeline import run_task
+from manipcli.record.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 
@@ -76,3 +81,71 @@ def test_what_is_no_log_is_refused(command: str, tmp_path: Path, capsys: pytest.
     for name, why in (("pipe", "not a regular file"), ("text", "no MCAP file"), ("absent", "No such file")):
         assert main([command, str(tmp_path / name)]) == 4
         assert why in capsys.readouterr().err
+
+
+def test_at_tells_joints_bodies_and_the_step(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["at", str(log), "0s"]) == 0
+    text = capsys.readouterr().out
+    assert "step 'move_1' (move), phase 'move'" in text
+    assert "cube  world  800.00, 500.00, 25.00 mm" in text
+    last = read_recording(log).states
+    assert main(["at", str(log), repr(float(last.time[-1])), "--format", "json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [joint["position"] for joint in found["joints"]] == pytest.approx(last.position[-1].tolist(), abs=1e-9)
+    (turned,) = [joint for joint in found["joints"] if joint["name"] == "joint_1"]
+    assert turned["position"] == pytest.approx(0.3)
+    assert turned["error"] == pytest.approx(0.0, abs=1e-9)
+    assert turned["unit"] == "rad"
+    assert found["step"] is None
+    assert found["contacts"] == []
+    assert main(["at", str(log), "1000"]) == 4
+    assert "there is nothing at 1000 s" in capsys.readouterr().err
+    for word in ("soon", "3 mm", "nan"):
+        assert main(["at", str(log), word]) == 4
+
+
+def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two publishers of joints and one frame, in wall time, by the rosbags library; a description with a slide."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    began = 1_700_000_000_000_000_000
+    urdf = "<robot name='r'><link name='a'/><link name='b'/><joint name='lift' type='prismatic'/></robot>"
+    types = store.types
+    header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](0, 0), "map")
+
+    def joints(names: list[str], position: list[float]) -> object:
+        none = np.zeros(0)
+        return types["sensor_msgs/msg/JointState"](header, names, np.array(position), none, none)
+
+    quat = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    place = types["geometry_msgs/msg/Transform"](types["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0), quat)
+    frame = types["geometry_msgs/msg/TransformStamped"](header, "tool", place)
+    messages = [
+        ("/robot_description", 0, types["std_msgs/msg/String"](urdf)),
+        ("/joint_states", 0, joints(["lift"], [0.1])),
+        ("/joint_states", 1, joints(["wheel"], [5.0])),
+        ("/tf", 1, types["tf2_msgs/msg/TFMessage"]([frame])),
+        ("/joint_states", 2, joints(["lift"], [0.2])),
+    ]
+    with RosbagWriter(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        types_of = {topic: message.__msgtype__ for topic, _, message in messages}
+        channels = {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in types_of.items()}
+        for topic, second, message in messages:
+            data = store.serialize_cdr(message, message.__msgtype__)
+            writer.write(channels[topic], began + second * 1_000_000_000, data)
+    (path,) = (tmp_path / "bag").glob("*.mcap")
+    assert main(["at", str(path), "1.5 s", "--format", "json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {joint["name"]: (joint["position"], joint["unit"]) for joint in found["joints"]} == {
+        "lift": (0.1, "m"),
+        "wheel": (5.0, None),
+    }
+    assert [(pose["name"], pose["parent"], pose["xyz"]) for pose in found["poses"]] == [
+        ("tool", "map", [1.0, 2.0, 3.0])
+    ]
+    assert found["contacts"] is None
+    assert main(["at", str(path), "2"]) == 0
+    assert "lift   200.000 mm" in capsys.readouterr().out
+    assert main(["info", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "missing: manipcli did not write it" in text
+    assert "/joint_states" in text

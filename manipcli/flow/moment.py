@@ -1,0 +1,171 @@
+"""A log at one moment; also of logs that somebody else wrote, as far as they go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Transform
+from manipcli.flow.log import URDF
+from manipcli.flow.log_info import COMMON
+from manipcli.model.located_xml import element_of, parse_document
+from manipcli.model.state import Contact
+from manipcli.record.contents import RECORD
+from manipcli.record.inventory import Inventory, inventory
+from manipcli.record.messages import WORLD
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import Span, TaskEvent
+from manipcli.record.snapshot import snapshot
+from manipcli.report.moment import JointMoment, Moment, PoseMoment
+
+_ROUNDING = 0.5e-9
+"""[s] Recorded times are whole nanoseconds."""
+_UNITS = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
+
+
+def moment(path: Path, time: float) -> Moment:
+    """What a log says of `time` [s from its beginning].
+
+    Raises:
+        InvalidInput: the file is no log, is damaged, or ends before.
+    """
+    found = inventory(path)
+    if not 0.0 <= time <= found.duration + _ROUNDING:
+        message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
+        raise InvalidInput([Finding("LOG110", message)])
+    return _ours(path, time) if RECORD in found.metadata else _others(path, found, time)
+
+
+def _ours(path: Path, time: float) -> Moment:
+    recording = open_recording(path)
+    missing = [] if recording.lost is None else [recording.lost]
+    span, k, touched, end = _at(recording.spans, time)
+    if span is None:
+        raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
+    states = span.states
+    now = float(states.time[k])
+    references: dict[str, float] = {}
+    for trace in span.controllers:
+        row = int(np.searchsorted(trace.times, now + _ROUNDING, side="right")) - 1
+        if row >= 0:
+            references |= dict(zip(trace.joints, trace.reference_position[row].tolist(), strict=True))
+    units = _units(recording.attachments.get(URDF, b""))
+    joints = tuple(
+        JointMoment(
+            name,
+            units.get(name, ""),
+            float(states.position[k, j]),
+            float(states.velocity[k, j]),
+            float(states.effort[k, j]),
+            references.get(name),
+        )
+        for j, name in enumerate(recording.joint_names)
+    )
+    poses = tuple(
+        PoseMoment(
+            name,
+            WORLD,
+            _pose(states.body_position[k, j], states.body_quat_xyzw[k, j]),
+            float(np.linalg.norm(states.body_linear[k, j])),
+        )
+        for j, name in enumerate(recording.body_names)
+    )
+    step, phase = active(recording.events, time)
+    return Moment(
+        log=str(path),
+        asked=time,
+        time=now,
+        end=end,
+        step="" if step is None else step.step,
+        verb="" if step is None else step.verb,
+        phase=phase,
+        joints=joints,
+        poses=poses,
+        contacts=touched,
+        missing=tuple(missing),
+    )
+
+
+def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Contact, ...], float]:
+    """The span with the last state until `time`, its row there, what touched, and the time [s] of the last state."""
+    chosen, k, end = None, 0, 0.0
+    touched: tuple[Contact, ...] = ()
+    for span in spans:
+        if not len(span.states.time):
+            continue
+        end = float(span.states.time[-1])
+        if span.states.time[0] > time + _ROUNDING:
+            continue
+        chosen = span
+        k = int(np.searchsorted(span.states.time, time + _ROUNDING, side="right")) - 1
+        for change in span.contacts:
+            if change.time <= time + _ROUNDING:
+                touched = change.contacts
+    return chosen, k, touched, end
+
+
+def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, str]:
+    """The step that is on at `time` [s], as the event that began it, and its phase; None between steps."""
+    step: TaskEvent | None = None
+    phase = ""
+    for event in events:
+        if event.time > time + _ROUNDING:
+            break
+        if event.kind == "step_started":
+            step, phase = event, ""
+        elif event.kind == "phase_started":
+            phase = event.text
+        elif event.kind == "step_ended":
+            step, phase = None, ""
+    return step, phase
+
+
+def _others(path: Path, found: Inventory, time: float) -> Moment:
+    start = found.start or 0.0
+    taken = snapshot(path, found, start + time)
+    missing = [f"there is no {topic}" for topic in COMMON if topic not in {t.name for t in found.topics if t.messages}]
+    missing += ["manipcli did not write it: it tells of no steps, references and contacts", *taken.unread]
+    units = _units(taken.urdf.encode()) if taken.urdf else {}
+    newest = [sample.time for sample in taken.joints.values()] + [sample.time for sample in taken.frames.values()]
+    return Moment(
+        log=str(path),
+        asked=time,
+        time=max(newest, default=start) - start,
+        end=found.duration,
+        step="",
+        verb="",
+        phase="",
+        joints=tuple(
+            JointMoment(name, units.get(name, ""), one.position, one.velocity, one.effort)
+            for name, one in taken.joints.items()
+        ),
+        poses=tuple(
+            PoseMoment(name, one.parent, _pose(one.pose[:3], one.pose[3:])) for name, one in taken.frames.items()
+        ),
+        contacts=None,
+        missing=(*found.faults, *missing),
+    )
+
+
+def _pose(position: npt.ArrayLike, quat_xyzw: npt.ArrayLike) -> Transform:
+    """Others write quaternions of zeros."""
+    return Transform.of(xyz=position, quat_xyzw=quat_xyzw if np.any(quat_xyzw) else None)
+
+
+def _units(urdf: bytes) -> dict[str, str]:
+    """The unit of each joint's position, by the types in a description; empty where it cannot be read."""
+    if not urdf:
+        return {}
+    try:
+        document = parse_document(urdf, "robot.urdf")
+    except InvalidInput:
+        return {}
+    if document.documentElement is None:
+        return {}
+    joints = element_of(document.documentElement).all("joint")
+    kinds = {joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in joints}
+    return {name: _UNITS[kind] for name, kind in kinds.items() if kind in _UNITS}

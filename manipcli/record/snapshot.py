@@ -1,0 +1,115 @@
+"""The joints and frames of any ROS 2 log at one moment: the newest of each until then, whoever published it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from manipcli.record import channels as topics
+from manipcli.record import schemas
+from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.columns import singly
+from manipcli.record.inventory import Inventory
+from manipcli.record.salvage import OpenChunk, Salvage
+
+_TYPES = {
+    topics.ROBOT_DESCRIPTION: schemas.STRING,
+    topics.JOINT_STATES: schemas.JOINT_STATE,
+    topics.TF: schemas.TF_MESSAGE,
+    topics.TF_STATIC: schemas.TF_MESSAGE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class JointSample:
+    """A joint as it was published last; None for what was not."""
+
+    time: float
+    position: float | None
+    velocity: float | None
+    effort: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class FrameSample:
+    """A frame as it was published last: `pose` is x y z [m] and quaternion xyzw in `parent`."""
+
+    time: float
+    parent: str
+    pose: tuple[float, ...]
+
+
+@dataclass(slots=True)
+class Snapshot:
+    """What was known at a moment, by name; `urdf`: /robot_description; `unread`: why messages were left out."""
+
+    joints: dict[str, JointSample] = field(default_factory=dict)
+    frames: dict[str, FrameSample] = field(default_factory=dict)
+    urdf: str | None = None
+    unread: dict[str, None] = field(default_factory=dict)
+
+
+def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
+    """The newest of everything at `time` [s of log time].
+
+    Raises:
+        BadRecording: the file is no MCAP file, or cannot be read.
+    """
+    from mcap import records
+
+    # A time since 1970 in nanoseconds has more digits than a double.
+    limit = round(time * 1e9) + 512
+    taken = Snapshot()
+    names: dict[int, str] = {}
+    types = {topic.name: topic.type for topic in found.topics}
+    for piece in Salvage(path):
+        if isinstance(piece, records.Channel):
+            names[piece.id] = piece.topic
+            expected = _TYPES.get(piece.topic)
+            if expected is not None and (types.get(piece.topic) != expected or piece.message_encoding != "cdr"):
+                del names[piece.id]
+                kind = f"{types.get(piece.topic) or 'an unknown type'}, {piece.message_encoding or 'no encoding'}"
+                taken.unread[f"{piece.topic} is {kind}, not {expected} in CDR"] = None
+        elif isinstance(piece, OpenChunk) and piece.start_ns <= limit:
+            for channel, places in piece.places.items():
+                topic = names.get(channel, "")
+                if topic not in _TYPES:
+                    continue
+                for ns, reader in singly(piece.data, places):
+                    if ns > limit:
+                        continue
+                    try:
+                        _take(taken, topic, ns, reader)
+                    except CdrError as error:
+                        taken.unread[f"a message of {topic} {error}"] = None
+    return taken
+
+
+def _take(taken: Snapshot, topic: str, ns: int, reader: CdrReader) -> None:
+    time = ns / 1e9
+    if topic == topics.ROBOT_DESCRIPTION:
+        taken.urdf = reader.text()
+    elif topic == topics.JOINT_STATES:
+        reader.header()
+        names = reader.texts()
+        values = [_doubles(reader) for _ in range(3)]
+        for k, name in enumerate(names):
+            known = taken.joints.get(name)
+            if known is None or known.time <= time:
+                taken.joints[name] = JointSample(time, *(run[k] if k < len(run) else None for run in values))
+    else:
+        for child, frame in _frames(reader, time):
+            known_frame = taken.frames.get(child)
+            if known_frame is None or known_frame.time <= time:
+                taken.frames[child] = frame
+
+
+def _frames(reader: CdrReader, time: float) -> Iterator[tuple[str, FrameSample]]:
+    for _ in range(reader.count(64)):
+        parent, child = reader.header(), reader.text()
+        yield child, FrameSample(time, parent, tuple(reader.f64() for _ in range(7)))
+
+
+def _doubles(reader: CdrReader) -> tuple[float, ...]:
+    return tuple(reader.f64() for _ in range(reader.count(8)))

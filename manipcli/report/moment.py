@@ -1,0 +1,186 @@
+"""A log at one moment, for people and for programs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from manipcli.core.geometry import Transform
+from manipcli.model.state import Contact
+from manipcli.report.json import Json, dumps, number
+from manipcli.report.table import table
+
+_CUSTOMARY = {
+    "rad": ("deg", math.degrees(1.0)),
+    "rad/s": ("deg/s", math.degrees(1.0)),
+    "m": ("mm", 1000.0),
+    "m/s": ("mm/s", 1000.0),
+}
+_RATE = {"rad": "rad/s", "m": "m/s"}
+_EFFORT = {"rad": "N m", "m": "N"}
+
+
+@dataclass(frozen=True, slots=True)
+class JointMoment:
+    """A joint: SI, in `unit` (rad or m; empty where nobody says what it is); None for what is not recorded."""
+
+    name: str
+    unit: str
+    position: float | None
+    velocity: float | None
+    effort: float | None
+    reference: float | None = None
+
+    @property
+    def error(self) -> float | None:
+        """Reference minus position."""
+        return None if self.reference is None or self.position is None else self.reference - self.position
+
+
+@dataclass(frozen=True, slots=True)
+class PoseMoment:
+    """A body or frame: its pose in `parent`, and its speed [m/s] where that is known."""
+
+    name: str
+    parent: str
+    pose: Transform
+    speed: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What a log says of one time.
+
+    Attributes:
+        log: path, as text.
+        asked: [s] from the beginning of the log.
+        time: [s] of the state that is told, the last one not behind `asked`.
+        end: [s] of the log.
+        step, verb, phase: what was on; empty where nothing was.
+        contacts: None where the log does not tell of contacts.
+        missing: what cannot be told, a sentence each.
+    """
+
+    log: str
+    asked: float
+    time: float
+    end: float
+    step: str
+    verb: str
+    phase: str
+    joints: tuple[JointMoment, ...]
+    poses: tuple[PoseMoment, ...]
+    contacts: tuple[Contact, ...] | None
+    missing: tuple[str, ...]
+
+
+def render_text(moment: Moment) -> str:
+    """When, in which step, and then joints, bodies and contacts; customary units, radians in brackets."""
+    lines = [f"missing: {one}" for one in moment.missing]
+    if lines:
+        lines.append("")
+    when = f"t = {moment.time:.3f} s of {moment.end:.3f} s"
+    idle = ": no step is on" if moment.contacts is not None else ""
+    on = f": step '{moment.step}' ({moment.verb})" if moment.step else idle
+    phase = f", phase '{moment.phase}'" if moment.phase else ""
+    lines.append(when + on + phase)
+    if moment.joints:
+        lines += ["", _joints(moment.joints)]
+    if moment.poses:
+        lines += ["", _poses(moment.poses)]
+    if moment.contacts is not None:
+        lines += ["", _contacts(moment.contacts) if moment.contacts else "nothing touches"]
+    return "\n".join(lines)
+
+
+def render_json(moment: Moment) -> str:
+    """The same as one object; numbers are SI."""
+    contacts: Json = None
+    if moment.contacts is not None:
+        contacts = [
+            {"a": c.a, "b": c.b, "force": number(c.force), "distance": number(c.distance)} for c in moment.contacts
+        ]
+    return dumps(
+        {
+            "log": moment.log,
+            "asked": moment.asked,
+            "time": number(moment.time),
+            "end": number(moment.end),
+            "step": moment.step or None,
+            "verb": moment.verb or None,
+            "phase": moment.phase or None,
+            "joints": [
+                {
+                    "name": joint.name,
+                    "unit": joint.unit or None,
+                    "position": number(joint.position),
+                    "velocity": number(joint.velocity),
+                    "effort": number(joint.effort),
+                    "reference": number(joint.reference),
+                    "error": number(joint.error),
+                }
+                for joint in moment.joints
+            ],
+            "poses": [
+                {
+                    "name": each.name,
+                    "parent": each.parent,
+                    "xyz": [number(value) for value in each.pose.p],
+                    "quat_xyzw": [number(value) for value in each.pose.quat_xyzw],
+                    "speed": number(each.speed),
+                }
+                for each in moment.poses
+            ],
+            "contacts": contacts,
+            "missing": list(moment.missing),
+        }
+    )
+
+
+def _joints(joints: tuple[JointMoment, ...]) -> str:
+    rows = [
+        [
+            joint.name,
+            _shown(joint.position, joint.unit),
+            "" if joint.position is None or joint.unit != "rad" else f"({_fixed(joint.position, 4)} rad)",
+            _shown(joint.velocity, _RATE.get(joint.unit, "")),
+            _shown(joint.effort, _EFFORT.get(joint.unit, "")),
+            _shown(joint.reference, joint.unit),
+            _shown(joint.error, joint.unit),
+        ]
+        for joint in joints
+    ]
+    header = ["joint", "position", "", "velocity", "effort", "reference", "error"]
+    used = [k for k in range(len(header)) if k == 0 or any(row[k] for row in rows)]
+    return table(
+        [header[k] for k in used], [[row[k] for k in used] for row in rows], right=[h for h in header[1:] if h]
+    )
+
+
+def _poses(poses: tuple[PoseMoment, ...]) -> str:
+    rows = []
+    for each in poses:
+        xyz = ", ".join(_fixed(1000.0 * value, 2) for value in each.pose.p)
+        rpy = ", ".join(_fixed(math.degrees(value), 2) for value in each.pose.rpy)
+        rows.append([each.name, each.parent, f"{xyz} mm", f"{rpy} deg", _shown(each.speed, "m/s")])
+    header = ["body", "in", "x, y, z", "roll, pitch, yaw", "speed"]
+    used = [k for k in range(len(header)) if k == 0 or any(row[k] for row in rows)]
+    return table([header[k] for k in used], [[row[k] for k in used] for row in rows], right=["speed"])
+
+
+def _contacts(contacts: tuple[Contact, ...]) -> str:
+    rows = [[c.a, c.b, _shown(c.force, "N"), _shown(-c.distance, "m")] for c in contacts]
+    return table(["touches", "", "force", "depth"], rows, right=["force", "depth"])
+
+
+def _shown(value: float | None, unit: str) -> str:
+    """In the customary unit, with as many digits as its column: what is nearly nothing reads as zero."""
+    if value is None:
+        return ""
+    name, scale = _CUSTOMARY.get(unit, (unit, 1.0))
+    return f"{_fixed(scale * value, 3)} {name}".rstrip()
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Without the sign of what is rounded to zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
