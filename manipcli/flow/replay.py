@@ -10,6 +10,7 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.log import judge_recording, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
+from manipcli.flow.other_log import is_own, open_other
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import TaskEvent
@@ -23,7 +24,7 @@ def open_playback(
     """A log as it is shown.
 
     Args:
-        path: the log of a run, or what a killed run left of it.
+        path: the log of a run, what a killed run left of it, or a ROS 2 log of another program.
         rate: [Hz] of what is shown.
         package_path: folders to look for packages of meshes in, before those near the log and the working directory.
         allow_outside: lets a mesh lie anywhere.
@@ -31,6 +32,8 @@ def open_playback(
     Raises:
         InvalidInput: the file is no log, is damaged, or has nothing to show.
     """
+    if not is_own(path):
+        return open_other(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
     if not len(samples.times):

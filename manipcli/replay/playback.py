@@ -124,6 +124,11 @@ class Playback:
         """[s] the last time."""
         return float(self.times[-1])
 
+    @property
+    def has_reference(self) -> bool:
+        """Whether a controller moves any joint of a robot that is known."""
+        return self.robot is not None and not bool(np.isnan(self.reference).all())
+
     def index(self, time: float) -> int:
         """Number of the time nearest to `time` [s]."""
         k = int(np.searchsorted(self.times, time))

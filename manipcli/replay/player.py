@@ -120,9 +120,6 @@ def _contents(playback: Playback) -> tuple[str, str]:
     camera = framing(drawing, start, leave_out=floors).further(1.2)
     surfaces, drawables = _drawables(drawing, index, floors, pack)
     path = playback.tool_path()
-    moved = (
-        playback.robot is not None and not np.isnan(playback.reference).all() and len(playback.robot.moving_joints) > 0
-    )
     head: Json = {
         "name": playback.name,
         "start": playback.start,
@@ -149,7 +146,7 @@ def _contents(playback: Playback) -> tuple[str, str]:
         "drawables": drawables,
         "times": pack.add(playback.times, "f"),
         "position": pack.add(np.nan_to_num(playback.position), "f"),
-        "reference": pack.add(playback.reference_position(), "f") if moved else None,
+        "reference": pack.add(playback.reference_position(), "f") if playback.has_reference else None,
         "body": pack.add(np.concatenate([playback.body_position, playback.body_quat_xyzw], axis=2), "f"),
         "path": pack.add(path, "f") if len(path) > 1 else None,
         "pushes": _pushes(playback, poses, pack),

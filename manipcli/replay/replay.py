@@ -49,7 +49,7 @@ class Replay(LocalServer):
             self.timeline = Timeline(self.viser, playback, self.clock)
             self.curves = CurvesPanel(self.viser, playback)
             self._ghost: Ghost | None = None
-            if playback.robot is not None:
+            if playback.robot is not None and playback.has_reference:
                 self._ghost = Ghost(self.viser, drawing, tuple(link.name for link in playback.robot.links))
                 self._wanted = playback.reference_poses()
             path = playback.tool_path()
@@ -73,7 +73,9 @@ class Replay(LocalServer):
     def _switches(self) -> None:
         gui = self.viser.gui
         with gui.add_folder("Run"):
-            ghost = gui.add_checkbox("reference", False, hint="Where the robot should be, clear and blue.")
+            ghost = gui.add_checkbox(
+                "reference", False, disabled=self._ghost is None, hint="Where the robot should be, clear and blue."
+            )
             path = gui.add_checkbox("tool path", True)
             forces = gui.add_checkbox("forces", True, hint="Normal forces on what can move, at the points of contact.")
         ghost.on_update(lambda _: self._show_ghost(ghost.value))
