@@ -4,7 +4,8 @@ from manipcli.control.action import ErrorCode, Feedback, GoalHandle, GoalResult,
 from manipcli.control.controller import Controller, ControllerOutput, JointState
 from manipcli.control.controllers.gripper import GripperController
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
-from manipcli.control.limits import JointLimiter, limit_effort, limit_position, limit_velocity
+from manipcli.control.limiter import JointLimiter, NotFinite
+from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
@@ -23,8 +24,10 @@ __all__ = [
     "JointState",
     "JointTrajectory",
     "JointTrajectoryController",
+    "NotFinite",
     "Pid",
     "TrajectoryPoint",
+    "limit_acceleration",
     "limit_effort",
     "limit_position",
     "limit_velocity",

@@ -1,16 +1,35 @@
-"""Joint limits on commands, applied after the controllers: pure functions, and a limiter that counts what it cut."""
+"""Joint limits on commands, after the controllers and before the transmissions: pure functions, n joints at once.
+
+The rules are those of ros2_control's `joint_limits` for hard limits and of ROS 1's `joint_limits_interface` for soft
+ones. All arguments broadcast; infinite (or, for `k_position` and `k_velocity`, 0) means that there is no such limit.
+
+A soft limit bounds the velocity v near it, before the hard one is met:
+
+    v_min = clamp(-k_position (q - soft_lower), -v_max, v_max),   v_max likewise with soft_upper
+
+so that a joint slows down towards it, and beyond it is led back; an effort is then bounded by what that velocity asks:
+
+    -k_velocity (v - v_min) <= effort <= -k_velocity (v - v_max)
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.command import JointCommand, Mode
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointLimits
+
+POSITION_TOLERANCE: Final = 0.002
+"""Beyond a position limit by no more than this [rad or m], a velocity may still lead back."""
+OUT_OF_BOUNDS: Final = 0.0087
+"""A position measured further beyond its limits than this [rad or m] is not believed."""
+
+Beyond = Literal["stop", "return"]
+"""What a velocity command may do where the joint is measured beyond its limits: nothing, or lead back."""
 
 
 def limit_position(
@@ -19,21 +38,50 @@ def limit_position(
     lower: npt.ArrayLike = -math.inf,
     upper: npt.ArrayLike = math.inf,
     velocity: npt.ArrayLike = math.inf,
-    previous: npt.ArrayLike,
+    acceleration: npt.ArrayLike = math.inf,
+    previous: npt.ArrayLike | None = None,
+    position: npt.ArrayLike | None = None,
+    measured_velocity: npt.ArrayLike = 0.0,
+    soft_lower: npt.ArrayLike = -math.inf,
+    soft_upper: npt.ArrayLike = math.inf,
+    k_position: npt.ArrayLike = 0.0,
     dt: float,
 ) -> Array:
-    """Clamped to [lower, upper] and to previous -+ velocity dt; the position limit wins.
+    """Clamped to [lower, upper] and to what can be reached from `previous` within `dt`; [lower, upper] wins.
+
+    Reached is previous -+ min(velocity, |measured_velocity| + acceleration dt) dt; with soft limits, previous +
+    [v_min, v_max] dt of the module's law at q = previous.
 
     Args:
         command: (n) rad or m.
-        lower, upper, velocity: limits; infinite: none.
-        previous: (n) the position command before, or the measured position when there is none.
-        dt: [s].
+        lower, upper, velocity, acceleration: hard limits.
+        previous: (n) the command before; None: the measured position.
+        position: (n) measured; None where `previous` is given.
+        measured_velocity: (n), only for the acceleration.
+        soft_lower, soft_upper, k_position: soft limits; k_position [1/s].
+        dt: [s], above 0.
+
+    Returns:
+        (n)
+
+    Raises:
+        InvalidArgument: a measured position is more than `OUT_OF_BOUNDS` beyond its limits; neither `previous` nor
+            `position` is given while a limit needs it.
     """
-    reach = np.asarray(velocity, dtype=np.float64) * dt
-    before = np.asarray(previous, dtype=np.float64)
-    near = np.minimum(np.maximum(np.asarray(command, dtype=np.float64), before - reach), before + reach)
-    return np.asarray(np.minimum(np.maximum(near, lower), upper))
+    low, high = _floats(lower), _floats(upper)
+    if position is not None:
+        _refuse_out_of_bounds(_floats(position), low, high)
+    limited = _floats(command)
+    before = previous if previous is not None else position
+    fastest = np.minimum(_floats(velocity), np.abs(_floats(measured_velocity)) + _floats(acceleration) * dt)
+    if before is None:
+        if np.isfinite(fastest).any() or np.any(_floats(k_position) > 0.0):
+            raise InvalidArgument("CTRL190", "a velocity limit on positions needs `previous`, or `position`")
+    else:
+        start = _floats(before)
+        least, most = _soft_velocities(start, fastest, soft_lower, soft_upper, k_position)
+        limited = np.minimum(np.maximum(limited, start + least * dt), start + most * dt)
+    return np.asarray(np.minimum(np.maximum(limited, low), high))
 
 
 def limit_velocity(
@@ -46,178 +94,151 @@ def limit_velocity(
     upper: npt.ArrayLike = math.inf,
     acceleration: npt.ArrayLike = math.inf,
     previous: npt.ArrayLike | None = None,
+    soft_lower: npt.ArrayLike = -math.inf,
+    soft_upper: npt.ArrayLike = math.inf,
+    k_position: npt.ArrayLike = 0.0,
+    beyond: Beyond = "stop",
 ) -> Array:
     """Clamped to -+ velocity, to what reaches no position limit within `dt`, and to previous -+ acceleration dt.
 
-    A joint beyond a limit may only move back: outward commands become 0, inward ones stay.
+    Beyond a position limit by up to `POSITION_TOLERANCE` it may lead back, but not further out; beyond that it is 0,
+    or with `beyond="return"` it may still lead back. Where position and acceleration limits exclude each other, the
+    command is let between them: a joint cannot brake faster than it can.
 
     Args:
         command: (n) rad/s or m/s.
-        velocity, acceleration, lower, upper: limits; infinite: none.
-        dt: [s].
-        position: (n) measured; None: position limits are not looked at.
+        velocity, acceleration, lower, upper: hard limits.
+        dt: [s], above 0.
+        position: (n) measured; None: position limits, soft ones included, are not looked at.
         previous: (n) the velocity command before; None: the acceleration is not limited.
+        soft_lower, soft_upper, k_position: soft limits; k_position [1/s].
+        beyond: see above.
+
+    Returns:
+        (n)
     """
-    high = np.asarray(velocity, dtype=np.float64)
-    low = -high
+    fastest = _floats(velocity)
+    low, high = -fastest, fastest
     if position is not None:
-        measured = np.asarray(position, dtype=np.float64)
-        high = np.minimum(high, np.maximum((np.asarray(upper, dtype=np.float64) - measured) / dt, 0.0))
-        low = np.maximum(low, np.minimum((np.asarray(lower, dtype=np.float64) - measured) / dt, 0.0))
-    limited = np.asarray(command, dtype=np.float64)
+        q, q_low, q_high = _floats(position), _floats(lower), _floats(upper)
+        low = np.maximum(low, np.minimum((q_low - q) / dt, 0.0))
+        high = np.minimum(high, np.maximum((q_high - q) / dt, 0.0))
+        if beyond == "stop":
+            out = (q > q_high + POSITION_TOLERANCE) | (q < q_low - POSITION_TOLERANCE)
+            low, high = np.where(out, 0.0, low), np.where(out, 0.0, high)
+        least, most = _soft_velocities(q, fastest, soft_lower, soft_upper, k_position)
+        # Led back by the soft limit only as far as the hard ones let it.
+        low, high = np.minimum(np.maximum(low, least), high), np.maximum(np.minimum(high, most), low)
     if previous is not None:
-        change = np.asarray(acceleration, dtype=np.float64) * dt
-        before = np.asarray(previous, dtype=np.float64)
-        limited = np.minimum(np.maximum(limited, before - change), before + change)
-    return np.asarray(np.minimum(np.maximum(limited, low), high))
+        change, before = _floats(acceleration) * dt, _floats(previous)
+        low, high = np.maximum(low, before - change), np.minimum(high, before + change)
+        low, high = np.minimum(low, high), np.maximum(low, high)
+    return np.asarray(np.minimum(np.maximum(_floats(command), low), high))
 
 
 def limit_effort(
     command: npt.ArrayLike,
     *,
-    effort: npt.ArrayLike,
-    position: npt.ArrayLike,
-    velocity: npt.ArrayLike,
+    effort: npt.ArrayLike = math.inf,
+    position: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
     lower: npt.ArrayLike = -math.inf,
     upper: npt.ArrayLike = math.inf,
     max_velocity: npt.ArrayLike = math.inf,
+    soft_lower: npt.ArrayLike = -math.inf,
+    soft_upper: npt.ArrayLike = math.inf,
+    k_position: npt.ArrayLike = 0.0,
+    k_velocity: npt.ArrayLike | None = None,
 ) -> Array:
     """Clamped to -+ effort, with no push further out at a position limit and none further up beyond the velocity limit.
 
     At or below `lower` and not moving back (velocity <= 0) the command cannot be negative; above `max_velocity` it
-    cannot be positive; and the mirror images.
+    cannot be positive; and the mirror images. Then the soft limits, by the module's law.
 
     Args:
         command: (n) N m or N.
-        effort, lower, upper, max_velocity: limits; infinite: none.
-        position, velocity: (n) measured.
+        effort, lower, upper, max_velocity: hard limits.
+        position, velocity: (n) measured; what is None is not looked at.
+        soft_lower, soft_upper, k_position, k_velocity: soft limits; k_position [1/s], k_velocity [N m s/rad or N s/m].
+
+    Returns:
+        (n)
     """
-    q, v = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
-    q_low, q_high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
-    high, fast = np.asarray(effort, dtype=np.float64), np.asarray(max_velocity, dtype=np.float64)
-    no_push = ((q >= q_high) & (v >= 0.0)) | (v > fast)
-    no_pull = ((q <= q_low) & (v <= 0.0)) | (v < -fast)
-    highest = np.where(no_push, 0.0, high)
-    lowest = np.where(no_pull, 0.0, -high)
-    return np.asarray(np.minimum(np.maximum(np.asarray(command, dtype=np.float64), lowest), highest))
+    most = _floats(effort)
+    lowest, highest = -most, most
+    if velocity is not None:
+        v, fastest = _floats(velocity), _floats(max_velocity)
+        no_push, no_pull = v > fastest, v < -fastest
+        if position is not None:
+            q = _floats(position)
+            no_push = no_push | ((q >= _floats(upper)) & (v >= 0.0))
+            no_pull = no_pull | ((q <= _floats(lower)) & (v <= 0.0))
+        if k_velocity is not None:
+            stiffness = _floats(k_velocity)
+            slow, fast = -fastest, fastest
+            if position is not None:
+                slow, fast = _soft_velocities(_floats(position), fastest, soft_lower, soft_upper, k_position)
+            acts = stiffness > 0.0
+            with np.errstate(invalid="ignore"):  # 0 times infinity, where it does not act
+                under, over = -stiffness * (v - slow), -stiffness * (v - fast)
+            lowest = np.where(acts, np.minimum(np.maximum(under, lowest), highest), lowest)
+            highest = np.where(acts, np.minimum(np.maximum(over, -most), most), highest)
+        highest = np.where(no_push, np.minimum(highest, 0.0), highest)
+        lowest = np.where(no_pull, np.maximum(lowest, 0.0), lowest)
+    return np.asarray(np.minimum(np.maximum(_floats(command), lowest), highest))
 
 
-class JointLimiter:
-    """The limits of all joints of a robot on their commands, once a tick.
-
-    Attributes:
-        saturations: (n) int, in how many ticks each joint's command was cut.
-        saturated: (n) bool, in the last tick.
+def limit_acceleration(
+    command: npt.ArrayLike,
+    *,
+    acceleration: npt.ArrayLike = math.inf,
+    deceleration: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+) -> Array:
+    """Clamped to -+ acceleration; to -+ deceleration where it acts against the measured `velocity` (n).
 
     Args:
-        limits: (n) of the joints.
+        command: (n) rad/s2 or m/s2.
+        acceleration, deceleration: limits; no deceleration: as the acceleration.
+        velocity: (n) measured; None: the acceleration holds everywhere.
+
+    Returns:
+        (n)
     """
+    wanted, most = _floats(command), _floats(acceleration)
+    if deceleration is not None and velocity is not None:
+        most = np.where(wanted * _floats(velocity) < 0.0, _floats(deceleration), most)
+    return np.asarray(np.minimum(np.maximum(wanted, -most), most))
 
-    def __init__(self, limits: Sequence[JointLimits]) -> None:
-        n = len(limits)
 
-        def bound(values: list[float | None], default: float) -> Array:
-            return np.array([default if value is None else value for value in values], dtype=np.float64)
+def _floats(values: npt.ArrayLike) -> Array:
+    return np.asarray(values, dtype=np.float64)
 
-        self._lower = bound([limit.lower for limit in limits], -math.inf)
-        self._upper = bound([limit.upper for limit in limits], math.inf)
-        self._velocity = bound([limit.velocity for limit in limits], math.inf)
-        self._acceleration = bound([limit.acceleration for limit in limits], math.inf)
-        self._effort = bound([limit.effort for limit in limits], math.inf)
-        self._version = -1
-        self._seen = np.zeros((3, n))
-        self._inside, self._below = np.zeros((2, 3, n), dtype=np.bool_)
-        self.saturations = np.zeros(n, dtype=np.int64)
-        self.saturated = np.zeros(n, dtype=np.bool_)
-        self._cut = False
-        self._previous = np.full(n, math.nan)
 
-    def reset(self) -> None:
-        """Forgets the commands before and the counts."""
-        self._previous[:] = math.nan
-        self.saturations[:] = 0
-        self.saturated[:] = False
+def _soft_velocities(
+    q: Array, fastest: Array, soft_lower: npt.ArrayLike, soft_upper: npt.ArrayLike, k_position: npt.ArrayLike
+) -> tuple[Array, Array]:
+    """(v_min, v_max) of the module's law; -+ fastest where k_position is 0."""
+    k = _floats(k_position)
+    acts = k > 0.0
+    if not acts.any():
+        return -fastest, fastest
+    with np.errstate(invalid="ignore"):  # 0 times infinity, where it does not act
+        least = np.where(acts, -k * (q - _floats(soft_lower)), -math.inf)
+        most = np.where(acts, -k * (q - _floats(soft_upper)), math.inf)
+    return np.minimum(np.maximum(least, -fastest), fastest), np.minimum(np.maximum(most, -fastest), fastest)
 
-    def _obey(self, modes: Sequence[Mode]) -> None:
-        self._previous[:] = math.nan
-        self._positions = np.flatnonzero([mode == "position" for mode in modes])
-        self._velocities = np.flatnonzero([mode == "velocity" for mode in modes])
-        self._plain = not len(self._positions) and not len(self._velocities)
-        efforts = np.array([mode == "effort" for mode in modes])
-        # Infinite: joints without effort command.
-        self._watched = [
-            np.where(efforts, limit, default)
-            for limit, default in (
-                (self._lower, -math.inf),
-                (self._upper, math.inf),
-                (self._velocity, math.inf),
-                (self._effort, math.inf),
-            )
-        ]
-        lower, upper, velocity, effort = self._watched
-        # Nothing is cut while position, velocity and effort lie within these, and all commands are efforts.
-        self._least = np.stack((lower, -velocity, -effort))
-        self._most = np.stack((upper, velocity, effort))
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, dt: float) -> None:
-        """Cuts the command in place; `position`, `velocity` (n) are measured, `dt` [s] is a control period."""
-        if command.version != self._version:
-            self._version = command.version
-            self._obey(command.modes)
-        seen, inside = self._seen, self._inside
-        seen[0], seen[1], seen[2] = position, velocity, command.effort
-        np.greater(seen, self._least, out=inside)
-        np.less(seen, self._most, out=self._below)
-        np.logical_and(inside, self._below, out=inside)
-        if self._plain and np.count_nonzero(inside) == inside.size:
-            if self._cut:
-                self._cut = False
-                self.saturated.fill(False)
-            return
-        self._cut = True
-        self.saturated.fill(False)
-        lower, upper, speed, effort = self._watched
-        limited = limit_effort(
-            command.effort,
-            effort=effort,
-            position=position,
-            velocity=velocity,
-            lower=lower,
-            upper=upper,
-            max_velocity=speed,
-        )
-        np.not_equal(limited, command.effort, out=self.saturated)
-        command.effort[:] = limited
-        if not self._plain:
-            self._apply_others(command, position, dt)
-        self.saturations += self.saturated
-
-    def _apply_others(self, command: JointCommand, position: Array, dt: float) -> None:
-        i = self._positions
-        if len(i):
-            before = np.where(np.isnan(self._previous[i]), position[i], self._previous[i])
-            limited = limit_position(
-                command.position[i],
-                lower=self._lower[i],
-                upper=self._upper[i],
-                velocity=self._velocity[i],
-                previous=before,
-                dt=dt,
-            )
-            self.saturated[i] |= limited != command.position[i]
-            self._previous[i] = command.position[i] = limited
-        i = self._velocities
-        if len(i):
-            before = np.where(np.isnan(self._previous[i]), command.velocity[i], self._previous[i])
-            limited = limit_velocity(
-                command.velocity[i],
-                velocity=self._velocity[i],
-                dt=dt,
-                position=position[i],
-                lower=self._lower[i],
-                upper=self._upper[i],
-                acceleration=self._acceleration[i],
-                previous=before,
-            )
-            self.saturated[i] |= limited != command.velocity[i]
-            self._previous[i] = command.velocity[i] = limited
+def _refuse_out_of_bounds(position: Array, lower: Array, upper: Array) -> None:
+    beyond = np.atleast_1d(np.maximum(position - upper, lower - position))
+    if not np.any(beyond > OUT_OF_BOUNDS):
+        return
+    k = int(np.argmax(beyond))
+    q = float(np.broadcast_to(position, beyond.shape)[k])
+    limits = [float(np.broadcast_to(bound, beyond.shape)[k]) for bound in (lower, upper)]
+    message = f"joint {k} is measured at {q:.6g}, more than {OUT_OF_BOUNDS:g} beyond its limits "
+    raise InvalidArgument(
+        "CTRL191",
+        f"{message}{limits[0]:g} to {limits[1]:g}",
+        hint="a broken sensor, or limits narrower than those of the robot",
+    )

@@ -76,6 +76,22 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class SoftLimits:
+    """Where a joint is slowed down before its limits (URDF's safety_controller); `control/limits.py` has the law.
+
+    Attributes:
+        lower, upper: rad or m; None: none on this side.
+        k_position: velocity per distance to them [1/s]; 0: they do not act.
+        k_velocity: effort per velocity beyond what they allow [N m s/rad or N s/m]; 0: efforts are not bounded.
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+    k_position: float = 0.0
+    k_velocity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class JointLimits:
     """SI: rad or m, and per second. None is unlimited (`lower`, `upper`) or not stated (the rest)."""
 
@@ -85,6 +101,7 @@ class JointLimits:
     effort: float | None = None
     acceleration: float | None = None
     jerk: float | None = None
+    soft: SoftLimits | None = None
 
 
 @dataclass(frozen=True, slots=True)

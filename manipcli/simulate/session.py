@@ -15,7 +15,7 @@ import numpy as np
 from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
-from manipcli.control.limits import JointLimiter
+from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
@@ -78,7 +78,7 @@ class Session:
         self.observer: Observer = Silent()
         self.ticks = 0
         self.state = engine.read()
-        self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints])
+        self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints], robot.joint_names)
         self.actuation = Actuation(robot, period)
         self._obeyed = -1
         self._asked = np.zeros(len(robot.joint_names))
@@ -123,7 +123,14 @@ class Session:
         self._touch(state)
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
-        self._limiter.apply(command, state.position, state.velocity, self.period)
+        try:
+            self._limiter.apply(command, state.position, state.velocity, self.period)
+        except NotFinite as bad:
+            self._refuse_runaway(state)  # a controller that is told nonsense is not to blame
+            if not np.isfinite(state.position).all():
+                raise SimulationFailed(str(bad), time=time) from bad
+            manager.stop_non_finite(time)
+            self._limiter.apply(command, state.position, state.velocity, self.period)
         if self.actuation.ideal or self.engine.ideal:
             self.engine.write(command)
         else:

@@ -9,7 +9,7 @@ from manipcli.control.controller import JointState
 from manipcli.control.controllers.gripper import GripperController, GripperGoal
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.factory import build_controllers, controller_findings
-from manipcli.control.limits import JointLimiter
+from manipcli.control.limiter import JointLimiter
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen

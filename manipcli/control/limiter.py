@@ -1,0 +1,376 @@
+"""The limits of all joints of a robot on what goes to them, once a tick, and how often each was cut.
+
+A joint that is measured beyond its position limits is no error here, as it is in ros2_control: what a simulation
+measures is true, so something pushed the joint there (a contact, a soft stop), and its way back stays open. A
+command or a measurement that is no finite number is an error, and names the joint.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.command import JointCommand, Mode
+from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity
+from manipcli.core.errors import ExitCode, ManipcliError
+from manipcli.core.geometry import Array
+from manipcli.model.robot import JointLimits, SoftLimits
+
+SLACK = 1e-3
+"""Relative, on velocity and acceleration limits of positions: what is planned to a limit goes through as it is."""
+_MOST = sys.float_info.max  # infinity is beyond it, so that it is found
+_NO_SOFT = SoftLimits()
+
+
+class NotFinite(ManipcliError):
+    """A command, or what is measured, is no finite number; names the joint."""
+
+    exit_code: ClassVar[ExitCode] = ExitCode.FAILED
+    code: ClassVar[str] = "CTRL192"
+
+    def __init__(self, joint: str, what: str, value: float) -> None:
+        self.joint = joint
+        super().__init__(f"joint '{joint}': the {what} is {value:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """Limits of joints as arrays (n); infinite, or of the gains 0, where there is none."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    effort: Array
+    soft_lower: Array
+    soft_upper: Array
+    k_position: Array
+    k_velocity: Array
+
+    @classmethod
+    def of(cls, limits: Sequence[JointLimits]) -> _Limits:
+        def bound(values: Sequence[float | None], default: float) -> Array:
+            return np.array([default if value is None else value for value in values], dtype=np.float64)
+
+        soft = [limit.soft or _NO_SOFT for limit in limits]
+        return cls(
+            lower=bound([limit.lower for limit in limits], -math.inf),
+            upper=bound([limit.upper for limit in limits], math.inf),
+            velocity=bound([limit.velocity for limit in limits], math.inf),
+            acceleration=bound([limit.acceleration for limit in limits], math.inf),
+            effort=bound([limit.effort for limit in limits], math.inf),
+            soft_lower=bound([one.lower for one in soft], -math.inf),
+            soft_upper=bound([one.upper for one in soft], math.inf),
+            k_position=np.array([one.k_position for one in soft]),
+            k_velocity=np.array([one.k_velocity for one in soft]),
+        )
+
+    def at(self, where: npt.NDArray[np.intp]) -> _Limits:
+        """Of some joints."""
+        return _Limits(
+            self.lower[where], self.upper[where], self.velocity[where], self.acceleration[where], self.effort[where],
+            self.soft_lower[where], self.soft_upper[where], self.k_position[where], self.k_velocity[where],
+        )  # fmt: skip
+
+
+class _Window:
+    """Rows of numbers, and whether each lies strictly between its bounds: in two comparisons, not two a row."""
+
+    __slots__ = ("_above", "_all", "_below", "_flags", "_least", "_most", "_values", "rows")
+
+    def __init__(self, least: Sequence[Array], most: Sequence[Array]) -> None:
+        self._least = np.maximum(np.concatenate(least), -_MOST)
+        self._most = np.minimum(np.concatenate(most), _MOST)
+        size = len(self._least)
+        self._values = np.zeros(size)
+        self.rows = tuple(self._values.reshape(len(least), -1))
+        self._flags = np.zeros(2 * size, dtype=np.bool_)
+        self._above, self._below = self._flags[:size], self._flags[size:]
+        self._all = b"\x01" * (2 * size)
+
+    def holds(self) -> bool:
+        np.greater(self._values, self._least, self._above)
+        np.less(self._values, self._most, self._below)
+        return self._flags.tobytes() == self._all  # faster than asking numpy whether all are true
+
+
+class _Efforts:
+    """Joints that obey an effort, or are told one to add; arrays are those of all joints.
+
+    Soft limits act where an effort is obeyed: elsewhere they act on the position, and would add an effort of their own.
+    """
+
+    def __init__(self, modes: Sequence[Mode], limits: _Limits) -> None:
+        commanded = np.array([mode in ("effort", "position") for mode in modes])
+        obeyed = np.array([mode == "effort" for mode in modes])
+
+        def watched(limit: Array, default: float) -> Array:
+            return np.where(commanded, limit, default)
+
+        self._limits = _Limits(
+            lower=watched(limits.lower, -math.inf),
+            upper=watched(limits.upper, math.inf),
+            velocity=watched(limits.velocity, math.inf),
+            acceleration=limits.acceleration,
+            effort=watched(limits.effort, math.inf),
+            soft_lower=watched(limits.soft_lower, -math.inf),
+            soft_upper=watched(limits.soft_upper, math.inf),
+            k_position=np.where(obeyed, limits.k_position, 0.0),
+            k_velocity=np.where(obeyed, limits.k_velocity, 0.0),
+        )
+        own = self._limits
+        least, most = [own.lower, -own.velocity, -own.effort], [own.upper, own.velocity, own.effort]
+        kv = own.k_velocity
+        self._soft = bool(kv.any())
+        if self._soft:
+            # Nothing is cut while effort + kv v is within -+ kv v_max, and with kv kp q added, within kv kp soft_limit.
+            self._kv, self._kv_kp = kv, kv * own.k_position
+            at, near = kv > 0.0, self._kv_kp > 0.0
+            with np.errstate(invalid="ignore"):  # 0 times infinity, where it does not act
+                fastest = np.where(at, kv * own.velocity, math.inf)
+                least += [-fastest, np.where(near, self._kv_kp * own.soft_lower, -math.inf)]
+                most += [fastest, np.where(near, self._kv_kp * own.soft_upper, math.inf)]
+        self._window = _Window(least, most)
+        self._rows = self._window.rows
+
+    def inside(self, command: JointCommand, position: Array, velocity: Array) -> bool:
+        """Whether nothing has to be cut."""
+        rows = self._rows
+        rows[0][:] = position
+        rows[1][:] = velocity
+        rows[2][:] = command.effort
+        if self._soft:
+            np.multiply(self._kv, velocity, rows[3])
+            np.add(rows[3], command.effort, rows[3])
+            np.multiply(self._kv_kp, position, rows[4])
+            np.add(rows[4], rows[3], rows[4])
+        return self._window.holds()
+
+    def cut(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+        own = self._limits
+        limited = limit_effort(
+            command.effort,
+            effort=own.effort,
+            position=position,
+            velocity=velocity,
+            lower=own.lower,
+            upper=own.upper,
+            max_velocity=own.velocity,
+            soft_lower=own.soft_lower,
+            soft_upper=own.soft_upper,
+            k_position=own.k_position,
+            k_velocity=own.k_velocity if self._soft else None,
+        )
+        saturated |= limited != command.effort
+        command.effort[:] = limited
+
+
+class _Positions:
+    """Joints that obey a position, and the velocity and acceleration that may go with it."""
+
+    def __init__(self, where: npt.NDArray[np.intp], limits: _Limits, dt: float) -> None:
+        self._where, self._dt = where, dt
+        self._own = own = limits.at(where)
+        self._velocity, self._acceleration = own.velocity * (1.0 + SLACK), own.acceleration * (1.0 + SLACK)
+        reach, gain = self._velocity * dt, self._acceleration * dt * dt
+        # A position, its step since the one before, and by how much that has grown.
+        least = [np.nextafter(own.lower, -math.inf), -reach, np.full(len(where), -math.inf)]
+        self._window = _Window(least, [np.nextafter(own.upper, math.inf), reach, gain])
+        self._soft = bool(own.k_position.any())
+        self._before, self._step, self._size = np.zeros((3, len(where)))
+        self.fresh = True
+
+    def apply(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+        where, (wanted, step, growth) = self._where, self._window.rows
+        if self.fresh:
+            self.fresh = False
+            self._before[:], self._step[:] = position[where], 0.0
+        command.position.take(where, out=wanted, mode="clip")
+        np.subtract(wanted, self._before, step)
+        np.abs(step, growth)
+        np.abs(self._step, self._size)
+        np.subtract(growth, self._size, growth)
+        if self._soft or not self._window.holds():
+            self._cut(command, wanted, saturated)
+        else:
+            self._before[:], self._step[:] = wanted, step
+        if command.velocity.any():
+            told = command.velocity[where]
+            limited = limit_velocity(told, velocity=self._velocity, dt=self._dt)
+            saturated[where] |= limited != told
+            command.velocity[where] = limited
+        if command.acceleration.any():
+            told = command.acceleration[where]
+            limited = limit_acceleration(told, acceleration=self._acceleration)
+            saturated[where] |= limited != told
+            command.acceleration[where] = limited
+
+    def _cut(self, command: JointCommand, wanted: Array, saturated: npt.NDArray[np.bool_]) -> None:
+        own, dt = self._own, self._dt
+        limited = limit_position(
+            wanted,
+            lower=own.lower,
+            upper=own.upper,
+            velocity=self._velocity,
+            acceleration=self._acceleration,
+            previous=self._before,
+            measured_velocity=self._step / dt,
+            soft_lower=own.soft_lower,
+            soft_upper=own.soft_upper,
+            k_position=own.k_position,
+            dt=dt,
+        )
+        saturated[self._where] |= limited != wanted
+        np.subtract(limited, self._before, self._step)
+        self._before[:] = limited
+        command.position[self._where] = limited
+
+
+class _Velocities:
+    """Joints that obey a velocity."""
+
+    def __init__(self, where: npt.NDArray[np.intp], limits: _Limits, dt: float) -> None:
+        self._where, self._dt = where, dt
+        self._own = own = limits.at(where)
+        # A velocity, by how much it has changed, and where it leads.
+        least = [-own.velocity, -own.acceleration * dt, own.lower]
+        most = [own.velocity, own.acceleration * dt, own.upper]
+        self._window = _Window([np.nextafter(a, -math.inf) for a in least], [np.nextafter(b, math.inf) for b in most])
+        self._soft = bool(own.k_position.any())
+        self._before = np.zeros(len(where))
+        self.fresh = True
+
+    def apply(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+        where, (wanted, change, ahead) = self._where, self._window.rows
+        if self.fresh:
+            self.fresh = False
+            self._before[:] = velocity[where]
+        command.velocity.take(where, out=wanted, mode="clip")
+        np.subtract(wanted, self._before, change)
+        np.multiply(wanted, self._dt, ahead)
+        np.add(ahead, position[where], ahead)
+        if not self._soft and self._window.holds():
+            self._before[:] = wanted
+            return
+        own = self._own
+        limited = limit_velocity(
+            wanted,
+            velocity=own.velocity,
+            dt=self._dt,
+            position=position[where],
+            lower=own.lower,
+            upper=own.upper,
+            acceleration=own.acceleration,
+            previous=self._before,
+            soft_lower=own.soft_lower,
+            soft_upper=own.soft_upper,
+            k_position=own.k_position,
+            beyond="return",
+        )
+        saturated[where] |= limited != wanted
+        self._before[:] = limited
+        command.velocity[where] = limited
+
+
+class JointLimiter:
+    """The limits of joints, hard and soft, on their commands.
+
+    Effort, in the modes `effort` and `position` (added there; hard limits only): `limit_effort`. Velocity:
+    `limit_velocity`, from the command before (at first, the measured velocity). Position: `limit_position`, from the
+    command before (at first, the measured position), its acceleration from the commands' own velocity, so that a joint
+    that lags is not slowed.
+
+    Attributes:
+        saturations: (n) int, in how many ticks each joint's command was cut.
+        saturated: (n) bool, in the last tick.
+
+    Args:
+        limits: (n) of the joints.
+        joints: (n) their names, for errors; by default their numbers.
+    """
+
+    def __init__(self, limits: Sequence[JointLimits], joints: Sequence[str] | None = None) -> None:
+        n = len(limits)
+        self._joints = tuple(joints) if joints is not None else tuple(map(str, range(n)))
+        self._limits = _Limits.of(limits)
+        self._version, self._dt = -1, 0.0
+        nobody: tuple[Mode, ...] = ("brake",) * n
+        self._efforts = _Efforts(nobody, self._limits)
+        self._others: list[_Positions | _Velocities] = []
+        self._cut = False
+        self.saturations = np.zeros(n, dtype=np.int64)
+        self.saturated = np.zeros(n, dtype=np.bool_)
+
+    def reset(self) -> None:
+        """Forgets the commands before and the counts."""
+        for group in self._others:
+            group.fresh = True
+        self.saturations[:] = 0
+        self.saturated[:] = False
+        self._cut = False
+
+    def _obey(self, modes: Sequence[Mode], dt: float) -> None:
+        self._efforts = _Efforts(modes, self._limits)
+        positions = np.flatnonzero([mode == "position" for mode in modes])
+        velocities = np.flatnonzero([mode == "velocity" for mode in modes])
+        self._others = []
+        if len(positions):
+            self._others.append(_Positions(positions, self._limits, dt))
+        if len(velocities):
+            self._others.append(_Velocities(velocities, self._limits, dt))
+
+    def apply(self, command: JointCommand, position: Array, velocity: Array, dt: float) -> None:
+        """Cuts the command in place.
+
+        Args:
+            command: of this tick.
+            position, velocity: (n) measured; rad or m, and per second.
+            dt: [s] of a control period.
+
+        Raises:
+            NotFinite: a command that a joint obeys, or what is measured of it, is not finite; nothing is cut then.
+        """
+        if command.version != self._version or dt != self._dt:
+            self._version, self._dt = command.version, dt
+            self._obey(command.modes, dt)
+        if self._cut:
+            self._cut = False
+            self.saturated.fill(False)
+        others = self._others
+        if self._efforts.inside(command, position, velocity):
+            if not others:
+                return
+            self._refuse_not_finite(command, position, velocity)
+        else:
+            self._refuse_not_finite(command, position, velocity)
+            self._efforts.cut(command, position, velocity, self.saturated)
+        for group in others:
+            group.apply(command, position, velocity, self.saturated)
+        self._cut = True
+        self.saturations += self.saturated
+
+    def _refuse_not_finite(self, command: JointCommand, position: Array, velocity: Array) -> None:
+        # Products tell it quickly, for infinity times 0 is NaN; where they overflow, that only costs the closer look.
+        with np.errstate(all="ignore"):
+            if math.isfinite(position.dot(velocity) + command.effort.dot(command.velocity) + command.position.sum()):
+                return
+        obeyed: dict[Mode, tuple[tuple[str, Array], ...]] = {
+            "effort": (("effort command", command.effort),),
+            "velocity": (("velocity command", command.velocity),),
+            "position": (
+                ("position command", command.position),
+                ("velocity command", command.velocity),
+                ("effort command", command.effort),
+            ),
+        }
+        measured = (("measured position", position), ("measured velocity", velocity))
+        for k, mode in enumerate(command.modes):
+            for what, values in (*measured, *obeyed.get(mode, ())):
+                if not math.isfinite(values[k]):
+                    raise NotFinite(self._joints[k], what, float(values[k]))

@@ -1,0 +1,137 @@
+"""The limiter against the pure functions, tick by tick, in every mode; what it counts, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+
+from manipcli.control import JointLimiter, NotFinite, limit_effort, limit_position, limit_velocity
+from manipcli.control.command import JointCommand
+from manipcli.control.limiter import SLACK
+from manipcli.model.robot import JointLimits, SoftLimits
+
+HARD = {"lower": -1.0, "upper": 1.0}
+SOFT = SoftLimits(-0.8, 0.8, 20.0, 5.0)
+DT = 0.01
+
+
+def soft_arguments(soft, *, effort=False):
+    if soft is None:
+        return {}
+    law = {"soft_lower": soft.lower, "soft_upper": soft.upper, "k_position": soft.k_position}
+    return {**law, "k_velocity": soft.k_velocity} if effort else law
+
+
+@pytest.mark.parametrize("soft", [None, SOFT])
+@pytest.mark.parametrize("scale", [0.02, 1.0])
+def test_it_is_the_pure_functions_and_counts_what_they_cut(soft, scale):
+    """Near zero nothing is cut, and the short way must notice all that is."""
+    rng = np.random.default_rng(0)
+    limits = [JointLimits(-1, 1, 2, 10, 5, None, soft)] * 4
+    limiter = JointLimiter(limits)
+    command = JointCommand(4)
+    command.obey(["effort", "velocity", "position", "free"])
+    counts = np.zeros(4, dtype=int)
+    speed, last, step = None, None, 0.0
+    for _ in range(300):
+        q, v = scale * rng.normal(size=4), 2 * scale * rng.normal(size=4)
+        wanted = scale * rng.normal(size=3) * [10, 3, 1]
+        command.effort[0], command.velocity[1], command.position[2] = wanted
+        expected = np.array([
+            limit_effort(
+                wanted[0], effort=10, position=q[0], velocity=v[0], max_velocity=2, **HARD,
+                **soft_arguments(soft, effort=True),
+            ),
+            limit_velocity(
+                wanted[1], velocity=2, dt=DT, position=q[1], acceleration=5, beyond="return", **HARD,
+                previous=v[1] if speed is None else speed, **soft_arguments(soft),
+            ),
+            limit_position(
+                wanted[2], velocity=2 * (1 + SLACK), acceleration=5 * (1 + SLACK), measured_velocity=step / DT, dt=DT,
+                previous=q[2] if last is None else last, **HARD, **soft_arguments(soft),
+            ),
+        ])  # fmt: skip
+        limiter.apply(command, q, v, DT)
+        got = np.array([command.effort[0], command.velocity[1], command.position[2]])
+        np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12)
+        step = expected[2] - (q[2] if last is None else last)
+        speed, last = expected[1], expected[2]
+        cut = np.append(got != wanted, False)
+        np.testing.assert_array_equal(limiter.saturated, cut)
+        counts += cut
+    np.testing.assert_array_equal(limiter.saturations, counts)
+    assert counts[:3].all() or scale < 1.0
+    limiter.reset()
+    assert not limiter.saturations.any()
+
+
+def test_what_nobody_commands_passes_through():
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10)] * 2), JointCommand(2)
+    for modes in (["brake", "free"], ["free", "brake"]):
+        command.obey(modes)
+        command.effort[:] = 99.0
+        limiter.apply(command, np.array([5.0, 5.0]), np.array([9.0, 9.0]), 0.001)
+        assert command.effort.tolist() == [99.0, 99.0]
+    assert not limiter.saturations.any()
+
+
+def test_what_goes_with_a_position_is_limited_too():
+    """position + velocity + acceleration, and position + effort."""
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10, 5)]), JointCommand(1)
+    command.obey(["position"])
+    command.velocity[:], command.acceleration[:], command.effort[:] = 7.0, -70.0, -30.0
+    limiter.apply(command, np.zeros(1), np.zeros(1), 0.001)
+    assert command.velocity[0] == pytest.approx(2.0 * (1 + SLACK))
+    assert command.acceleration[0] == pytest.approx(-5.0 * (1 + SLACK))
+    assert command.effort[0] == -10.0
+    assert limiter.saturations.tolist() == [1]
+
+
+def test_a_position_planned_to_the_limits_goes_through_as_it_is():
+    """Rest to rest in a parabola of exactly the greatest acceleration, to exactly the position limit."""
+    a, dt = 4.0, 0.001
+    t = np.arange(1001) * dt
+    q = np.where(t < 0.5, 0.5 * a * t**2, 1.0 - 0.5 * a * (1.0 - t) ** 2)
+    limiter, command = JointLimiter([JointLimits(-1.0, 1.0, 2.0, 10.0, a)]), JointCommand(1)
+    command.obey(["position"])
+    for value in q:
+        command.position[0] = value
+        limiter.apply(command, np.zeros(1), np.zeros(1), dt)
+        assert command.position[0] == value
+    assert limiter.saturations[0] == 0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("mode", ["effort", "velocity", "position"])
+def test_a_command_that_is_no_finite_number_names_its_joint(mode, bad):
+    """Also of a joint without any limit."""
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10), JointLimits()], ["elbow", "wrist"]), JointCommand(2)
+    command.obey([mode, mode])
+    limiter.apply(command, np.zeros(2), np.zeros(2), 0.001)
+    getattr(command, mode)[1] = bad
+    with pytest.raises(NotFinite, match=f"joint 'wrist': the {mode} command is {bad}"):
+        limiter.apply(command, np.zeros(2), np.zeros(2), 0.001)
+
+
+def test_a_measurement_that_is_no_finite_number_names_its_joint():
+    limiter, command = JointLimiter([JointLimits()] * 2, ["elbow", "wrist"]), JointCommand(2)
+    command.obey(["effort", "free"])
+    with pytest.raises(NotFinite, match="joint 'wrist': the measured velocity is nan"):
+        limiter.apply(command, np.zeros(2), np.array([0.0, math.nan]), 0.001)
+
+
+def test_efforts_and_soft_limits_stop_a_thrown_joint_before_its_hard_limit():
+    """A unit mass on its way out with a full push: the effort law turns it round inside of the hard limit."""
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 50, None, None, SoftLimits(-0.8, 0.8, 20, 40))]), None
+    command = JointCommand(1)
+    command.obey(["effort"])
+    q, v = np.zeros(1), np.full(1, 1.9)
+    highest = 0.0
+    for _ in range(2000):
+        command.effort[:] = 50.0
+        limiter.apply(command, q, v, 0.001)
+        v = v + 0.001 * command.effort
+        q = q + 0.001 * v
+        highest = max(highest, float(q[0]))
+    assert highest < 0.85
+    assert q[0] == pytest.approx(0.8, abs=1e-3)
