@@ -22,6 +22,31 @@ def replay(
         Path | None,
         typer.Option("--html", metavar="FILE", help="Write one page that plays offline, instead of serving one."),
     ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw one moment of the run.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step; the end of the run when absent."),
+    ] = None,
+    sheet: Annotated[
+        Path | None,
+        typer.Option("--sheet", metavar="FILE.png", help="Draw all steps, each at its most telling moment."),
+    ] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option("--video", metavar="FILE", help="Make a film: .webp, .gif, or .mp4 with the extra 'video'."),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WxH", help="Of a picture, 960x720 when absent; of a film, 640x360.")
+    ] = None,
+    view: Annotated[
+        str, typer.Option("--view", metavar="VIEW", help="iso, front, back, left, right, top, or AZIMUTH,ELEVATION.")
+    ] = "iso",
+    fps: Annotated[float, typer.Option("--fps", metavar="N", help="Frames of a film in one second.")] = 25.0,
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film.")
+    ] = 1.0,
     port: Annotated[
         int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
     ] = None,
@@ -34,9 +59,13 @@ def replay(
     Needs nothing but the log and the packages of its meshes. Ctrl-C ends it.
     """
     with Interrupts():
+        from manipcli.cli.pictures import Pictures
         from manipcli.flow.replay import open_playback
 
-        playback = open_playback(log, package_path=tuple(package_path or ()), allow_outside=allow_outside)
+        pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
+        playback = open_playback(
+            log, rate=pictures.rate, package_path=tuple(package_path or ()), allow_outside=allow_outside
+        )
         if playback.lost is not None:
             console.talk(f"the log is not closed: {playback.lost}")
         for note in playback.notes:
@@ -46,6 +75,8 @@ def replay(
 
             html.write_text(player_page(playback), "utf-8")
             console.result(str(html))
+        pictures.make(playback)
+        if html is not None or pictures.wanted:
             return ExitCode.PASSED
         from manipcli.replay.replay import Replay
 

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Writes a file beside its place and gives it its name when it is complete; replaces what is there.
+    """Writes a file; see `whole_file`."""
+    with whole_file(path) as partial:
+        partial.write_bytes(data)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A name beside that of a file, to write to; the file gets its own name when the block ends well.
+
+    What was there before is replaced then, and stays as it is where the block does not end well.
 
     Raises:
-        OSError: nothing can be written there; what was there before still is.
+        OSError: nothing can be written there.
     """
-    partial = partial_of(path)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        partial.write_bytes(data)
+        partial.touch()  # what cannot be written is told before the work
+        yield partial
         partial.replace(path)
-    except BaseException as error:
-        partial.unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename == str(partial):
+    except OSError as error:
+        if error.filename is not None and os.fspath(error.filename) == str(partial):
             error.filename = str(path)  # the user knows of this one only
         raise
-
-
-def partial_of(path: Path) -> Path:
-    """The name of a file while it is written."""
-    return path.with_name(f".{path.name}.{os.getpid()}.partial")
+    finally:
+        partial.unlink(missing_ok=True)

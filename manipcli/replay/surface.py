@@ -53,7 +53,8 @@ class Surface:
     def corners(self) -> Array:
         """(8, 3) of the box around it, which is not empty."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
-        return np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
+        found: Array = np.where([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], high, low)
+        return found
 
     def scaled(self, scale: tuple[float, float, float]) -> Surface:
         """Scaled along each axis; a mirrored surface is turned so that its outside stays outside."""

@@ -1,0 +1,123 @@
+"""A sheet with a picture of each step, as a figure in a paper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manipcli.replay.camera import FROM, Vector
+from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, cut, font, text_size
+from manipcli.replay.image import Image
+from manipcli.replay.playback import Playback
+from manipcli.replay.shots import Shots, telling
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+TILE = (480, 360)
+"""Of one picture [pixel]."""
+GAP = 8
+MOMENTS = 6
+"""Pictures of a run that has no steps."""
+PAPER: Rgb = (255, 255, 255)
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """What a picture shows: `time` None where the step never began, and there is nothing to show."""
+
+    label: str
+    time: float | None
+    outcome: str
+    text: str = ""
+
+
+def tiles(playback: Playback) -> tuple[Tile, ...]:
+    """One a step, of the steps that never began too; without steps, some moments of the run."""
+    if not playback.steps:
+        times = np.linspace(playback.start, playback.end, MOMENTS if playback.end > playback.start else 1)
+        return tuple(Tile("", float(time), "") for time in times)
+    begun = [Tile(one.label, telling(playback, one), one.outcome, one.text) for one in playback.steps]
+    judged = playback.verdict.steps if playback.verdict is not None else ()
+    known = {one.id for one in playback.steps}
+    return (*begun, *(Tile(one.id, None, one.outcome, one.text) for one in judged if one.id not in known))
+
+
+def columns_of(count: int) -> int:
+    """As many as make the sheet about as wide as a page: rows of up to four."""
+    return min(count, 3 if count <= 9 and count != 4 else 4)
+
+
+def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
+    """The sheet.
+
+    Args:
+        playback: the run.
+        size: width and height of each picture [pixel].
+        towards: from what is shown to the eye.
+    """
+    from PIL import Image as PillowImage
+    from PIL import ImageDraw as Drawing
+
+    shown = tiles(playback)
+    columns = columns_of(len(shown))
+    rows = math.ceil(len(shown) / columns)
+    letter = text_size(size[1])
+    strip = round(2.1 * letter)
+    head = round(2.4 * letter)
+    high = size[1] + strip
+    whole = PillowImage.new("RGB", (columns * (size[0] + GAP) + GAP, head + rows * (high + GAP)), PAPER)
+    pen = Drawing.Draw(whole)
+    _heading(pen, playback, whole.width, head, letter)
+    with Shots(playback, size=size, towards=towards, captions=False) as shots:
+        for k, tile in enumerate(shown):
+            row, column = divmod(k, columns)
+            left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)
+            if tile.time is None:
+                pen.rectangle((left, top, left + size[0] - 1, top + size[1] - 1), fill=(240, 242, 245))
+                middle = (left + size[0] / 2, top + size[1] / 2)
+                pen.text(middle, "not begun", fill=QUIET, font=font(letter), anchor="mm")
+            else:
+                whole.paste(PillowImage.fromarray(shots.at(tile.time)), (left, top))
+            _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
+    return np.asarray(whole)
+
+
+def _heading(pen: ImageDraw, playback: Playback, width: int, height: int, letter: int) -> None:
+    """The task and why it failed at the left, its verdict at the right."""
+    verdict = playback.verdict
+    right = ""
+    if verdict is not None:
+        right = f"{verdict.verdict}  {verdict.simulated_time:.2f} s"
+        colour = DONE if verdict.verdict == "passed" else FAILED
+        pen.text((width - GAP, height / 2), right, fill=colour, font=font(letter), anchor="rm")
+    room = width - 4 * GAP - pen.textlength(right, font=font(letter))
+    large = round(1.2 * letter)
+    name = cut(pen, playback.name, large, room)
+    pen.text((GAP, height / 2), name, fill=INK, font=font(large), anchor="lm")
+    if verdict is not None and verdict.text:
+        x = GAP + pen.textlength(f"{name}    ", font=font(large))
+        pen.text((x, height / 2), cut(pen, verdict.text, letter, room - x), fill=QUIET, font=font(letter), anchor="lm")
+
+
+def _label(pen: ImageDraw, tile: Tile, number: int, box: tuple[int, int, int, int], letter: int) -> None:
+    """Number and name at the left, outcome and time at the right; why, where the step failed."""
+    left, top, width, height = box
+    y = top + height / 2
+    left, end = left + 3, float(left + width - 3)
+    if tile.time is not None:
+        clock = f"{tile.time:.2f} s"
+        pen.text((end, y), clock, fill=QUIET, font=font(letter), anchor="rm")
+        end -= pen.textlength(f"{clock}  ", font=font(letter))
+    colour = DONE if tile.outcome == "done" else QUIET if tile.outcome in ("", "not_run") else FAILED
+    outcome = tile.outcome.replace("_", " ")
+    pen.text((end, y), outcome, fill=colour, font=font(letter), anchor="rm")
+    end -= pen.textlength(f"{outcome}  ", font=font(letter))
+    figure = f"{number}  "
+    pen.text((left, y), figure, fill=QUIET, font=font(letter), anchor="lm")
+    x = left + pen.textlength(figure, font=font(letter))
+    why = f": {tile.text}" if tile.text and tile.outcome not in ("done", "") else ""
+    pen.text((x, y), cut(pen, tile.label + why, letter, end - x), fill=INK, font=font(letter), anchor="lm")
