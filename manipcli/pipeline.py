@@ -42,6 +42,7 @@ def run_task(
     seed: int | None = None,
     log: Path | None = None,
     force: bool = False,
+    embed_meshes: bool = False,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
     progress: Progress | None = None,
@@ -54,6 +55,7 @@ def run_task(
         seed: instead of the task's.
         log: where the log goes; default `runs/<task>.mcap`, which is replaced.
         force: replace `log` if it exists.
+        embed_meshes: put the files of all meshes into the log, so that it is shown without any package.
         package_path, allow_outside: see `load_task`.
         progress: told of steps and ticks.
 
@@ -78,7 +80,7 @@ def run_task(
 
     manager = controllers(task, plan.planner.kinematics)
     where = log if log is not None else default_log(task)
-    recorder = open_log(task, plan, manager, where, overwrite=force or log is None)
+    recorder = open_log(task, plan, manager, where, overwrite=force or log is None, embed_meshes=embed_meshes)
     try:
         status, cause = _carried_out(task, plan, manager, recorder, progress)
         recorder.metadata("run", {"status": status, "cause": cause})

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TextIO
 
 from manipcli.core.text import escape
@@ -50,6 +52,27 @@ def painted(lines: Sequence[Sequence[tuple[str, str]]]) -> None:
         for line in lines
     )
     _write(sys.stdout, f"{text}\n")
+
+
+def result_is_terminal() -> bool:
+    """Whether somebody looks at what the command was asked for, and no file or program takes it."""
+    return _is_terminal(sys.stdout)
+
+
+def result_bytes(path: Path) -> None:
+    """A file that the command was asked for, to stdout as it is."""
+    stream = sys.stdout
+    if stream is None or stream.closed:
+        return
+    try:
+        with path.open("rb") as file:
+            shutil.copyfileobj(file, stream.buffer)
+        stream.flush()
+    except BrokenPipeError:
+        _abandon(stream)
+    except OSError:
+        _abandon(stream)
+        raise
 
 
 def talk(text: str) -> None:

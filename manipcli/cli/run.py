@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,9 +17,17 @@ def run(
     task: TaskFile,
     *,
     log: Annotated[
-        Path | None, typer.Option("--log", metavar="PATH", help="Where the log goes; runs/<task>.mcap when absent.")
+        Path | None,
+        typer.Option(
+            "--log",
+            metavar="PATH",
+            help="Where the log goes; runs/<task>.mcap when absent; - is stdout, the report stderr.",
+        ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a --log file that exists.")] = False,
+    embed_meshes: Annotated[
+        bool, typer.Option("--embed-meshes", help="Put the mesh files into the log: it needs no package then.")
+    ] = False,
     seed: Seed = None,
     overrides: Overrides = None,
     format_: Format = "text",
@@ -29,8 +38,12 @@ def run(
 ) -> ExitCode:
     """Validate, plan, simulate, record and judge a task."""
     from manipcli.cli.interrupts import Interrupts
+    from manipcli.cli.log_to_stdout import refuse_stdout, stdout_or
 
-    with Interrupts() as interrupts:
+    to_stdout = log is not None and str(log) == "-"
+    if to_stdout:
+        refuse_stdout(format_)
+    with Interrupts() as interrupts, stdout_or(log) as path:
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
         from manipcli.report import json, text
@@ -41,11 +54,16 @@ def run(
                 task,
                 overrides=tuple(overrides or ()),
                 seed=seed,
-                log=log,
+                log=path,
                 force=force,
+                embed_meshes=embed_meshes,
                 package_path=tuple(package_path or ()),
                 allow_outside=allow_outside,
                 progress=progress,
             )
-        console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
+        if to_stdout:
+            report = replace(report, log="stdout" if report.log is not None else None)
+            console.talk(text.render_run(report, verbose=verbose))
+        else:
+            console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
         return exit_code(report.verdict)

@@ -9,6 +9,7 @@ from pathlib import Path
 from manipcli import __version__
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.flow.embedding import embeddable
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
 from manipcli.flow.vocabulary import task_spec
@@ -22,7 +23,7 @@ from manipcli.record.channels import ControllerChannel
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
-from manipcli.record.recording import Recording
+from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
@@ -33,7 +34,7 @@ RUNS = Path("runs")
 """Where logs go that nobody asked elsewhere, below the working directory."""
 TASK, ROBOT, CONTROLLERS, URDF = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf"
 SCENE, PLAN = "scene.json", "plan.json"
-YAML, XML, JSON = "application/yaml", "application/xml", "application/json"
+YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/json", "application/octet-stream"
 
 
 def default_log(task: Task) -> Path:
@@ -46,9 +47,14 @@ def default_log(task: Task) -> Path:
     return RUNS / f"{task.name}.mcap"
 
 
-def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool) -> Recorder:
-    """A recorder whose file already holds everything that is known before the run."""
+def open_log(
+    task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool = False
+) -> Recorder:
+    """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
+    meshes, too, so that the log is shown without any package."""
     engine = ENGINES[task.spec.simulation.engine]
+    meshes = mesh_files(task)
+    embedded = embeddable(meshes) if embed_meshes else ()
     return Recorder(
         path,
         robot=task.robot,
@@ -62,6 +68,7 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
             (URDF, XML, task.robot.urdf.encode()),
             (SCENE, JSON, scene_to_json(task.scene)),
             (PLAN, JSON, plan.to_json()),
+            *((one.attachment, BYTES, one.path.read_bytes()) for one in embedded),
         ],
         metadata={
             "run": {
@@ -72,18 +79,19 @@ def open_log(task: Task, plan: Plan, manager: ControllerManager, path: Path, *, 
                 "period": repr(task.spec.simulation.control_period),
             },
             "versions": {"manipcli": __version__, engine.name: engine.version()},
-            "meshes": mesh_hashes(task),
+            "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
+            **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),
         },
         overwrite=overwrite,
     )
 
 
-def mesh_hashes(task: Task) -> dict[str, str]:
-    """SHA-256 of every mesh file of the robot and of the scene, by its URI."""
+def mesh_files(task: Task) -> dict[str, Path]:
+    """Every mesh file of the robot and of the scene, by its URI, sorted."""
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
     geometries += [g for body in task.scene.bodies for g in body.geometries]
     meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
-    return {uri: hashlib.sha256(meshes[uri].read_bytes()).hexdigest() for uri in sorted(meshes)}
+    return {uri: meshes[uri] for uri in sorted(meshes)}
 
 
 def _portable_task(spec: TaskSpec) -> TaskSpec:

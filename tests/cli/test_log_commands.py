@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -14,13 +15,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from manipcli.cli.app import main
 from manipcli.pipeline import run_task
-from manipcli.record.reading import read_recording
+from manipcli.record.reading import open_recording, read_recording
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def task(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One move and one wait of the arm, on the ideal engine."""
     folder = tmp_path_factory.mktemp("run")
     task = folder / "task.yaml"
@@ -31,7 +32,13 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "steps:\n  - move: {to: {joint_1: 0.3}}\n  - wait: 0.2 s\n"
         "expect: [{duration: {below: 20 s}}]\n"
     )
-    path = folder / "wave.mcap"
+    return task
+
+
+@pytest.fixture(scope="module")
+def log(task: Path) -> Path:
+    """Its log."""
+    path = task.with_name("wave.mcap")
     assert run_task(task, log=path).verdict.verdict == "passed"
     return path
 
@@ -149,3 +156,26 @@ def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: p
     text = capsys.readouterr().out
     assert "missing: manipcli did not write it" in text
     assert "/joint_states" in text
+
+
+def test_the_log_to_stdout_is_the_log_and_the_report_goes_to_stderr(
+    task: Path, log: Path, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    assert main(["run", str(task), "--log", "-", "--quiet"]) == 0
+    written = capfdbinary.readouterr()
+    assert written.out == log.read_bytes()
+    assert "log: stdout" in written.err.decode()
+    assert "wave passed" in written.err.decode()
+    assert main(["run", str(task), "--log", "-", "--format", "json"]) == 4
+    assert b"both want stdout" in capfdbinary.readouterr().out
+
+
+def test_a_log_with_its_meshes_holds_every_file(task: Path, tmp_path: Path, log: Path) -> None:
+    path = tmp_path / "full.mcap"
+    assert main(["run", str(task), "--log", str(path), "--embed-meshes", "--quiet"]) == 0
+    recording = open_recording(path)
+    embedded = recording.embedded_meshes()
+    hashes = recording.metadata["meshes"]
+    assert {uri: hashlib.sha256(data).hexdigest() for uri, data in embedded.items()} == hashes
+    assert len(hashes) > 20
+    assert open_recording(log).embedded_meshes() == {}
