@@ -16,7 +16,17 @@ from manipcli.model.examine import examine
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
 from manipcli.model.packages import NotFound, Packages, Unread
-from manipcli.model.robot import Group, Joint, JointLimits, Link, Mimic, RobotModel, Tool, TransmissionTag
+from manipcli.model.robot import (
+    Group,
+    Joint,
+    JointLimits,
+    Link,
+    Mimic,
+    RobotModel,
+    SoftLimits,
+    Tool,
+    TransmissionTag,
+)
 from manipcli.model.urdf import Parts, read_parts
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
 
@@ -311,9 +321,35 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
         upper=upper,
         velocity=own.velocity if own.velocity is not None else base.velocity,
         effort=own.effort if own.effort is not None else base.effort,
-        acceleration=own.acceleration,
-        jerk=own.jerk,
+        acceleration=own.acceleration if own.acceleration is not None else base.acceleration,
+        jerk=own.jerk if own.jerk is not None else base.jerk,
+        soft=_soft(reporter, joint.name, own, base, lower, upper),
     )
+
+
+def _soft(
+    reporter: Reporter, joint: str, own: LimitsSpec, base: JointLimits, lower: float | None, upper: float | None
+) -> SoftLimits | None:
+    """The description's soft limits with what the robot file says instead; they lie inside of the hard ones."""
+    written = (own.soft_lower, own.soft_upper, own.k_position, own.k_velocity)
+    if all(value is None for value in written):
+        return base.soft
+    before = base.soft or SoftLimits()
+    soft = SoftLimits(*(o if o is not None else b for o, b in zip(written, dataclasses.astuple(before), strict=True)))
+    for key, value in (("soft_lower", own.soft_lower), ("soft_upper", own.soft_upper)):
+        if value is None:
+            continue
+        if (lower is not None and value < lower) or (upper is not None and value > upper):
+            message = f"joint '{joint}': {key} {value:g} is outside of its limits {interval(lower, upper)}"
+            reporter.error("ROBOT307", message, ("limits", joint, key), hint="soft limits lie inside of the limits")
+        elif soft.k_position == 0.0:
+            message = f"joint '{joint}': {key} without k_position, which says how hard it acts"
+            hint = "k_position is a velocity per distance [1/s]; 20 is usual"
+            reporter.error("ROBOT308", message, ("limits", joint, key), hint=hint)
+    if soft.lower is not None and soft.upper is not None and soft.lower >= soft.upper:
+        message = f"joint '{joint}': the soft limits {soft.lower:g} and {soft.upper:g} leave nothing between them"
+        reporter.error("ROBOT307", message, ("limits", joint))
+    return soft
 
 
 def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) -> bool:

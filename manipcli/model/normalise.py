@@ -32,6 +32,7 @@ from manipcli.model.robot import (
     Sphere,
     TransmissionTag,
 )
+from manipcli.model.urdf_joint import UNBOUNDED
 
 MAX_LINE = 4096
 """Bytes; no line that is written is longer."""
@@ -86,7 +87,9 @@ def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> st
         inertial = dataclasses.replace(inertial, inertia=inside_triangle(inertial.inertia))
         lines += _link(link, inertial, drawn, lambda mesh: str(clean_mesh(mesh, folder)))
     for joint in robot.joints:
-        lines += _joint(joint)
+        # Bullet would take greatest numbers for limits.
+        free = joint.type == "revolute" and joint.limits.lower is None and joint.limits.upper is None
+        lines += _joint(dataclasses.replace(joint, type="continuous") if free else joint)
     return _text(lines)
 
 
@@ -199,11 +202,20 @@ def _joint(joint: Joint) -> list[str]:
     if joint.moves:
         lines.append(f'    <axis xyz="{_numbers(joint.axis)}"/>')
         limits = joint.limits
-        stated = {"lower": limits.lower, "upper": limits.upper, "velocity": limits.velocity, "effort": limits.effort}
+        lower, upper = limits.lower, limits.upper
+        if joint.type != "continuous":
+            lower, upper = (-UNBOUNDED if lower is None else lower), (UNBOUNDED if upper is None else upper)
+        stated = {"lower": lower, "upper": upper, "velocity": limits.velocity, "effort": limits.effort}
         written = " ".join(f'{key}="{number(value)}"' for key, value in stated.items() if value is not None)
         lines += [f"    <limit {written}/>"] if written else []
         if joint.damping or joint.friction:
             lines.append(f'    <dynamics damping="{number(joint.damping)}" friction="{number(joint.friction)}"/>')
+        if limits.soft is not None:
+            soft = limits.soft
+            ends = {"soft_lower_limit": soft.lower, "soft_upper_limit": soft.upper}
+            gains = {"k_position": soft.k_position, "k_velocity": soft.k_velocity}
+            written = " ".join(f'{key}="{number(value)}"' for key, value in (ends | gains).items() if value is not None)
+            lines.append(f"    <safety_controller {written}/>")
         if joint.mimic is not None:
             mimic = joint.mimic
             ratio = f'multiplier="{number(mimic.multiplier)}" offset="{number(mimic.offset)}"'

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.errors import Finding, Place
+from manipcli.model.control_limits import with_control_limits
 from manipcli.model.description import Description
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint, Link, TransmissionTag
@@ -58,7 +59,7 @@ def read_parts(description: Description) -> Parts:
     known = {key: joint for key, joint in joints.items() if joint is not None}
     complete = len(joints_by_name) == len(root.all("joint"))
     top = check_tree(reader, links_by_name, joints, joints_by_name, complete=complete) if links else ""
-    known = resolve_mimics(reader, known, joints_by_name)
+    known = with_control_limits(root, resolve_mimics(reader, known, joints_by_name))
     transmissions = read_transmissions(reader, root, joints_by_name)
     _check_point_masses(reader, links, known, places)
     ordered = depth_first(top, known) if top else tuple(known.values())

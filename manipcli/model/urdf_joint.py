@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import sys
 from collections.abc import Collection
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import shorten
 from manipcli.model.located_xml import Element
-from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, TransmissionTag
+from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, SoftLimits, TransmissionTag
 from manipcli.model.urdf_numbers import Reader
 
 _TYPES: dict[str, JointType] = {
@@ -26,6 +28,8 @@ _HELD = frozenset({"floating", "planar"})
 """Types of several degrees of freedom: where such a joint stands, the link is held."""
 UNIT_TOLERANCE = 1e-3
 """How far the length of an axis may be from 1 without a word."""
+UNBOUNDED: Final = sys.float_info.max
+"""Limits of a joint that has none, where URDF asks for some."""
 
 
 def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
@@ -60,7 +64,7 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
         child=ends[1],
         X_PJ=X_PJ,
         axis=_axis(reader, element, name) if moves else frozen([1.0, 0.0, 0.0]),
-        limits=_limits(reader, element, name, kind) if moves and kind is not None else JointLimits(),
+        limits=_with_soft(reader, element, name, kind) if moves and kind is not None else JointLimits(),
         mimic=_mimic(reader, element) if moves else None,
         damping=damping if moves else 0.0,
         friction=friction if moves else 0.0,
@@ -105,6 +109,26 @@ def _not_negative(reader: Reader, element: Element, attribute: str, joint: str) 
     return value
 
 
+def _with_soft(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
+    """The limits, and the soft ones of a <safety_controller>; soft positions that are both 0 are none."""
+    limits = _limits(reader, element, name, kind)
+    safety = element.first("safety_controller")
+    if safety is None:
+        return limits
+    lower, upper = (reader.number(safety, f"soft_{side}_limit", 0.0) or 0.0 for side in ("lower", "upper"))
+    k_position, k_velocity = (_not_negative(reader, safety, key, name) or 0.0 for key in ("k_position", "k_velocity"))
+    positions = k_position > 0.0 and lower < upper and kind != "continuous"
+    if not positions and k_velocity == 0.0:
+        return limits
+    soft = SoftLimits(
+        lower=lower if positions else None,
+        upper=upper if positions else None,
+        k_position=k_position if positions else 0.0,
+        k_velocity=k_velocity,
+    )
+    return dataclasses.replace(limits, soft=soft)
+
+
 def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
     limit = element.first("limit")
     if limit is None:
@@ -116,7 +140,7 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
     lower = reader.number(limit, "lower", 0.0)
     upper = reader.number(limit, "upper", 0.0)
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
-    if kind == "continuous":
+    if kind == "continuous" or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)
     if lower is not None and upper is not None and lower > upper:
         message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"

@@ -39,8 +39,8 @@ CHECK = Check(
     severity="warning",
     summary="The soft limits of a safety_controller lie outside of the limits, or cross",
     reason=(
-        "Soft limits are there to slow a joint before its end; outside of the limits they never act. manipcli "
-        "ignores them."
+        "Soft limits are there to slow a joint before its end; outside of the limits they never act, and the joint "
+        "meets its hard limit at full speed."
     ),
     bad=one_joint(LIMIT + '<safety_controller soft_lower_limit="-2" soft_upper_limit="0.9" k_velocity="1"/>'),
     find=_find,
