@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from manipcli.control.command import may_go_together
-from manipcli.control.controller import Controller
 from manipcli.core.errors import Finding
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, listed
 from manipcli.spec.controllers import Interface
+
+
+class Claimant(Protocol):
+    """A controller, as far as claims go."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def joints(self) -> tuple[str, ...]: ...
+    @property
+    def interfaces(self) -> tuple[Interface, ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +30,7 @@ class Claims:
     owners: dict[tuple[str, Interface], str]
 
     @staticmethod
-    def of(controllers: Sequence[Controller]) -> Claims:
+    def of(controllers: Sequence[Claimant]) -> Claims:
         """Of these controllers; where two claim the same, the first has it."""
         owners: dict[tuple[str, Interface], str] = {}
         for controller in controllers:
@@ -34,7 +45,7 @@ class Claims:
 
 
 def conflicts(
-    controllers: Sequence[Controller], joints: Sequence[str], following: Sequence[str] = ()
+    controllers: Sequence[Claimant], joints: Collection[str], following: Collection[str] = ()
 ) -> tuple[Finding, ...]:
     """Everything for which these controllers cannot be active at once.
 
@@ -49,31 +60,37 @@ def conflicts(
         if names.count(name) > 1:
             findings.append(Finding("CTRL141", f"two controllers are named '{name}'"))
     claims = Claims.of(controllers)
+    twice: dict[tuple[str, str], list[str]] = {}
+    excluded: dict[tuple[tuple[Interface, str], ...], dict[str, None]] = {}
     for controller in controllers:
         for joint in controller.joints:
-            findings += _conflicts_of(controller, joint, claims, joints, following)
+            unfit = _unfit(controller, joint, joints, following)
+            if unfit is not None:
+                findings.append(unfit)
+                continue
+            for interface in controller.interfaces:
+                owner = claims.owners[joint, interface]
+                if owner != controller.name:
+                    twice.setdefault((owner, controller.name), []).append(f"{joint}/{interface}")
+            together = claims.interfaces(joint)
+            if not may_go_together(together):
+                excluded.setdefault(tuple((i, claims.owners[joint, i]) for i in together), {})[joint] = None
+    for (owner, name), what in twice.items():
+        findings.append(Finding("CTRL142", f"controllers '{owner}' and '{name}' both claim {listed(what, most=3)}"))
+    for claimed, (first, *others) in excluded.items():
+        all_of = ", ".join(f"{first}/{interface} ({owner})" for interface, owner in claimed)
+        more = f"; the same of {listed(others, most=3)}" if others else ""
+        findings.append(Finding("CTRL148", f"a joint cannot be commanded on all of these at once: {all_of}{more}"))
     return tuple(findings)
 
 
-def _conflicts_of(
-    controller: Controller, joint: str, claims: Claims, joints: Sequence[str], following: Sequence[str]
-) -> list[Finding]:
+def _unfit(controller: Claimant, joint: str, joints: Collection[str], following: Collection[str]) -> Finding | None:
+    """Why a controller could have a joint under no circumstances."""
     name = controller.name
     if joint not in joints:
         message = f"controller '{name}' wants joint '{joint}', but the robot has no such moving joint"
-        return [Finding("CTRL144", message, hint=did_you_mean(joint, joints, kind="joints"))]
+        return Finding("CTRL144", message, hint=did_you_mean(joint, joints, kind="joints"))
     if joint in following and controller.interfaces:
         what = f"{joint}/{controller.interfaces[0]}"
-        return [Finding("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' follows another joint")]
-    others = [
-        (interface, owner) for interface in controller.interfaces if (owner := claims.owners[joint, interface]) != name
-    ]
-    if others:
-        interface, owner = others[0]
-        message = f"controllers '{owner}' and '{name}' both claim {joint}/{interface}"
-        return [Finding("CTRL142", message)]
-    together = claims.interfaces(joint)
-    if controller.interfaces and not may_go_together(together):
-        listed = ", ".join(f"{joint}/{i} ({claims.owners[joint, i]})" for i in together)
-        return [Finding("CTRL148", f"a joint cannot be commanded on all of these at once: {listed}")]
-    return []
+        return Finding("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' follows another joint")
+    return None

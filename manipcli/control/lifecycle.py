@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from manipcli.control.controller import Controller
+from manipcli.control.claims import Claimant, conflicts
 from manipcli.core.text import did_you_mean
+from manipcli.plan.step import Strictness, Switch
 
 ControllerState = Literal["unconfigured", "inactive", "active"]
-Strictness = Literal["strict", "best_effort"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,42 @@ class ControllerInfo:
     claimed: tuple[str, ...]
 
     @staticmethod
-    def of(controller: Controller, state: ControllerState) -> ControllerInfo:
+    def of(controller: Claimant, state: ControllerState) -> ControllerInfo:
         """Of a controller in this state."""
         wants = tuple(f"{joint}/{interface}" for joint in controller.joints for interface in controller.interfaces)
         return ControllerInfo(controller.name, state, wants, wants if state == "active" else ())
+
+
+def decided(
+    controllers: Mapping[str, tuple[Claimant, ControllerState]],
+    switch: Switch,
+    joints: Collection[str],
+    following: Collection[str] = (),
+) -> SwitchResult:
+    """What comes of a request.
+
+    Args:
+        controllers: all that are loaded, by name, and their states.
+        switch: the request.
+        joints: all moving joints of the robot.
+        following: those that follow others.
+    """
+    active = [one for one, state in controllers.values() if state == "active"]
+    activate, deactivate = switch.activate, switch.deactivate
+    if switch.to:
+        taken = {joint for name in switch.to if name in controllers for joint in _commanded(controllers[name][0])}
+        others = [one for one in active if one.name not in switch.to]
+        deactivate = tuple(one.name for one in others if taken & _commanded(one))
+        activate = tuple(name for name in switch.to if name not in [one.name for one in active])
+    states = {name: state for name, (_, state) in controllers.items()}
+    request = requested(states, activate, deactivate, switch.strictness)
+    if not request.ok:
+        return request
+    kept = [one for one in active if one.name not in request.deactivated]
+    clashes = conflicts([*kept, *(controllers[name][0] for name in request.activated)], joints, following)
+    if clashes:
+        return SwitchResult(False, (*request.messages, *(finding.message for finding in clashes)))
+    return request
 
 
 def requested(
@@ -62,6 +94,10 @@ def requested(
     if told and (strictness == "strict" or lost):
         return SwitchResult(False, tuple(told))
     return SwitchResult(True, tuple(told), on, off)
+
+
+def _commanded(controller: Claimant) -> set[str]:
+    return set(controller.joints if controller.interfaces else ())
 
 
 def _why_not(states: Mapping[str, ControllerState], name: str) -> str:

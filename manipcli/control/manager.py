@@ -25,10 +25,11 @@ from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
 from manipcli.control.controller import Controller, ControllerOutput, JointState
 from manipcli.control.feed_forward import FeedForwardLaw, NoDynamics
-from manipcli.control.lifecycle import ControllerInfo, ControllerState, Strictness, SwitchResult, requested
+from manipcli.control.lifecycle import ControllerInfo, ControllerState, SwitchResult, decided
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.plan.step import Strictness, Switch
 from manipcli.spec.controllers import Interface
 
 Index = slice | npt.NDArray[np.intp]
@@ -230,34 +231,30 @@ class ControllerManager:
             strictness: see above.
             time: simulated time [s], for the results of goals that end.
         """
-        states = {name: slot.state for name, slot in self._slots.items()}
-        request = requested(states, activate, deactivate, strictness)
-        if not request.ok:
-            return request
-        kept = [s.controller for s in self._active if s.controller.name not in request.deactivated]
-        wanted = [self._slots[name].controller for name in request.activated]
-        clashes = conflicts([*kept, *wanted], self.joints, self.following)
-        if clashes:
-            return SwitchResult(False, (*request.messages, *(finding.message for finding in clashes)))
-        for name in request.deactivated:
-            self._slots[name].controller.deactivate(time)
-            self._slots[name].state = "inactive"
-        for name in request.activated:
-            self._slots[name].state = "active"
-            self._slots[name].first = self._tick
-        self._rearrange()
-        return request
+        lists = Switch(activate=tuple(activate), deactivate=tuple(deactivate), strictness=strictness)
+        return self.carry_out(lists, time=time)
 
     def switch_to(
         self, names: Collection[str], *, strictness: Strictness = "strict", time: float = 0.0
     ) -> SwitchResult:
-        """Has all of `names` active; whoever claims what they need is deactivated. Those that are active stay as they
-        are. See `switch`."""
-        wanted = [self._slots[name].controller for name in dict.fromkeys(names) if name in self._slots]
-        active = [slot.controller for slot in self._active]
-        in_the_way = [c.name for c in active if c.name not in names and conflicts([*wanted, c], self.joints)]
-        missing = [name for name in names if name not in [c.name for c in active]]
-        return self.switch(missing, in_the_way, strictness=strictness, time=time)
+        """Has all of `names` active, and nobody else on their joints. Those that are active stay as they are. See
+        `switch`."""
+        return self.carry_out(Switch(to=tuple(names), strictness=strictness), time=time)
+
+    def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:
+        """A switch as a step asks for it; see `switch` and `switch_to`."""
+        controllers = {name: (slot.controller, slot.state) for name, slot in self._slots.items()}
+        decision = decided(controllers, switch, self.joints, self.following)
+        if not decision.ok:
+            return decision
+        for name in decision.deactivated:
+            self._slots[name].controller.deactivate(time)
+            self._slots[name].state = "inactive"
+        for name in decision.activated:
+            self._slots[name].state = "active"
+            self._slots[name].first = self._tick
+        self._rearrange()
+        return decision
 
     def list(self) -> tuple[ControllerInfo, ...]:
         """All that are loaded, and what they claim."""

@@ -14,6 +14,7 @@ import numpy as np
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
+from manipcli.flow.switches import foreseen
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
@@ -213,13 +214,19 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     controller could carry out, where it is known who `claims` what."""
     found: list[tuple[Loc, Problem]] = []
     uncommanded: list[tuple[Loc, Problem]] = []
+    refused: list[tuple[Loc, Problem]] = []
     spec = task.spec
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, scene)
         found += [(at, p) for p in unknown]
         if claims is not None and not unknown:
-            uncommanded += [(at, p) for p in member.uncommanded(step.body, robot, claims)]
+            without = member.uncommanded(step.body, robot, claims)
+            uncommanded += [(at, p) for p in without]
+            switch = member.request(step.body)
+            if switch is not None and not without:
+                problems, claims = foreseen(switch, claims, robot)
+                refused += [(at, p) for p in problems]
         if step.until is not None:
             condition = CONDITIONS[step.until.name]
             found += [
@@ -231,7 +238,7 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
         found += [(("expect", k, expected.name), p) for p in problems]
     findings = [
         task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
-        for number, problems in ((230, found), (232, uncommanded))
+        for number, problems in ((230, found), (232, uncommanded), (233, refused))
         for loc, p in problems
     ]
     known = [pose.name for pose in robot.poses]

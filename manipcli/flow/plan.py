@@ -165,4 +165,8 @@ def _described(motion: Motion) -> dict[str, object]:
     if motion.grip is not None:
         described["hand"] = motion.grip.target.tolist()
         described["force"] = motion.grip.force
+    if motion.switch is not None:
+        described["switch"] = {
+            key: list(names) for key in ("to", "activate", "deactivate") if (names := getattr(motion.switch, key))
+        }
     return described

@@ -1,16 +1,18 @@
 """Which controller commands which joints, and what of a step no controller could carry out.
 
-A trajectory goes to one controller, and so does a goal of the hand: neither can be split. This is known from the files
-alone, so it is told before anything is planned.
+A trajectory goes to one active controller, and so does a goal of the hand: neither can be split. This is known from the
+files alone, step by step, so it is told before anything is planned.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
 Loc = tuple[str | int, ...]
@@ -18,32 +20,62 @@ Loc = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The joints that one controller commands."""
+    """One controller: what steps may ask of it, what it commands of its joints while active, and whether it is."""
 
-    controller: str
+    name: str
+    role: Role
     joints: tuple[str, ...]
+    interfaces: tuple[Interface, ...]
+    active: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """All controllers of a robot: those that follow trajectories, and those that open and close a hand."""
+    """All controllers of a robot, at some moment of a task."""
 
-    followers: tuple[Claim, ...]
-    grippers: tuple[Claim, ...]
+    controllers: tuple[Claim, ...]
 
     @classmethod
     def of(cls, spec: ControllersSpec) -> Claims:
-        """Those of a controllers file."""
-        named = spec.controllers.items()
+        """Those of a controllers file, at the start."""
         return cls(
-            followers=tuple(Claim(name, one.joints) for name, one in named if one.role == "follower"),
-            grippers=tuple(Claim(name, one.joints) for name, one in named if one.role == "hand"),
+            tuple(
+                Claim(name, one.role, one.joints, one.interfaces, one.active) for name, one in spec.controllers.items()
+            )
+        )
+
+    def switched(self, activated: Sequence[str], deactivated: Sequence[str]) -> Claims:
+        """The same after a switch; a name of both is active."""
+        return Claims(
+            tuple(
+                replace(one, active=one.name in activated or (one.active and one.name not in deactivated))
+                for one in self.controllers
+            )
         )
 
     @property
+    def followers(self) -> tuple[Claim, ...]:
+        """Those that follow trajectories now."""
+        return tuple(one for one in self.controllers if one.active and one.role == "follower")
+
+    @property
+    def grippers(self) -> tuple[Claim, ...]:
+        """Those that open and close a hand now."""
+        return tuple(one for one in self.controllers if one.active and one.role == "hand")
+
+    @property
     def hand(self) -> tuple[str, ...]:
-        """The joints that a gripper controller moves."""
-        return tuple(name for claim in self.grippers for name in claim.joints)
+        """The joints that are a hand's: those of all gripper controllers, active or not."""
+        return tuple(dict.fromkeys(name for one in self.controllers if one.role == "hand" for name in one.joints))
+
+
+def unknown_controller(claims: Claims, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if there is a controller of this name."""
+    known = [one.name for one in claims.controllers]
+    if name in known:
+        return ()
+    message = f"there is no controller '{name}' in the controllers file"
+    return (Problem(loc, message, did_you_mean(name, known, kind="controllers")),)
 
 
 def arm_joints(robot: RobotModel, hand: Sequence[str]) -> tuple[str, ...]:
@@ -61,14 +93,17 @@ def arm_joints(robot: RobotModel, hand: Sequence[str]) -> tuple[str, ...]:
 
 def unfollowed(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem, ...]:
     """Empty if one controller follows trajectories of all these joints."""
-    gripped = [name for name in joints if name in claims.hand]
+    followed = {name for claim in claims.followers for name in claim.joints}
+    gripped = [
+        name for name in joints if name not in followed and any(name in claim.joints for claim in claims.grippers)
+    ]
     if gripped:
         message = f"joint '{gripped[0]}' is moved by a gripper controller, which follows no trajectory"
         return (Problem(loc, message, "`move`, `grasp` or `release` move the hand"),)
     owners = [claim for claim in claims.followers if set(joints) & set(claim.joints)]
     if len(owners) < 2:
-        return ()
-    shares = " and ".join(f"'{_first(joints, claim)}' ({claim.controller})" for claim in owners)
+        return tuple(_sleeping(claims, "follower", name, loc) for name in joints if name not in followed)[:1]
+    shares = " and ".join(f"'{_first(joints, claim)}' ({claim.name})" for claim in owners)
     return (
         Problem(
             loc,
@@ -81,7 +116,7 @@ def unfollowed(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem
 def unmoved_joints(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem, ...]:
     """Empty if one controller follows trajectories of these joints, and one moves those of them that are the hand's."""
     arm = [name for name in joints if name not in claims.hand]
-    return unfollowed(claims, arm, loc) + (_two_hands(claims, loc) if len(arm) < len(joints) else ())
+    return unfollowed(claims, arm, loc) + (_not_one_hand(claims, loc) if len(arm) < len(joints) else ())
 
 
 def unmoved_tool(claims: Claims, robot: RobotModel, loc: Loc) -> tuple[Problem, ...]:
@@ -101,15 +136,27 @@ def unmoved_hand(claims: Claims, robot: RobotModel, posture: str, loc: Loc) -> t
     if not set(robot.pose(posture).joints) & set(claims.hand):
         hint = "add a controller of type `gripper` for the hand's joints to the controllers file"
         return (Problem(loc, f"pose '{posture}' has no joint that a gripper controller moves", hint),)
-    return _two_hands(claims, loc)
+    return _not_one_hand(claims, loc)
 
 
-def _two_hands(claims: Claims, loc: Loc) -> tuple[Problem, ...]:
+def _not_one_hand(claims: Claims, loc: Loc) -> tuple[Problem, ...]:
     if len(claims.grippers) < 2:
-        return ()
-    names = ", ".join(f"'{claim.controller}'" for claim in claims.grippers)
+        moved = [name for claim in claims.grippers for name in claim.joints]
+        return tuple(_sleeping(claims, "hand", name, loc) for name in claims.hand if name not in moved)[:1]
+    names = ", ".join(f"'{claim.name}'" for claim in claims.grippers)
     message = f"a step moves one hand, and {len(claims.grippers)} gripper controllers move joints of hands: {names}"
     return (Problem(loc, message, "give one gripper controller; one of type `joint_trajectory` moves other fingers"),)
+
+
+def _sleeping(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
+    """Nobody who is active does what a step asks of a joint."""
+    what = "follows trajectories of" if role == "follower" else "opens and closes a hand with"
+    able = [one.name for one in claims.controllers if one.role == role and joint in one.joints]
+    if able:
+        message = f"controller '{able[0]}', which {what} joint '{joint}', is not active here"
+        return Problem(loc, message, f"add a step before it: `switch_controllers: {able[0]}`")
+    hint = "add the joint to a controller of type `joint_trajectory` in the controllers file"
+    return Problem(loc, f"no controller {what} joint '{joint}'", hint)
 
 
 def _first(joints: Sequence[str], claim: Claim) -> str:

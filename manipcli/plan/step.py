@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from manipcli.plan.planner import Planner
 
 S = TypeVar("S", bound=Model)
+
+Strictness = Literal["strict", "best_effort"]
+"""Of a switch of controllers: all of it or nothing, or what of it can be done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +62,16 @@ class Grip:
     must_hold: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """Controllers that take over between two ticks: those of `to`, in whose way nobody stays, or those of the lists."""
+
+    to: tuple[str, ...] = ()
+    activate: tuple[str, ...] = ()
+    deactivate: tuple[str, ...] = ()
+    strictness: Strictness = "strict"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """What is commanded at once, and when it is done: all its goals reached and `duration` [s] over.
@@ -69,6 +82,7 @@ class Motion:
         grip: of the hand, or None where it holds.
         duration: planned [s].
         awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
+        switch: of controllers, before anything else; None where they stay.
     """
 
     label: str
@@ -76,6 +90,7 @@ class Motion:
     grip: Grip | None
     duration: float
     awaits: bool = False
+    switch: Switch | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +106,10 @@ class StepPlan:
         return sum(motion.duration for motion in self.motions)
 
 
+def _switches_nothing(_: object) -> None:
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class StepMember(Generic[S]):
     """A member of the seam: the verb in YAML.
@@ -102,6 +121,8 @@ class StepMember(Generic[S]):
         check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know.
         uncommanded: (spec, robot, claims) -> everything in it that these controllers cannot carry out; only to be
             asked when `check` finds nothing.
+        request: (spec) -> the switch of controllers that it asks for, so that the steps after it are checked against
+            who is active then.
     """
 
     name: str
@@ -109,3 +130,4 @@ class StepMember(Generic[S]):
     plan: Callable[[S, Planner, Situation], StepPlan]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
+    request: Callable[[S], Switch | None] = _switches_nothing

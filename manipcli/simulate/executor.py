@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 
 from manipcli.control.action import GoalHandle, GripperGoal
+from manipcli.control.lifecycle import SwitchResult
 from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
@@ -59,6 +60,12 @@ class Executor:
         """
         session = self._session
         given_up = session.time + motion.duration + PATIENCE
+        told = ""
+        if motion.switch is not None:
+            switched = session.manager.carry_out(motion.switch, time=session.time)
+            told = _told(switched)
+            if not switched.ok:
+                return MotionEnd("failed", told)
         handles = self._send(motion)
         last_tick = session.ticks + round(motion.duration / session.period)
         awaited = until if motion.awaits else None
@@ -67,11 +74,13 @@ class Executor:
             for handle in handles:
                 if handle.result is not None and handle.result.status != "succeeded":
                     return MotionEnd("failed", handle.result.text)
+            if session.manager.faults:
+                return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
             if not busy and awaited is not None and session.ticks % UNTIL_TICKS == 0 and awaited(state):
                 awaited = None
             if not busy and awaited is None:
-                return _held(motion, handles, self._touch)
+                return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
                 why = _late(handles)
                 self._cancel(handles)
@@ -85,6 +94,8 @@ class Executor:
         """Hold still until the condition holds."""
         while self._session.time < deadline:
             state = self._session.tick()
+            if self._session.manager.faults:
+                return _fault(self._session)
             if self._session.ticks % UNTIL_TICKS == 0 and until(state):
                 return DONE
         return MotionEnd("timeout", "the condition under `until` did not come to hold")
@@ -133,6 +144,18 @@ class Executor:
     def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
         for handle in handles:
             handle.cancel()
+
+
+def _fault(session: Session) -> MotionEnd:
+    """A controller failed, if only one that nobody waits for: the robot is no longer what the task was planned for."""
+    return MotionEnd("failed", session.manager.faults[-1].message)
+
+
+def _told(switched: SwitchResult) -> str:
+    """What came of a switch."""
+    parts = [f"activated {', '.join(switched.activated)}"] if switched.activated else []
+    parts += [f"deactivated {', '.join(switched.deactivated)}"] if switched.deactivated else []
+    return "; ".join((*parts, *switched.messages)) or "nothing to switch"
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:

@@ -125,6 +125,9 @@ def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
             longest[key] = last + 1
         else:
             result.append(complaint)
+    # An item that is wrong is not counted, which needs no second telling.
+    wrong = {complaint.path[:depth] for complaint in result for depth in range(len(complaint.path))}
+    result = [one for one in result if one.error["type"] != "too_short" or one.path not in wrong]
     for index, complaint in enumerate(result):
         wanted = longest.get((complaint.path, complaint.tags))
         if wanted is not None and complaint.error["type"] == "missing":

@@ -39,6 +39,7 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "grasp": (("grasp", {"posture": "wrap"}), ()),
     "release": (("release", {}), (("grasp", {"posture": "wrap"}),)),
     "wait": (("wait", "1 s"), ()),
+    "switch controllers": (("switch_controllers", "hand_controller"), ()),
     "pick": (PICK, ()),
     "lift": (LIFT, (PICK,)),
     "pour": (("pour", {"object": "cup", "into": "tray"}), (PICK, LIFT)),

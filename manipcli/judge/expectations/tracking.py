@@ -25,21 +25,30 @@ class TrackingSpec(Model):
 
 
 def evaluate(spec: TrackingSpec, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
-    """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of joints and run."""
+    """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of joints and run.
+
+    Only while a controller of a joint is active does the joint have a reference.
+    """
     robot = evidence.world.robot
     found: Measured | None = None
     for name in robot.group(spec.group).joints:
         unit = "m" if robot.joint(name).type == "prismatic" else "rad"
-        trace = next((trace for trace in span.controllers if name in trace.joints), None)
-        if trace is None:
+        traces = [trace for trace in span.controllers if name in trace.joints]
+        if not traces:
             return NotEvaluated(f"the recording holds no reference of joint '{name}'", unit)
-        k = trace.joints.index(name)
-        margins = spec.within - np.abs(trace.reference_position[:, k] - trace.position[:, k])
-        joint = worst(margins, trace.times, unit, f"joint '{name}'")
-        if isinstance(joint, NotEvaluated):
-            return joint
-        if found is None or joint.margin < found.margin:
-            found = joint
+        for trace in traces:
+            k = trace.joints.index(name)
+            active = ~np.isnan(trace.reference_position[:, k])
+            if not active.any():
+                continue
+            margins = spec.within - np.abs(trace.reference_position[active, k] - trace.position[active, k])
+            joint = worst(margins, trace.times[active], unit, f"joint '{name}'")
+            if isinstance(joint, NotEvaluated):
+                return joint
+            if found is None or joint.margin < found.margin:
+                found = joint
+    if found is None and robot.group(spec.group).joints:
+        return Measured(spec.within, unit, float(span.states.time[0]), "no controller of it was active")
     return found or NotEvaluated(f"group '{spec.group}' has no joints")
 
 

@@ -1,0 +1,28 @@
+"""Switches of controllers, foreseen by the rules by which the manager carries them out."""
+
+from __future__ import annotations
+
+from manipcli.control.lifecycle import ControllerState, decided
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.plan.claims import Claim, Claims
+from manipcli.plan.step import Switch
+
+
+def foreseen(switch: Switch, claims: Claims, robot: RobotModel) -> tuple[tuple[Problem, ...], Claims]:
+    """Why a switch would be refused, and who is active after it; after one that is refused, whoever was.
+
+    Args:
+        switch: what a step asks for.
+        claims: the controllers, before it.
+        robot: the robot.
+    """
+    controllers: dict[str, tuple[Claim, ControllerState]] = {
+        one.name: (one, "active" if one.active else "inactive") for one in claims.controllers
+    }
+    following = [joint.name for joint in robot.moving_joints if joint.mimic is not None]
+    decision = decided(controllers, switch, robot.joint_names, following)
+    if decision.ok:
+        return (), claims.switched(decision.activated, decision.deactivated)
+    hint = "say `to` for those that shall be active: it deactivates who is in their way" if not switch.to else None
+    return tuple(Problem((), message, hint) for message in decision.messages), claims

@@ -1,0 +1,89 @@
+"""`switch_controllers`: other controllers take over, between two control ticks; nothing moves.
+
+    - switch_controllers: soft_arm                     # it is active then, and nobody else on its joints
+    - switch_controllers: {to: [soft_arm, hand]}
+    - switch_controllers: {activate: [soft_arm], deactivate: [arm]}
+    - switch_controllers: {deactivate: [hand], strictness: best_effort}
+
+What is activated holds what it measures. Joints that nobody commands any more are braked. With `strict` a switch is
+done as a whole or refused; with `best_effort` names that cannot be switched are left out.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field, model_validator
+
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.claims import Claims, unknown_controller
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Motion, Situation, StepMember, StepPlan, Strictness, Switch
+from manipcli.spec.base import Model
+
+
+class SwitchControllersSpec(Model):
+    """Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them."""
+
+    to: tuple[str, ...] = Field((), description="These are active afterwards, and nobody else on their joints.")
+    activate: tuple[str, ...] = Field((), description="Controllers to activate.")
+    deactivate: tuple[str, ...] = Field((), description="Controllers to deactivate.")
+    strictness: Strictness = Field(
+        "strict", description="`strict`: all of it or nothing. `best_effort`: what can be switched. Default `strict`."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _short(cls, value: Any) -> Any:
+        """`switch_controllers: arm` and `{to: arm}` are short for `{to: [arm]}`."""
+        if isinstance(value, str | list):
+            value = {"to": value}
+        if isinstance(value, dict) and isinstance(value.get("to"), str):
+            value = value | {"to": [value["to"]]}
+        return value
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SwitchControllersSpec:
+        lists = bool(self.activate or self.deactivate)
+        if bool(self.to) == lists:
+            raise ValueError("say either `to`, or `activate` and `deactivate`")
+        return self
+
+
+def request(spec: SwitchControllersSpec) -> Switch:
+    """What is to be switched."""
+    return Switch(to=spec.to, activate=spec.activate, deactivate=spec.deactivate, strictness=spec.strictness)
+
+
+def plan(spec: SwitchControllersSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """One motion that takes no time."""
+    motion = Motion("switch", trajectory=None, grip=None, duration=0.0, switch=request(spec))
+    return StepPlan((motion,), situation)
+
+
+def check(spec: SwitchControllersSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+    """The robot and the scene know no controllers."""
+    return ()
+
+
+def uncommanded(spec: SwitchControllersSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
+    """Names that are not in the controllers file; whether the rest can be switched is asked with `request`."""
+    lists = (("to", spec.to), ("activate", spec.activate), ("deactivate", spec.deactivate))
+    return tuple(
+        problem
+        for key, names in lists
+        for k, name in enumerate(names)
+        for problem in unknown_controller(claims, name, (key, k))
+    )
+
+
+MEMBER = StepMember(
+    name="switch_controllers",
+    spec=SwitchControllersSpec,
+    plan=plan,
+    check=check,
+    uncommanded=uncommanded,
+    request=request,
+)
