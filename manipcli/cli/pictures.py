@@ -86,7 +86,7 @@ class Pictures:
         """
         if not self.wanted:
             return
-        from manipcli.core.whole_file import write_whole
+        from manipcli.core.whole_file import whole_file
         from manipcli.replay import sheet as sheets
         from manipcli.replay.camera import direction
         from manipcli.replay.image import png_bytes
@@ -97,12 +97,16 @@ class Pictures:
         size = parse_size(self._size) if self._size is not None else None
         if self._picture is not None:
             when = moment(playback, self._at or "end")
-            with Shots(playback, size=size or SIZE, towards=towards) as shots:
+            with (
+                whole_file(self._picture) as partial,
+                Shots(playback, size=size or SIZE, towards=towards) as shots,
+            ):
                 _tell_missing(shots)
-                write_whole(self._picture, png_bytes(shots.at(when)))
+                partial.write_bytes(png_bytes(shots.at(when)))
             console.result(str(self._picture))
         if self._sheet is not None:
-            write_whole(self._sheet, png_bytes(sheets.sheet(playback, size=size or sheets.TILE, towards=towards)))
+            with whole_file(self._sheet) as partial:
+                partial.write_bytes(png_bytes(sheets.sheet(playback, size=size or sheets.TILE, towards=towards)))
             console.result(str(self._sheet))
         if self._video is not None:
             self._film(self._video, playback, size, towards)

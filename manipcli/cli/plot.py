@@ -69,10 +69,11 @@ def plot(
     for note in chart.notes:
         console.talk(f"note: {note}")
     if output is not None and kind is not None:
-        from manipcli.core.whole_file import write_whole
+        from manipcli.core.whole_file import whole_file
         from manipcli.replay.figure import render
 
-        write_whole(output, render(chart, kind))
+        with whole_file(output) as partial:
+            partial.write_bytes(render(chart, kind))
         console.talk(f"drawn: {output}")
     if csv is not None:
         _write_table(chart, csv)

@@ -51,10 +51,14 @@ class Leaf:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The wanted numbers of a message; `guards`: offsets of all bytes that decided where they are."""
+    """The wanted numbers of a message.
+
+    `guards`: offsets of all bytes that decided where they are; `steps`: values that were passed to find them.
+    """
 
     leaves: tuple[Leaf, ...]
     guards: tuple[int, ...]
+    steps: int = 0
 
 
 @dataclass(slots=True)
@@ -80,7 +84,7 @@ def layout(message: Message, way: tuple[Part, ...], data: bytes | memoryview) ->
     leaves = tuple(
         Leaf(" ".join(one.names), one.offset, one.code, one.time) for one in found if _resolved(one, named=())
     )
-    return Layout(leaves, tuple(walk.guards))
+    return Layout(leaves, tuple(walk.guards), walk.steps)
 
 
 def _resolved(one: _Found, *, named: tuple[str, ...]) -> bool:
@@ -102,7 +106,7 @@ class _Walk:
     def __init__(self, data: bytes | memoryview) -> None:
         self._reader = CdrReader(data)
         self._data = memoryview(data)
-        self._steps = 0
+        self.steps = 0
         self.guards: list[int] = []
 
     def message(self, message: Message, way: tuple[Part, ...]) -> list[_Found]:
@@ -239,8 +243,8 @@ class _Walk:
         self.guards.extend(range(start, end))
 
     def _count(self, steps: int) -> None:
-        self._steps += steps
-        if self._steps > MAX_STEPS:
+        self.steps += steps
+        if self.steps > MAX_STEPS:
             raise CdrError("has too many parts to be looked through")
 
 

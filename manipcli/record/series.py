@@ -22,8 +22,10 @@ from manipcli.record.layout import MAX_LEAVES, Layout, layout
 from manipcli.record.schemas import CONTACTS
 from manipcli.record.topics import Topics
 
-MAX_VALUES = 100_000_000
-"""Of all series together: 800 MB."""
+MAX_VALUES = 50_000_000
+"""Of all series together: 800 MB with their times."""
+MAX_WALKED = 50_000_000
+"""Values that are passed one by one in messages of which each has a layout of its own; about a minute."""
 REMEMBERED = 16
 """Layouts of one topic that are tried before a message is walked."""
 
@@ -103,6 +105,7 @@ class _Gathered:
         self._layouts: deque[tuple[int, Layout, Int, bytes]] = deque(maxlen=REMEMBERED)
         self._parts: dict[str, list[tuple[Array, Array]]] = {}
         self._seen: list[Array] = []
+        self._walked = 0
 
     @property
     def type(self) -> str:
@@ -116,10 +119,11 @@ class _Gathered:
             self._seen.append(seconds)
         while len(rest):
             found, alike = self._alike(data, places, rest)
+            times = seconds[alike]
             for leaf, values in _values(data, places.starts[alike], found):
                 if leaf not in self._parts and len(self._parts) >= MAX_LEAVES:
                     raise CdrError(f"has more than {MAX_LEAVES} numbers there; say which ones in brackets")
-                self._parts.setdefault(leaf, []).append((seconds[alike], values))
+                self._parts.setdefault(leaf, []).append((times, values))
                 added += len(values)
             rest = np.setdiff1d(rest, alike, assume_unique=True)
         return added
@@ -134,6 +138,9 @@ class _Gathered:
         found = next(fitting, None)
         if found is None:
             made = layout(self._message, self._way.parts, message)
+            self._walked += made.steps
+            if self._walked > MAX_WALKED:
+                raise CdrError("has other parts each time, and there are too many of them")
             at = np.array(made.guards, dtype=np.int64)
             found = (length, made, at, bytes(own[at]))
             self._layouts.appendleft(found)

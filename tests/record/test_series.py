@@ -12,9 +12,11 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from manipcli.record.cdr import CdrError
 from manipcli.record.definition import read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import UnknownField, parse_field, ways
+from manipcli.record.fields import FieldName, UnknownField, parse_field, ways
+from manipcli.record.layout import layout
 from manipcli.record.series import Series, Wanted, read_series
 from manipcli.record.topics import open_topics
 from manipcli.record.units import unit_of
@@ -219,6 +221,45 @@ def test_a_message_of_millions_of_parts_is_not_walked_to_its_end(tmp_path: Path)
         writer.finish()
     with pytest.raises(BadRecording, match=r"too many parts|declares"):
         series(path, "many.x")
+
+
+def test_messages_that_differ_each_time_are_walked_only_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("manipcli.record.series.MAX_WALKED", 200)
+    messages = [
+        (k, "/joint_states", "sensor_msgs/msg/JointState", joint_state(k, [f"j{k:03}"], [1.0])) for k in range(100)
+    ]
+    with pytest.raises(BadRecording, match="other parts each time"):
+        series(write(tmp_path / "log.mcap", messages), "joint_states.position")
+
+
+def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
+    rng = np.random.default_rng(8)
+    topics = open_topics(log)
+    kept: dict[str, bytes] = {}
+    for name, data, places in topics.messages(set(topics.all)):
+        start = int(places.starts[0])
+        kept.setdefault(name, data[start : start + int(places.lengths[0])])
+    read = refused = 0
+    for name, good in kept.items():
+        message = read_definition(topics.all[name].type, topics.all[name].definition)
+        try:
+            found = ways(message, FieldName(name, name, None, ()))
+        except UnknownField:
+            continue
+        for _ in range(40):
+            bad = bytearray(good)
+            for k in rng.integers(4, len(bad), 3):
+                new = (b"\xff\xff\xff\x7f", bytes(4), rng.bytes(1), b"")[int(rng.integers(4))]
+                bad[k : k + len(new)] = new
+                del bad[k : k + (len(new) == 0)]
+            try:
+                result = layout(message, found[int(rng.integers(len(found)))].parts, bytes(bad))
+            except CdrError:
+                refused += 1
+                continue
+            assert all(leaf.offset + int(leaf.code[-1]) <= len(bad) for leaf in result.leaves)
+            read += 1
+    assert read > 50 and refused > 50
 
 
 @pytest.mark.parametrize(
