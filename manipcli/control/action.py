@@ -7,10 +7,13 @@ owns the stepping, and the Python API, hold the same handles.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Literal
 
+import numpy as np
+
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 
 GoalStatus = Literal["active", "succeeded", "aborted", "canceled"]
@@ -29,6 +32,16 @@ class ErrorCode(IntEnum):
     GOAL_TOLERANCE_VIOLATED = -5
 
 
+class GoalRejected(InvalidArgument):
+    """A goal that no controller will carry out; `error_code` says in ROS's numbers what is wrong with it."""
+
+    def __init__(
+        self, code: str, message: str, *, hint: str | None = None, error_code: ErrorCode = ErrorCode.INVALID_GOAL
+    ) -> None:
+        super().__init__(code, message, hint=hint)
+        self.error_code = error_code
+
+
 @dataclass(frozen=True, slots=True)
 class GoalResult:
     """How a goal ended: code, a text that names joint, value, limit and time, and the `time` [s].
@@ -45,11 +58,22 @@ class GoalResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feedback:
-    """A goal on its way: `elapsed` [s] since it began, and (n) copies of what is wanted and what is; rad or m."""
+    """A goal on its way.
+
+    Attributes:
+        elapsed: [s] of the goal's own clock since it began; negative before its start time.
+        desired, actual: (n) copies of what is wanted and what is; rad or m. Of a continuous joint, `actual` is told in
+            the turn of `desired`.
+        index: the point of the goal that comes next, or its last.
+        desired_velocity, actual_velocity: (n), per second; empty where a controller does not tell.
+    """
 
     elapsed: float
     desired: Array
     actual: Array
+    index: int = 0
+    desired_velocity: Array = field(default_factory=lambda: np.zeros(0))
+    actual_velocity: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def error(self) -> Array:
@@ -62,12 +86,20 @@ class GoalHandle:
 
     Attributes:
         result: None while the goal is active, then how it ended.
+        notes: what of the goal was not taken as it was said, and why.
     """
 
-    __slots__ = ("_cancel", "_feedback", "result")
+    __slots__ = ("_cancel", "_feedback", "notes", "result")
 
-    def __init__(self, *, cancel: Callable[[GoalHandle], None], feedback: Callable[[], Feedback]) -> None:
+    def __init__(
+        self,
+        *,
+        cancel: Callable[[GoalHandle], None],
+        feedback: Callable[[], Feedback],
+        notes: tuple[str, ...] = (),
+    ) -> None:
         self.result: GoalResult | None = None
+        self.notes = notes
         self._cancel = cancel
         self._feedback = feedback
 

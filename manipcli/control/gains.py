@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-import numpy as np
-
-from manipcli.control.pid import Compat, Pid
+from manipcli.control.pid import AntiWindup, Compat, Pid
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
@@ -26,28 +24,38 @@ def joint_gains(name: str, joints: tuple[str, ...], gains: Mapping[str, GainsSpe
     return tuple(gains.get(joint, GainsSpec()) for joint in joints)
 
 
-def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], compat: Compat) -> Pid:
+def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], compat: Compat | None) -> Pid:
     """The PID of gains (n).
 
     Raises:
         InvalidArgument: gains of a joint that are all zero and feed no velocity forward: it would never move.
     """
     for joint, g in zip(joints, gains, strict=True):
-        if g.p == g.i == g.d == g.ff_velocity_scale == 0.0:
+        if g.idle:
             raise InvalidArgument(
                 "CTRL103",
                 f"controller '{name}': the gains of joint '{joint}' are all zero, so it would not move",
                 hint=f"give gains.{joint}.p",
             )
-    clamp = np.array([math.inf if g.i_clamp is None else g.i_clamp for g in gains])
+    i_clamp = [math.inf if g.i_clamp is None else g.i_clamp for g in gains]
     return Pid(
         p=[g.p for g in gains],
         i=[g.i for g in gains],
         d=[g.d for g in gains],
-        i_min=-clamp,
-        i_max=clamp,
-        compat=compat,
+        u_min=[-math.inf if g.u_clamp_min is None else g.u_clamp_min for g in gains],
+        u_max=[math.inf if g.u_clamp_max is None else g.u_clamp_max for g in gains],
+        i_min=[-clamp if g.i_clamp_min is None else g.i_clamp_min for g, clamp in zip(gains, i_clamp, strict=True)],
+        i_max=[clamp if g.i_clamp_max is None else g.i_clamp_max for g, clamp in zip(gains, i_clamp, strict=True)],
+        antiwindup=[_antiwindup(g, compat) for g in gains],
+        tracking_time=[g.tracking_time_constant for g in gains],
+        error_deadband=[g.error_deadband for g in gains],
+        compat="ros2" if compat is None else compat,
     )
+
+
+def _antiwindup(gains: GainsSpec, compat: Compat | None) -> AntiWindup:
+    """ROS 1 says it with a boolean, for its own law; by the other rules the integral is clamped anyway."""
+    return "conditional_integration" if compat == "ros1" and gains.antiwindup else gains.antiwindup_strategy
 
 
 def strangers(
@@ -66,7 +74,7 @@ def idle_gains(joints: Sequence[str], gains: Mapping[str, GainsSpec], interface:
     """Joints that would never move: their gains are all zero, and they feed no velocity forward."""
     for joint in joints:
         own = gains.get(joint)
-        if own is None or own.p == own.i == own.d == own.ff_velocity_scale == 0.0:
+        if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
             message = f"the gains of joint '{joint}' are all zero; on the {interface} interface it would not move"
             yield Problem(loc, message, f"give gains.{joint}.p", "CTRL103")

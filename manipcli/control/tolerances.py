@@ -3,30 +3,50 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
-from manipcli.control.trajectory_goal import JointFacts
+from manipcli.control.trajectory_goal import JointFacts, JointTolerance, TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.core.text import did_you_mean
 from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
+
+DISABLED: Final = -1.0
+"""A tolerance that says so is not enforced."""
+
+QUANTITIES: Final = (("", ""), ("velocity ", "/s"), ("acceleration ", "/s^2"))
+"""The rows of errors and tolerances (3, n): what they are called, and their unit after that of the position."""
+PATH: Final = ("path tolerance", "path velocity tolerance", "path acceleration tolerance")
+GOAL: Final = ("goal tolerance", "stopped velocity tolerance", "goal acceleration tolerance")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerances:
-    """`path`, `goal` (n) rad or m; `stopped_velocity` per second; infinite: not enforced. `goal_time` [s];
-    `least_path`: the smallest of `path`."""
+    """Greatest errors of position, velocity and acceleration: `path`, `goal` (3, n), infinite where not enforced.
+
+    Attributes:
+        path: on the way.
+        goal: at the end.
+        goal_time: [s] of grace after the end; infinite: without end.
+        bound: errors of position and velocity whose squares sum to less are inside every path tolerance.
+    """
 
     path: Array
     goal: Array
-    stopped_velocity: float
     goal_time: float
-    least_path: float
 
     @staticmethod
-    def of(joints: tuple[str, ...], constraints: ConstraintsSpec) -> Tolerances:
+    def of(joints: tuple[str, ...], constraints: ConstraintsSpec, *, patient: bool = False) -> Tolerances:
         """Of the joints in their order.
+
+        Args:
+            joints: (n).
+            constraints: of the controller.
+            patient: whether a `goal_time` of 0 means to wait without end.
 
         Raises:
             InvalidArgument: a tolerance of a joint that is not one of them.
@@ -35,49 +55,90 @@ class Tolerances:
         if unknown:
             raise InvalidArgument("CTRL104", f"tolerances of '{unknown[0]}', which is not a joint of the controller")
         each = [constraints.joints.get(joint, JointConstraintSpec()) for joint in joints]
-        path = np.array([c.trajectory or math.inf for c in each])
-        return Tolerances(
-            path=path,
-            goal=np.array([c.goal or math.inf for c in each]),
-            stopped_velocity=constraints.stopped_velocity_tolerance or math.inf,
-            goal_time=constraints.goal_time,
-            least_path=float(path.min()),
-        )
+        path, goal = np.full((2, 3, len(joints)), np.inf)
+        path[0] = [one.trajectory or math.inf for one in each]
+        goal[0] = [one.goal or math.inf for one in each]
+        goal[1] = constraints.stopped_velocity_tolerance or math.inf
+        endless = patient and constraints.goal_time == 0.0
+        return Tolerances(path, goal, math.inf if endless else constraints.goal_time)
 
-    def outside_path(self, error: Array) -> bool:
-        """Whether some joint is outside its path tolerance."""
-        # The largest error is at most their norm: nearly always this alone answers. NaN does not pass here.
-        if error.dot(error) < self.least_path**2:
-            return False
-        return bool((np.abs(error) > self.path).any())
+    @property
+    def bound(self) -> float:
+        """Errors of position and velocity whose squares sum to less are inside; 0 where acceleration counts, too."""
+        if np.isfinite(self.path[2]).any():
+            return 0.0
+        return float(self.path[:2].min()) ** 2
 
-    def inside_goal(self, error: Array, error_rate: Array) -> bool:
-        """Whether every joint is within goal tolerance and slow enough, now."""
-        within = np.abs(error) <= self.goal
-        slow = np.abs(error_rate) <= self.stopped_velocity
-        return bool((within & slow).all())
+    @property
+    def needs_acceleration(self) -> bool:
+        """Whether an acceleration is to be judged."""
+        return bool(np.isfinite([self.path[2], self.goal[2]]).any())
 
-    def path_text(self, facts: JointFacts, error: Array, time: float, elapsed: float) -> str:
-        j = int(np.argmax(np.abs(error) / self.path))
-        unit = facts.units[j]
+    def adopted(self, goal: TrajectoryGoal, joints: tuple[str, ...]) -> tuple[Tolerances, tuple[str, ...]]:
+        """With those of a goal, and notes of what was not taken.
+
+        Above 0 replaces, 0 leaves, -1 disables. Any other negative number or an unknown joint, and none of the goal's
+        tolerances is taken: ROS 2's rule.
+        """
+        path, goal_rows = np.array(self.path), np.array(self.goal)
+        for rows, given, which in ((path, goal.path_tolerance, "path"), (goal_rows, goal.goal_tolerance, "goal")):
+            for tolerance in given:
+                wrong = _wrong(tolerance, joints)
+                if wrong:
+                    return self, (f"{which} tolerance: {wrong}; the controller's own tolerances hold",)
+                j = joints.index(tolerance.name)
+                for k, value in enumerate((tolerance.position, tolerance.velocity, tolerance.acceleration)):
+                    rows[k, j] = _chosen(value, rows[k, j])
+        time = goal.goal_time_tolerance
+        if not (time >= 0.0 or time == DISABLED):
+            return self, (f"goal time tolerance {time:g} s; the controller's own tolerances hold",)
+        return replace(self, path=path, goal=goal_rows, goal_time=_chosen(time, self.goal_time)), ()
+
+    def outside_path(self, errors: Sequence[Array]) -> bool:
+        """Whether some joint is outside its path tolerance; `errors` of position, velocity and, if known, more."""
+        return any(bool((np.abs(error) > limit).any()) for error, limit in zip(errors, self.path, strict=False))
+
+    def inside_goal(self, errors: Sequence[Array]) -> bool:
+        """Whether every joint is inside its goal tolerances, now."""
+        return all(bool((np.abs(error) <= limit).all()) for error, limit in zip(errors, self.goal, strict=False))
+
+    def path_text(self, facts: JointFacts, errors: Sequence[Array], time: float, elapsed: float) -> str:
+        joint, what = _worst(facts, errors, self.path, PATH)
+        return f"joint '{joint}' left its {what}, at t = {time:.3f} s ({elapsed:.3f} s into the goal)"
+
+    def goal_text(self, facts: JointFacts, errors: Sequence[Array], time: float, late: float) -> str:
+        joint, what = _worst(facts, errors, self.goal, GOAL)
         return (
-            f"joint '{facts.joints[j]}' left its path tolerance: error {error[j]:+.6g} {unit}, "
-            f"limit {self.path[j]:.6g} {unit}, at t = {time:.3f} s ({elapsed:.3f} s into the goal)"
-        )
-
-    def goal_text(self, facts: JointFacts, error: Array, error_rate: Array, time: float, late: float) -> str:
-        position = np.abs(error) / self.goal
-        velocity = np.abs(error_rate) / self.stopped_velocity
-        j = int(np.argmax(np.maximum(position, velocity)))
-        unit = facts.units[j]
-        if position[j] > 1.0:
-            what = f"goal tolerance: error {error[j]:+.6g} {unit}, limit {self.goal[j]:.6g} {unit}"
-        else:
-            what = (
-                f"stopped velocity tolerance: velocity error {error_rate[j]:+.6g} {unit}/s, "
-                f"limit {self.stopped_velocity:.6g} {unit}/s"
-            )
-        return (
-            f"joint '{facts.joints[j]}' is outside its {what}, at t = {time:.3f} s, "
+            f"joint '{joint}' is outside its {what}, at t = {time:.3f} s, "
             f"{late:.3f} s after the end (goal_time {self.goal_time:.6g} s)"
         )
+
+
+def _worst(facts: JointFacts, errors: Sequence[Array], limits: Array, called: Sequence[str]) -> tuple[str, str]:
+    """The joint whose error is the largest multiple of its limit, and what that is."""
+    shares = np.array([np.abs(error) / limit for error, limit in zip(errors, limits, strict=False)])
+    k, j = (int(i) for i in np.unravel_index(np.argmax(shares), shares.shape))
+    quantity, per = QUANTITIES[k]
+    unit = facts.units[j] + per
+    text = f"{called[k]}: {quantity}error {errors[k][j]:+.6g} {unit}, limit {limits[k, j]:.6g} {unit}"
+    return facts.joints[j], text
+
+
+def _wrong(tolerance: JointTolerance, joints: tuple[str, ...]) -> str:
+    """Why a tolerance cannot be taken; empty where it can."""
+    if tolerance.name not in joints:
+        near = did_you_mean(tolerance.name, joints, kind="joints")
+        return f"'{tolerance.name}' is not a joint of the controller" + (f" ({near})" if near else "")
+    for (quantity, _), value in zip(
+        QUANTITIES, (tolerance.position, tolerance.velocity, tolerance.acceleration), strict=True
+    ):
+        if not (value >= 0.0 or value == DISABLED):
+            return f"{quantity or 'position '}of joint '{tolerance.name}' is {value:g}; expected 0 or more, or -1"
+    return ""
+
+
+def _chosen(value: float, default: float) -> float:
+    """Above 0 itself, 0 the default, -1 none."""
+    if value == DISABLED:
+        return math.inf
+    return value if value > 0.0 else float(default)

@@ -1,4 +1,4 @@
-"""What a joint trajectory controller asks of a trajectory, and how it leads into one and out of one."""
+"""Goals of joint trajectory controllers: what they are, what is refused, and how one is led into."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.core.errors import InvalidArgument
+from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import JointLimits, JointType
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
 
 REST = 1.2e-7
 """Velocities below this count as zero at the end of a trajectory; ROS's own threshold (single-precision epsilon)."""
@@ -57,59 +57,149 @@ class JointFacts:
             wraps=bool(continuous.any()),
         )
 
+    def some(self, joints: tuple[str, ...]) -> JointFacts:
+        """Of these joints alone."""
+        if joints == self.joints:
+            return self
+        k = [self.joints.index(joint) for joint in joints]
+        return JointFacts(
+            joints=joints,
+            units=tuple(self.units[i] for i in k),
+            lower=self.lower[k],
+            upper=self.upper[k],
+            velocity=self.velocity[k],
+            acceleration=self.acceleration[k],
+            continuous=self.continuous[k],
+            wraps=bool(self.continuous[k].any()),
+        )
 
-def check_goal(trajectory: JointTrajectory, facts: JointFacts, *, allow_end_velocity: bool) -> JointTrajectory:
-    """The trajectory with its joints in the controller's order.
+
+@dataclass(frozen=True, slots=True)
+class JointTolerance:
+    """control_msgs/JointTolerance: rad or m, per second, per second squared.
+
+    Each: above 0 is the tolerance, 0 leaves the controller's own, -1 means that it is not enforced.
+    """
+
+    name: str
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrajectoryGoal:
+    """A trajectory and how it is wanted: control_msgs/FollowJointTrajectory's goal.
+
+    Attributes:
+        trajectory: of all joints of the controller in any order, or of some where that is allowed.
+        start_time: [s] simulated time from which the trajectory's times count; 0: the next update.
+        path_tolerance, goal_tolerance: instead of the controller's own; see `JointTolerance`.
+        goal_time_tolerance: [s] likewise.
+    """
+
+    trajectory: JointTrajectory
+    start_time: float = 0.0
+    path_tolerance: tuple[JointTolerance, ...] = ()
+    goal_tolerance: tuple[JointTolerance, ...] = ()
+    goal_time_tolerance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Acceptance:
+    """What goals a controller takes; the words are those of ROS 2's parameters."""
+
+    allow_partial_joints_goal: bool
+    allow_nonzero_velocity_at_trajectory_end: bool
+    allow_integration_in_goal_trajectories: bool
+    efforts: bool
+
+
+def check_goal(goal: TrajectoryGoal, facts: JointFacts, accepted: Acceptance, now: float) -> JointTrajectory:
+    """The goal's trajectory with its joints in the controller's order.
 
     Raises:
-        InvalidArgument: see `JointTrajectoryController.send_goal`.
+        GoalRejected: see `JointTrajectoryController.send_goal`.
     """
-    for name in trajectory.names:
-        if name not in facts.joints:
-            raise InvalidArgument(
-                "CTRL120",
-                f"joint '{name}' is not one of the controller's: {', '.join(facts.joints)}",
-                hint=did_you_mean(name, facts.joints, kind="joints"),
-            )
-    for name in facts.joints:
-        if name not in trajectory.names:
-            raise InvalidArgument("CTRL121", f"the trajectory has no values for joint '{name}'")
+    trajectory = goal.trajectory
+    names = _check_joints(trajectory, facts, accepted)
     if trajectory.orders is not None:
         k = int(np.flatnonzero(trajectory.orders != trajectory.orders[0])[0])
-        raise InvalidArgument(
+        raise GoalRejected(
             "CTRL122",
             f"point {k} gives other things than point 0",
             hint="give velocities (and accelerations) at every point, or at none",
         )
-    ordered = trajectory.of_joints(facts.joints)
-    _check_limits(ordered, facts)
-    if ordered.velocities is not None and not allow_end_velocity:
-        last = ordered.velocities[-1]
-        j = int(np.argmax(np.abs(last)))
-        if abs(last[j]) > REST:
-            raise InvalidArgument(
-                "CTRL123",
-                f"the trajectory ends with joint '{facts.joints[j]}' at {last[j]:.6g} {facts.units[j]}/s, not at rest",
-            )
+    if trajectory.integrated and not accepted.allow_integration_in_goal_trajectories:
+        message = "the trajectory has points without positions, and integrating them is not allowed"
+        hint = "give positions, or say allow_integration_in_goal_trajectories: true"
+        raise GoalRejected("CTRL126", message, hint=hint)
+    if trajectory.efforts is not None and not accepted.efforts:
+        message = "the trajectory gives efforts, but the controller commands none"
+        raise GoalRejected("CTRL127", message, hint="take them out, or add effort to command_interfaces")
+    if not math.isfinite(goal.start_time) or goal.start_time < 0.0:
+        raise GoalRejected("CTRL128", f"a start time of {goal.start_time} s; expected 0 or more")
+    if goal.start_time > 0.0 and goal.start_time + trajectory.duration < now:
+        end = goal.start_time + trajectory.duration
+        message = f"the trajectory ends at t = {end:.3f} s, {now - end:.3f} s ago"
+        raise GoalRejected("CTRL128", message, hint="leave the start time out to begin now")
+    ordered = trajectory.of_joints(names)
+    own = facts.some(names)
+    _check_limits(ordered, own)
+    _check_end(ordered, own, accepted)
     return ordered
 
 
+def _check_joints(trajectory: JointTrajectory, facts: JointFacts, accepted: Acceptance) -> tuple[str, ...]:
+    """The joints of a trajectory, in the order of the controller."""
+    for name in trajectory.names:
+        if name not in facts.joints:
+            raise GoalRejected(
+                "CTRL120",
+                f"joint '{name}' is not one of the controller's: {', '.join(facts.joints)}",
+                hint=did_you_mean(name, facts.joints, kind="joints"),
+                error_code=ErrorCode.INVALID_JOINTS,
+            )
+    left_out = [name for name in facts.joints if name not in trajectory.names]
+    if left_out and not accepted.allow_partial_joints_goal:
+        raise GoalRejected(
+            "CTRL121",
+            f"the trajectory has no values for joint '{left_out[0]}'",
+            hint="give all joints, or say allow_partial_joints_goal: true",
+            error_code=ErrorCode.INVALID_JOINTS,
+        )
+    return tuple(name for name in facts.joints if name in trajectory.names)
+
+
+def _check_end(trajectory: JointTrajectory, facts: JointFacts, accepted: Acceptance) -> None:
+    if trajectory.velocities is None or accepted.allow_nonzero_velocity_at_trajectory_end or trajectory.source:
+        return
+    last = trajectory.velocities[-1]
+    j = int(np.argmax(np.abs(last)))
+    if abs(last[j]) > REST:
+        message = f"the trajectory ends with joint '{facts.joints[j]}' at {last[j]:.6g} {facts.units[j]}/s, not at rest"
+        hint = "end at rest, or say allow_nonzero_velocity_at_trajectory_end: true"
+        raise GoalRejected("CTRL123", message, hint=hint)
+
+
 def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
-    positions = trajectory.positions
-    beyond = (positions < facts.lower - POSITION_SLACK) | (positions > facts.upper + POSITION_SLACK)
-    if beyond.any():
-        k, j = (int(index) for index in np.argwhere(beyond)[0])
-        raise InvalidArgument("CTRL124", _beyond(facts, j, float(positions[k, j]), f"point {k}"))
-    if trajectory.velocities is None:
-        velocities = np.diff(positions, axis=0) / np.diff(trajectory.times)[:, None]
-        what = "on the way to point"
-        first = 1
-    else:
+    if trajectory.source is None:  # else nobody knows the positions yet
+        positions = trajectory.positions
+        beyond = (positions < facts.lower - POSITION_SLACK) | (positions > facts.upper + POSITION_SLACK)
+        if beyond.any():
+            k, j = (int(index) for index in np.argwhere(beyond)[0])
+            raise GoalRejected("CTRL124", _beyond(facts, j, float(positions[k, j]), f"point {k}"))
+    if trajectory.velocities is not None:
         velocities, what, first = trajectory.velocities, "point", 0
+    elif trajectory.interpolation == "splines":
+        velocities = np.diff(trajectory.positions, axis=0) / np.diff(trajectory.times)[:, None]
+        what, first = "on the way to point", 1
+    else:
+        return
     fast = np.abs(velocities) > facts.velocity * (1.0 + VELOCITY_SLACK)
     if fast.any():
         k, j = (int(index) for index in np.argwhere(fast)[0])
-        raise InvalidArgument(
+        raise GoalRejected(
             "CTRL125",
             f"joint '{facts.joints[j]}' moves at {velocities[k, j]:.6g} {facts.units[j]}/s {what} {k + first}; "
             f"its limit is {facts.velocity[j]:.6g} {facts.units[j]}/s",
@@ -136,46 +226,75 @@ def outside_limits(positions: Array, facts: JointFacts, period: float) -> str | 
     return _beyond(facts, j, float(positions[k, j]), f"{k * period:.3f} s into the goal")
 
 
-def lead_in(trajectory: JointTrajectory, reference: Array, facts: JointFacts) -> JointTrajectory:
-    """The trajectory from `reference` (3, n) on: position, velocity, acceleration at time 0.
+def shortest(error: Array, facts: JointFacts) -> None:
+    """Makes errors (n) of continuous joints the shortest angles, in place; at half a turn the sign stays."""
+    turns = np.ceil(np.abs(error) / math.tau - 0.5)
+    error -= facts.continuous * math.tau * np.copysign(np.maximum(turns, 0.0), error)
 
-    The reference becomes a point at time 0 of what the trajectory's points give, unless the first point is at 0 itself.
+
+def lead_in(
+    trajectory: JointTrajectory,
+    start: Array,
+    facts: JointFacts,
+    *,
+    ago: float = 0.0,
+    smooth: bool = False,
+    interpolation: Interpolation = "splines",
+) -> JointTrajectory:
+    """The trajectory from `start` on.
+
+    The start becomes a point at time 0 of what the trajectory's points give, unless the first point is at 0 itself.
     Continuous joints of the trajectory are shifted by whole turns, so that its first point is the nearest.
+
+    Args:
+        trajectory: of the joints of `facts`.
+        start: (4, n) where it begins: position, velocity, acceleration, effort.
+        facts: of its joints.
+        ago: [s] its time 0 was so long ago (negative: will be); of its points those that are still to come are left.
+        smooth: whether points that give positions alone get the velocities of a spline.
+        interpolation: `none` also where the trajectory does not say so.
     """
+    if trajectory.source is not None:
+        begin = TrajectoryPoint(start[0], 0.0, start[1], start[2], start[3])
+        trajectory = JointTrajectory(trajectory.names, trajectory.source, begin, interpolation=trajectory.interpolation)
+    if interpolation == "none":
+        trajectory = trajectory.with_interpolation("none")
+    if ago != 0.0:
+        trajectory = _remaining(trajectory, ago)
     positions = trajectory.positions
     if facts.wraps:
-        ahead = positions[0] - reference[0]
-        turns = np.maximum(np.ceil(np.abs(ahead) / math.tau - 0.5), 0.0)
-        shift = facts.continuous * math.tau * np.copysign(turns, ahead)
-        if shift.any():
-            positions = positions - shift
-    if trajectory.times[0] == 0.0:
-        if positions is trajectory.positions:
-            return trajectory
-        rows = (positions, trajectory.velocities, trajectory.accelerations)
-        return JointTrajectory.of_arrays(trajectory.names, trajectory.times, *rows)
+        ahead = positions[0] - start[0]
+        near = ahead.copy()
+        shortest(near, facts)
+        if (near != ahead).any():
+            positions = positions + (near - ahead)
+    leads = trajectory.times[0] > 0.0
+    if not leads and positions is trajectory.positions:
+        whole = trajectory
+    else:
+
+        def after(row: Array, values: Array | None) -> Array | None:
+            return values if values is None or not leads else np.vstack([row, values])
+
+        whole = JointTrajectory.of_arrays(
+            trajectory.names, np.concatenate([[0.0], trajectory.times]) if leads else trajectory.times,
+            np.vstack([start[0], positions]) if leads else positions,
+            after(start[1], trajectory.velocities), after(start[2], trajectory.accelerations),
+            after(start[3], trajectory.efforts), interpolation=trajectory.interpolation,
+            led_in=leads or trajectory.led_in,
+        )  # fmt: skip
+    return whole.with_spline_velocities(start[1] if leads else None) if smooth else whole
+
+
+def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
+    """The points of a trajectory that come later than `ago` [s] of it, at the least the last, from then on."""
+    first = min(int(np.searchsorted(trajectory.times, ago, side="right")), len(trajectory.times) - 1)
+
+    def kept(values: Array | None) -> Array | None:
+        return None if values is None else values[first:]
+
     return JointTrajectory.of_arrays(
-        names=trajectory.names,
-        times=np.concatenate([[0.0], trajectory.times]),
-        positions=np.vstack([reference[0], positions]),
-        velocities=None if trajectory.velocities is None else np.vstack([reference[1], trajectory.velocities]),
-        accelerations=None if trajectory.accelerations is None else np.vstack([reference[2], trajectory.accelerations]),
-    )
-
-
-def stopping(reference: Array, acceleration: Array, period: float) -> Array:
-    """References (T, 3, n) from a moving `reference` (3, n) to rest: all joints stop together, none over its limit.
-
-    With T = max |v| / a: q = q0 + v0 (t - t^2 / (2 T)), v = v0 (1 - t / T). Without limits it stops at once.
-    """
-    position, velocity = np.array(reference[0]), np.array(reference[1])
-    stop = float(np.max(np.abs(velocity) / acceleration))
-    count = math.ceil(stop / period - 1e-6)
-    table = np.zeros((count + 1, 3, len(position)))
-    t = np.minimum(np.arange(count + 1) * period, stop)[:, None]
-    table[:, 0] = position
-    if count > 0:
-        table[:, 0] += velocity * (t - t * t / (2.0 * stop))
-        table[:-1, 1] = velocity * (1.0 - t[:-1] / stop)
-        table[:-1, 2] = -velocity / stop
-    return table
+        trajectory.names, np.maximum(trajectory.times[first:] - ago, 0.0), trajectory.positions[first:],
+        kept(trajectory.velocities), kept(trajectory.accelerations), kept(trajectory.efforts),
+        interpolation=trajectory.interpolation,
+    )  # fmt: skip

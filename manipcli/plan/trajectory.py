@@ -229,19 +229,34 @@ class JointTrajectory:
         object.__setattr__(made, "integrated", self.integrated)
         return made
 
-    def with_spline_velocities(self) -> JointTrajectory:
-        """Where points give positions alone: with the velocities of the cubic spline that begins and ends at rest.
+    def with_spline_velocities(self, begin: Array | None = None) -> JointTrajectory:
+        """Where points give positions alone: with the velocities of the cubic spline that ends at rest.
 
         Velocity and acceleration are then continuous. Others come back as they are.
+
+        Args:
+            begin: (n) the velocity of the first point; None: at rest.
         """
         if self.velocities is not None or len(self.times) < 2:
             return self
         from scipy.interpolate import CubicSpline
 
-        spline = CubicSpline(self.times, self.positions, bc_type="clamped")
+        rest = np.zeros(len(self.names))
+        spline = CubicSpline(self.times, self.positions, bc_type=((1, rest if begin is None else begin), (1, rest)))
         return JointTrajectory.of_arrays(
             self.names, self.times, self.positions, spline(self.times, 1), None, self.efforts,
             interpolation=self.interpolation, led_in=self.led_in,
+        )  # fmt: skip
+
+    def with_interpolation(self, interpolation: Interpolation) -> JointTrajectory:
+        """The same points, with this between them."""
+        if interpolation == self.interpolation:
+            return self
+        if self.source is not None:
+            return JointTrajectory(self.names, self.source, interpolation=interpolation)
+        return JointTrajectory.of_arrays(
+            self.names, self.times, self.positions, self.velocities, self.accelerations, self.efforts,
+            orders=self.orders, interpolation=interpolation, led_in=self.led_in,
         )  # fmt: skip
 
     def _refuse(self, t: Array) -> None:

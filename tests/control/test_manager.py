@@ -175,7 +175,8 @@ def test_serving_and_lookup():
 
 def test_two_controllers_on_one_joint_are_refused_with_both_names():
     def controller(name, interface):
-        return JointTrajectoryController(name=name, joints=["a"], interface=interface, gains={"a": GainsSpec(p=1.0)})
+        gains = {"a": GainsSpec(p=1.0)}
+        return JointTrajectoryController(name=name, joints=["a"], command_interfaces=(interface,), gains=gains)
 
     with pytest.raises(InvalidInput, match=r"a/effort \(one\), a/velocity \(two\)"):
         ControllerManager([controller("one", "effort"), controller("two", "velocity")], joints=["a"], period=0.001)
@@ -273,7 +274,7 @@ def test_a_controller_cannot_change_what_was_measured():
             return super().update(time, period, measured, contact_force=contact_force)
 
     for joints in (["a", "b"], ["b", "a"]):
-        spy = Spy(name="spy", joints=joints, interface="position")
+        spy = Spy(name="spy", joints=joints, command_interfaces=("position",))
         manager = ControllerManager([spy], joints=["a", "b"], period=0.001)
         world = World(2)
         manager.update(0.0, world)

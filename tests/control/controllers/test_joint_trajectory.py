@@ -31,7 +31,9 @@ def make(interface="position", joints=JOINTS, *, path=None, goal=None, goal_time
         joints={j: JointConstraintSpec(trajectory=path, goal=goal) for j in joints},
     )
     more.setdefault("gains", {} if interface == "position" else {j: GainsSpec(p=1.0) for j in joints})
-    return JointTrajectoryController(name="arm", joints=joints, interface=interface, constraints=constraints, **more)
+    return JointTrajectoryController(
+        name="arm", joints=joints, command_interfaces=(interface,), constraints=constraints, **more
+    )
 
 
 def point(positions, time, velocities=None, accelerations=None):
@@ -166,7 +168,7 @@ def test_goals_that_cannot_be_followed_are_refused_and_the_one_before_goes_on(ma
 
 
 def test_an_end_velocity_is_accepted_where_it_is_allowed():
-    controller = make(allow_end_velocity=True)
+    controller = make(allow_nonzero_velocity_at_trajectory_end=True)
     assert controller.send_goal(trajectory(point([1, 1, 1], 1.0, [-1, -2, -3]))).active
 
 
@@ -297,13 +299,8 @@ def test_velocity_law_feeds_the_reference_forward():
     assert output.command == pytest.approx(np.full(3, 2.0 * 0.1 + 0.5 * 1.0))
 
 
-def test_effort_law_adds_the_feed_forward_and_position_passes_the_reference_on():
-    gravity = np.array([1.0, 2.0, 3.0])
-    effort = make("effort", gains={j: GainsSpec(p=10.0, d=1.0) for j in JOINTS})
-    assert np.array_equal(effort.update(0.0, PERIOD, state(START), gravity).command, gravity)
-    assert np.array_equal(gravity, [1.0, 2.0, 3.0])
-    position = make("position")
-    assert np.array_equal(position.update(0.0, PERIOD, state(START), gravity).command, START)
+def test_position_passes_the_reference_on():
+    assert np.array_equal(make("position").update(0.0, PERIOD, state(START)).command, START)
 
 
 def test_continuous_joints_take_the_shortest_way():
@@ -324,14 +321,14 @@ def test_continuous_joints_take_the_shortest_way():
         {"joints": ("a", "a")},
         {"joints": ()},
         {"gains": {"other": GainsSpec(p=1.0)}},
-        {"interface": "effort", "gains": {}},
-        {"interface": "velocity", "gains": {"a": GainsSpec()}},
+        {"command_interfaces": ("effort",), "gains": {}},
+        {"command_interfaces": ("velocity",), "gains": {"a": GainsSpec()}},
         {"constraints": ConstraintsSpec(joints={"other": JointConstraintSpec(goal=1.0)})},
     ],
 )
 def test_a_controller_that_cannot_work_is_refused(bad):
     with pytest.raises(InvalidArgument):
-        JointTrajectoryController(**{"name": "c", "joints": ("a",), "interface": "position", **bad})
+        JointTrajectoryController(**{"name": "c", "joints": ("a",), "command_interfaces": ("position",), **bad})
 
 
 def test_a_double_integrator_under_pd_tracks_and_arrives():
