@@ -13,6 +13,7 @@ from pathlib import Path
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
+from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.load import Task, load_libraries, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
@@ -25,6 +26,7 @@ __all__ = [
     "Plan",
     "Task",
     "check_files",
+    "controllers_of",
     "judge_log",
     "kind_of",
     "load_task",

@@ -1,4 +1,4 @@
-"""`manipcli list [KIND]`: the files below this folder, and the words that files may use."""
+"""`manipcli list [KIND [TASK]]`: the files below this folder, the words that files may use, a task's controllers."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Literal, get_args
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import Format
-from manipcli.core.errors import ExitCode
+from manipcli.cli.options import Format, OutputFormat
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 Kind = Literal["robots", "tasks", "controllers", "steps", "expectations", "conditions", "shapes", "engines", "checks"]
 FILES = {"robots": "robot", "tasks": "task", "controllers": "controllers"}
@@ -20,15 +20,22 @@ def list_(
     kind: Annotated[
         Kind | None, typer.Argument(metavar="KIND", help="Which; all when absent.", show_default=False)
     ] = None,
+    task: Annotated[
+        Path | None,
+        typer.Argument(metavar="TASK", help="With `controllers`: those of this task.", show_default=False),
+    ] = None,
     *,
     format_: Format = "text",
 ) -> ExitCode:
     """List files and the words they may use.
 
-    Robots, tasks and controllers are files below this folder; the rest are words of task files.
+    Robots, tasks and controllers are files below this folder; the rest are words of task files. `list controllers TASK`
+    shows who claims what at the start of a task.
     """
     from manipcli.report.json import dumps
 
+    if task is not None:
+        return _controllers(kind, task, format_)
     if kind == "checks" and format_ == "text":
         from manipcli.model.checks import CHECKS
         from manipcli.report.description import render_checks
@@ -44,6 +51,18 @@ def list_(
     else:
         for one, names in found.items():
             console.result(f"{one}: {', '.join(names) or '-'}")
+    return ExitCode.PASSED
+
+
+def _controllers(kind: Kind | None, task: Path, format_: OutputFormat) -> ExitCode:
+    from manipcli import pipeline
+    from manipcli.report.controllers import render_json, render_text
+
+    if kind != "controllers":
+        message = f"'list {kind}' takes no file; only `list controllers TASK` does"
+        raise InvalidInput([Finding("USE058", message)])
+    rows = pipeline.controllers_of(task)
+    console.result(render_json(str(task), rows) if format_ == "json" else render_text(rows))
     return ExitCode.PASSED
 
 

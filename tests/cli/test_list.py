@@ -65,6 +65,31 @@ def test_words_are_those_of_the_registries(capsys: pytest.CaptureFixture[str], k
     assert "pose" not in listed
 
 
+TASK = str(Path(__file__).parents[2] / "tasks" / "pour.yaml")
+
+
+def test_the_controllers_of_a_task_and_who_claims_what(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "controllers", TASK]) == 0
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header.split() == ["controller", "type", "at", "the", "start", "rate", "claims"]
+    (arm,) = [row for row in rows if row.startswith("arm_controller")]
+    assert "joint_trajectory  active" in arm
+    assert "1000 Hz  effort of joint_1, joint_2, joint_3, ..., joint_7 (7 joints)" in arm
+    assert main(["list", "controllers", TASK, "--format", "json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    first = answer["controllers"][0]
+    assert (first["name"], first["type"], first["state"], first["update_rate"]) == (
+        "arm_controller", "joint_trajectory", "active", 1000.0,
+    )  # fmt: skip
+    assert first["claimed"] == first["interfaces"] == [f"joint_{k}/effort" for k in range(1, 8)]
+
+
+def test_a_file_after_another_kind_is_a_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "robots", TASK]) == 4
+    assert "only `list controllers TASK` does" in capsys.readouterr().err
+    assert main(["list", "controllers", "no.yaml"]) == 4
+
+
 def test_all_kinds_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "--format", "json"]) == 0
     answer = json.loads(capsys.readouterr().out)
