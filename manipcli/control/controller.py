@@ -62,6 +62,12 @@ class ControllerOutput:
         wanted = rows[2] if wanted_acceleration is None else wanted_acceleration
         return cls(rows, rows[0], rows[1], rows[2], tuple(rows[REFERENCE_ROWS:]), wanted)
 
+    @classmethod
+    def published(cls, count: int) -> ControllerOutput:
+        """Of a broadcaster, which commands nothing: `rows` (1, count) are what it publishes; all else is empty."""
+        none = np.zeros(0)
+        return cls(np.zeros((1, count)), none, none, none, (), none)
+
     @property
     def command(self) -> Array:
         """(n) in the controller's first interface."""
@@ -115,7 +121,7 @@ class Fit:
 
     robot: RobotModel
     kinematics: Callable[[], Kinematics]
-    compat: Compat
+    compat: Compat | None
 
 
 @dataclass(frozen=True, slots=True)

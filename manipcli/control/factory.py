@@ -33,7 +33,7 @@ def build_controllers(
     place: Where = _nowhere,
     *,
     kinematics: Kinematics | None = None,
-    compat: Compat = "ros2",
+    compat: Compat | None = None,
 ) -> ControllerManager:
     """The controllers of a file, for a robot, loaded and configured; active those that say so.
 
@@ -43,7 +43,7 @@ def build_controllers(
         period: [s] of a control tick.
         place: of values, for findings.
         kinematics: of the robot, for those that need its dynamics; None: made when needed.
-        compat: see `Pid`.
+        compat: whose rules where ROS 1 and 2 differ; None: the safer one of each.
 
     Raises:
         InvalidInput: `controller_findings` has errors.

@@ -161,7 +161,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
         tool=tool,
         collision_ignore=spec.collision_ignore,
         friction=spec.friction,
-        compat=spec.compat,
+        compat=spec.compat or "ros2",
         actuators=actuators,
     )
 

@@ -218,8 +218,10 @@ class RobotSpec(Model):
     friction: Annotated[float, Field(ge=0)] = Field(
         1.0, description="Coefficient of the robot's surfaces; the engine multiplies it by the other body's. Default 1."
     )
-    compat: Literal["ros1", "ros2"] = Field(
-        "ros2",
-        description="Whose PID (in ROS 1 the integral acts a step earlier) and whose four-bar efforts (in ROS 1 they "
-        "do not keep power). Default ros2.",
+    compat: Literal["ros1", "ros2"] | None = Field(
+        None,
+        description="Whose rules where ROS 1 and 2 differ: when the integral of a PID acts (in ROS 1 a step earlier), "
+        "what follows an abort (in ROS 1 the trajectory goes on), what goal_time 0 means (in ROS 2 to wait without "
+        "end), what becomes of a goal that another replaces, and the efforts of a four-bar linkage (in ROS 1 they do "
+        "not keep power). Default: the safer one of each.",
     )

@@ -87,7 +87,7 @@ class GripperController:
         goal_tolerance: npt.ArrayLike = 0.05,
         contact_time: float = 0.02,
         feed_forward: FeedForward = "none",
-        compat: Compat = "ros2",
+        compat: Compat | None = None,
     ) -> None:
         self.name = name
         self.joints = tuple(joints)
