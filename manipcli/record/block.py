@@ -16,9 +16,16 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
-from manipcli.record.channels import Channel, ControllerChannel
+from manipcli.record.channels import Channel, ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.messages import WORLD
-from manipcli.record.rows import RowBlock, Times, controller_state_template, joint_state_template, tf_template
+from manipcli.record.rows import (
+    RowBlock,
+    Times,
+    controller_state_template,
+    joint_state_template,
+    tf_template,
+    wrench_template,
+)
 from manipcli.spec.controllers import Interface
 
 PLOT_PERIOD = 0.01
@@ -82,7 +89,7 @@ class Block:
         self,
         robot: RobotModel,
         scene: Scene,
-        controllers: Sequence[ControllerChannel],
+        controllers: Sequence[Recorded],
         channels: Sequence[Channel],
         period: float,
         capacity: int,
@@ -98,13 +105,23 @@ class Block:
         self._ticks = np.zeros(capacity, dtype=np.int64)
         self._position, self._velocity, self._effort = (np.zeros((capacity, n)) for _ in range(3))
         self._body_position, self._body_quat = np.zeros((capacity, m, 3)), np.zeros((capacity, m, 4))
-        self._controllers = [_ControllerRows(controller, robot, capacity) for controller in controllers]
+        claiming = [c for c in controllers if isinstance(c, ControllerChannel)]
+        sensing = [c for c in controllers if isinstance(c, WrenchChannel)]
+        self._controllers = [_ControllerRows(controller, robot, capacity) for controller in claiming]
+        self._wrenches = [np.zeros((capacity, 1, 6)) for _ in sensing]
+        rows = iter([*(of.rows for of in self._controllers)])
+        wrenches = iter(self._wrenches)
+        self._rows: list[Array | None] = [
+            next(rows) if isinstance(c, ControllerChannel) else None if c is None else next(wrenches)
+            for c in controllers
+        ]
         frames = [(joint.parent, joint.child) for joint in joints] + [(WORLD, body.name) for body in bodies]
-        states = [controller_state_template(ids[c.state_topic], c.joints, c.interfaces) for c in controllers]
+        states = [controller_state_template(ids[c.state_topic], c.joints, c.interfaces) for c in claiming]
+        states += [wrench_template(ids[c.topic], c.link) for c in sensing]
         self._actuators = Drivetrain.of(robot)
         plots = [
             joint_state_template(ids[topic], c.joints, effort=False)
-            for c in controllers
+            for c in claiming
             for topic in (c.reference_topic, c.error_topic)
         ]
         if self._actuators.names:
@@ -125,8 +142,9 @@ class Block:
         self._effort[k] = state.effort
         self._body_position[k] = state.body_position
         self._body_quat[k] = state.body_quat_xyzw
-        for of, output in zip(self._controllers, outputs, strict=True):
-            of.rows[k] = np.nan if output is None else output.rows
+        for rows, output in zip(self._rows, outputs, strict=True):
+            if rows is not None:
+                rows[k] = np.nan if output is None else output.rows
         self.count = k + 1
 
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:
@@ -150,6 +168,7 @@ class Block:
             state, plots = rows.values(position, velocity, effort)
             fast += state
             slow += [values[plotted] for values in plots]
+        fast += [wrenches[:T, 0] for wrenches in self._wrenches]
         if self._actuators.names:
             slow += self._actuators.state(position[plotted], velocity[plotted], effort[plotted])
         self._fast.fill(times, self._fast_written + 1, fast)

@@ -95,6 +95,14 @@ def controller_state_template(channel: int, joints: Sequence[str], interfaces: S
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
 
 
+def wrench_template(channel: int, frame: str) -> Template:
+    """geometry_msgs/WrenchStamped; a run of 6: force, torque."""
+    writer = CdrWriter()
+    stamp = writer.header(0, frame)
+    offset = writer.f64s([0.0] * 6)
+    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, 6),))
+
+
 class RowBlock:
     """Up to `capacity` rows of the messages of `templates`, in that order.
 

@@ -46,6 +46,16 @@ class Engine(Protocol):
         """What the joints obey until the next write; an ideal engine makes the references in it come true."""
         ...
 
+    def sense_wrench(self, joint: str) -> Array:
+        """A force/torque sensor at a joint, fixed or not, from now on.
+
+        Returns:
+            (6) force [N] and torque [N m] that the child link, with all that hangs on it, puts on the parent, in the
+            child's frame L and about its origin; overwritten by every read. Zeros before the first tick, and always
+            in an engine without physics.
+        """
+        ...
+
     def advance(self) -> None:
         """One control tick: `substeps` physics steps."""
         ...

@@ -15,6 +15,7 @@ import numpy as np
 from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
+from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
@@ -84,6 +85,9 @@ class Session:
         self._asked = np.zeros(len(robot.joint_names))
         if engine.ideal:
             manager.keep_references()
+        for controller in manager.controllers:
+            if isinstance(controller, ForceTorqueBroadcaster):
+                controller.attach(engine.sense_wrench(controller.joint))
         n = len(robot.joint_names)
         self._contact_force = np.zeros(n)
         self._joint_of_part = _joint_of_part(robot)

@@ -9,9 +9,25 @@ from pydantic import Field
 
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import GripperSpec, JointTrajectorySpec
+from manipcli.spec.other_controllers import (
+    ComputedTorqueSpec,
+    ForceTorqueBroadcasterSpec,
+    ForwardCommandSpec,
+    JointStateBroadcasterSpec,
+    PidSpec,
+)
 from manipcli.spec.robot import Version
 
-AnyController = Annotated[JointTrajectorySpec | GripperSpec, Field(discriminator="type")]
+AnyController = Annotated[
+    JointTrajectorySpec
+    | GripperSpec
+    | ComputedTorqueSpec
+    | ForwardCommandSpec
+    | PidSpec
+    | JointStateBroadcasterSpec
+    | ForceTorqueBroadcasterSpec,
+    Field(discriminator="type"),
+]
 """One of the types of controllers; which, says `type`."""
 
 

@@ -11,6 +11,7 @@ STANDARD = (
     schemas.STRING,
     schemas.TF_MESSAGE,
     schemas.JOINT_STATE,
+    schemas.WRENCH,
     schemas.LOG,
     schemas.MARKER_ARRAY,
     "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",

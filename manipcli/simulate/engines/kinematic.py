@@ -8,6 +8,7 @@ import numpy as np
 
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding
+from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
@@ -52,6 +53,9 @@ class KinematicEngine:
         for follower, driver, multiplier, offset in self._followers:
             position[follower] = multiplier * position[driver] + offset
             velocity[follower] = multiplier * velocity[driver]
+
+    def sense_wrench(self, joint: str) -> Array:
+        return np.zeros(6)
 
     def advance(self) -> None:
         """Nothing moves by itself."""

@@ -14,6 +14,7 @@ import numpy as np
 from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand, Mode
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
+from manipcli.core.geometry import Array
 from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
@@ -23,6 +24,7 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines.pybullet_contacts import NONE, ContactMerger, Pair, Vector, touching_pairs
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
+from manipcli.simulate.engines.pybullet_wrench import WrenchSensor
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
@@ -157,6 +159,8 @@ class PybulletEngine:
         infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
         self._joints = [by_name[name] for name in robot.joint_names]
+        self._sensed = {joint.name: (by_name[joint.name], joint) for joint in robot.joints}
+        self._sensors: list[WrenchSensor] = []
         link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
         for link in link_names:
             p.changeDynamics(
@@ -194,6 +198,7 @@ class PybulletEngine:
         self._version = -1
         self._torques_at: slice | list[int] = []
         self._torque_joints: list[int] = []
+        self._torques: list[float] = []
         self._motors: list[tuple[int, int, Mode]] = []
         self._measures = False
         self._applied = np.zeros(n)
@@ -251,6 +256,8 @@ class PybulletEngine:
                     linear = _minus(linear, _cross(angular, arm))
                 state.body_linear[row] = linear
                 state.body_angular[row] = angular
+        for sensor in self._sensors:
+            sensor.measure()
         return state
 
     def write(self, command: JointCommand) -> None:
@@ -260,10 +267,7 @@ class PybulletEngine:
         if self._torque_joints:
             at = self._torques_at
             self._applied[at] = command.effort[at]
-            p.setJointMotorControlArray(
-                self._robot, self._torque_joints, p.TORQUE_CONTROL, forces=self._applied[at].tolist(),
-                physicsClientId=client,
-            )  # fmt: skip
+            self._torques = self._applied[at].tolist()
         for row, joint, mode in self._motors:
             if mode == "position":
                 p.setJointMotorControl2(
@@ -296,6 +300,7 @@ class PybulletEngine:
         torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
         self._torques_at = slice(None) if len(torques) == len(modes) else torques
         self._torque_joints = [self._joints[k] for k in torques]
+        self._torques = [0.0] * len(torques)
         self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
         self._measures = bool(self._motors) or "brake" in modes
         self._applied[:] = 0.0
@@ -316,9 +321,19 @@ class PybulletEngine:
             physicsClientId=self._client,
         )  # fmt: skip
 
+    def sense_wrench(self, joint: str) -> Array:
+        sensor = WrenchSensor(self._p, self._client, self._robot, *self._sensed[joint])
+        self._sensors.append(sensor)
+        return sensor.values
+
     def advance(self) -> None:
+        p, client, joints = self._p, self._client, self._torque_joints
         for _ in range(self._substeps):
-            self._p.stepSimulation(self._client)
+            if joints:  # Bullet forgets torques after a step
+                p.setJointMotorControlArray(
+                    self._robot, joints, p.TORQUE_CONTROL, forces=self._torques, physicsClientId=client
+                )
+            p.stepSimulation(client)
 
     def touches_changed(self) -> bool:
         points = self._p.getContactPoints(self._robot, physicsClientId=self._client)

@@ -132,12 +132,15 @@ def test_opening_ignores_contact():
     assert hand.q == pytest.approx(np.zeros(4), abs=0.01)
 
 
-def test_effort_of_a_goal_replaces_the_controllers_and_includes_the_feed_forward():
+def test_effort_of_a_goal_replaces_the_controllers():
+    """A finger that is pressed away pushes back with no more than that."""
     controller = make()
     still = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
+    controller.update(0.0, PERIOD, still)
+    pressed = JointState(position=np.array([1.0, -1.0, 1.0, 0.1]), velocity=np.zeros(4), effort=np.zeros(4))
+    assert controller.update(PERIOD, PERIOD, pressed).command == pytest.approx([-2.0, 2.0, -2.0, -0.3])
     controller.send_goal(GripperGoal(target=np.zeros(4), max_effort=np.array([0.1, 0.2, 0.3, 0.4])))
-    output = controller.update(0.0, PERIOD, still, np.array([1.0, -1.0, 0.25, 0.0]))
-    assert output.command.tolist() == [0.1, -0.2, 0.25, 0.0]
+    assert controller.update(2 * PERIOD, PERIOD, pressed).command == pytest.approx([-0.1, 0.2, -0.3, -0.3])
 
 
 def test_a_goal_finds_its_fingers_in_the_goal_first():

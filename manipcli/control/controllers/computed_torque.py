@@ -1,0 +1,163 @@
+"""Follows joint trajectories by inverse dynamics: the robot is made to look like one unit mass a joint.
+
+    controllers:
+      arm_controller:
+        type: computed_torque
+        joints: [joint_1, joint_2]
+        bandwidth: 15 Hz
+        damping_ratio: 1
+        constraints: {goal_time: 2 s, joints: {joint_1: {trajectory: 0.1, goal: 0.02}}}
+
+    u = M(q) (a_r + d (v_r - v) + p (q_r - q)) + C(q, v) v + g(q) + D v_r
+
+so that, where the model is right, every error obeys e'' + d e' + p e = 0, with p = (2 pi f)^2 and d = 4 pi f ratio of
+the bandwidth f [Hz] and the damping ratio; the damping D of the joints themselves is on top of d. Siciliano et al., Robotics: Modelling, Planning and Control (2009), 8.5.2.
+The manager's feed-forward multiplies by the inertia and adds the rest (see `ModelFeedForward`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from manipcli.control.action import GoalHandle
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.gains import strangers
+from manipcli.control.pid import Compat
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.model.condition import Problem
+from manipcli.model.robot import JointLimits, JointType, RobotModel
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
+from manipcli.spec.other_controllers import ComputedTorqueSpec
+
+DEFAULT_BANDWIDTH: Final = 15.0
+"""[Hz]"""
+
+
+class ComputedTorqueController:
+    """A joint trajectory controller whose PID asks for accelerations, which inverse dynamics turns into efforts.
+
+    Goals, tolerances, results and what it holds are those of `JointTrajectoryController`. Its own command is 0: all of
+    the effort comes from the feed-forward, so nothing moves where nobody adds that.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        bandwidth: [Hz] natural frequency of the errors.
+        damping_ratio: of the errors.
+        gains: by joint, instead of the two: p [1/s2], i [1/s3], d [1/s].
+        constraints, limits, types, compat: see `JointTrajectoryController`.
+
+    Raises:
+        InvalidArgument: no or repeated joints, gains of an unknown joint, gains or a bandwidth of zero.
+    """
+
+    role: Role = "follower"
+    senses_contact = False
+    interfaces: tuple[Interface, ...] = ("effort",)
+    feed_forward: FeedForward = "inverse_dynamics"
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        bandwidth: float = DEFAULT_BANDWIDTH,
+        damping_ratio: float = 1.0,
+        gains: Mapping[str, GainsSpec] | None = None,
+        constraints: ConstraintsSpec | None = None,
+        limits: Sequence[JointLimits] | None = None,
+        types: Sequence[JointType] | None = None,
+        compat: Compat | None = None,
+    ) -> None:
+        if not bandwidth > 0.0:
+            raise InvalidArgument(
+                "CTRL180", f"controller '{name}': a bandwidth of {bandwidth} Hz; expected more than 0"
+            )
+        common = error_gains(bandwidth, damping_ratio)
+        self._follower = JointTrajectoryController(
+            name=name,
+            joints=joints,
+            command_interfaces=("effort",),
+            gains={**dict.fromkeys(joints, common), **(gains or {})},
+            constraints=constraints,
+            limits=limits,
+            types=types,
+            compat=compat,
+        )
+        self.name, self.joints = self._follower.name, self._follower.joints
+        followed = self._follower.output
+        self._correction = followed.command
+        self._wanted = np.zeros(len(self.joints))
+        self._output = ControllerOutput(
+            rows=followed.rows,
+            position=followed.position,
+            velocity=followed.velocity,
+            acceleration=followed.acceleration,
+            commands=followed.commands,
+            wanted_acceleration=self._wanted,
+        )
+
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
+        """Accepts a trajectory; see `JointTrajectoryController.send_goal`."""
+        return self._follower.send_goal(trajectory, constraints=constraints)
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        self._follower.deactivate(time, reason)
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
+        self._follower.update(time, period, measured)
+        np.add(self._output.acceleration, self._correction, out=self._wanted)
+        self._correction[:] = 0.0
+        return self._output
+
+
+def error_gains(bandwidth: float, damping_ratio: float) -> GainsSpec:
+    """p = (2 pi f)^2 [1/s2] and d = 4 pi f ratio [1/s] of a bandwidth f [Hz]."""
+    pulse = math.tau * bandwidth
+    return GainsSpec(p=pulse * pulse, d=2.0 * damping_ratio * pulse)
+
+
+def build(name: str, spec: ComputedTorqueSpec, fit: Fit) -> ComputedTorqueController:
+    """The controller of a spec."""
+    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    return ComputedTorqueController(
+        name=name,
+        joints=spec.joints,
+        bandwidth=spec.bandwidth,
+        damping_ratio=spec.damping_ratio,
+        gains=spec.gains,
+        constraints=spec.constraints,
+        limits=[joint.limits for joint in joints],
+        types=[joint.type for joint in joints],
+        compat=fit.compat,
+    )
+
+
+def check(spec: ComputedTorqueSpec, robot: RobotModel) -> Iterator[Problem]:
+    """Gains and tolerances of joints that it does not have, and gains all zero."""
+    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    for joint, gains in spec.gains.items():
+        if joint in spec.joints and gains.p == gains.i == gains.d == 0.0:
+            hint = f"give gains.{joint}.p [1/s2] and d [1/s], or leave them out for those of the bandwidth"
+            message = f"the gains of joint '{joint}' are all zero; nothing would bring it back to its reference"
+            yield Problem(("gains", joint), message, hint, "CTRL103")
+
+
+MEMBER = ControllerMember(name="computed_torque", spec=ComputedTorqueSpec, build=build, check=check)

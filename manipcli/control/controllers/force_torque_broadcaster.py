@@ -1,0 +1,121 @@
+"""Measures the wrench that a link puts on the one that carries it, as a force/torque sensor between the two would.
+
+    controllers:
+      wrist_sensor:
+        type: force_torque_broadcaster
+        link: palm
+
+The force [N] and the torque about the link's origin [N m] are those that the link, with all that hangs on it, exerts on
+its parent, in the link's frame (Gazebo's `child_to_parent`): a link that hangs at rest pulls with its weight. The log
+has it as geometry_msgs/WrenchStamped in /NAME/wrench at every control tick, programs as
+`manager["wrist_sensor"].wrench`. An engine without physics measures zeros.
+
+A joint that is driven is measured with what drives it; what couples a mimic joint is not measured, so it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import did_you_mean
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import Interface, Role
+from manipcli.spec.other_controllers import ForceTorqueBroadcasterSpec
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wrench:
+    """geometry_msgs/WrenchStamped, of the link on its parent, in the frame of `link`.
+
+    Attributes:
+        time: [s] of the update.
+        link: the link.
+        force: (3) [N].
+        torque: (3) [N m] about the link's origin.
+    """
+
+    time: float
+    link: str
+    force: Array
+    torque: Array
+
+
+class ForceTorqueBroadcaster:
+    """Publishes what it is attached to.
+
+    Args:
+        name: of the controller.
+        link: in whose frame it measures.
+        joint: between the link and its parent; fixed or not.
+    """
+
+    role: Role = "other"
+    senses_contact = False
+    joints: tuple[str, ...] = ()
+    interfaces: tuple[Interface, ...] = ()
+    feed_forward: FeedForward = "none"
+
+    def __init__(self, *, name: str, link: str, joint: str) -> None:
+        self.name = name
+        self.link = link
+        self.joint = joint
+        self._output = ControllerOutput.published(6)
+        self._source = np.zeros(6)
+        self._time = 0.0
+
+    def attach(self, source: Array) -> None:
+        """From now on it publishes this (6): force and torque, which the engine keeps up to date."""
+        self._source = source
+
+    @property
+    def output(self) -> ControllerOutput:
+        """`rows` (1, 6): force and torque at the last update."""
+        return self._output
+
+    @property
+    def wrench(self) -> Wrench:
+        """What was measured at the last update; zeros before the first."""
+        values = self._output.rows[0]
+        return Wrench(self._time, self.link, frozen(values[:3]), frozen(values[3:]))
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Nothing ends."""
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s]."""
+        self._time = time
+        self._output.rows[0] = self._source
+        return self._output
+
+
+def build(name: str, spec: ForceTorqueBroadcasterSpec, fit: Fit) -> ForceTorqueBroadcaster:
+    """The controller of a spec."""
+    joint = next(joint.name for joint in fit.robot.joints if joint.child == spec.link)
+    return ForceTorqueBroadcaster(name=name, link=spec.link, joint=joint)
+
+
+def check(spec: ForceTorqueBroadcasterSpec, robot: RobotModel) -> Iterator[Problem]:
+    """A link that is not there, that nothing carries, or whose joint mimics another; joints, of which it has none."""
+    if spec.joints:
+        yield Problem(("joints",), "it reads no joints", "leave `joints` out: `link` says where it measures", "CTRL184")
+    joint = next((joint for joint in robot.joints if joint.child == spec.link), None)
+    if joint is None:
+        carried = [one.child for one in robot.joints]
+        root = spec.link == robot.root
+        message = "is the root: nothing carries it" if root else f"is not in robot '{robot.name}'"
+        hint = did_you_mean(spec.link, carried, kind="links")
+        yield Problem(("link",), f"link '{spec.link}' {message}", hint, "CTRL184")
+    elif joint.mimic is not None:
+        message = f"joint '{joint.name}' above link '{spec.link}' mimics another; what couples the two is not measured"
+        yield Problem(("link",), message, "measure at a link above or below it", "CTRL184")
+
+
+MEMBER = ControllerMember(name="force_torque_broadcaster", spec=ForceTorqueBroadcasterSpec, build=build, check=check)

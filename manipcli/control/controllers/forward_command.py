@@ -1,0 +1,136 @@
+"""Passes commands on: positions, velocities or efforts.
+
+    controllers:
+      arm_controller:
+        type: forward_command
+        joints: [joint_1, joint_2]
+        command_interface: velocity
+
+    manager["arm_controller"].set_command([0.1, 0.0])   # rad/s, from the next update on
+
+Until the first command it holds: the measured position, no velocity, no effort.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import Interface, Role
+from manipcli.spec.other_controllers import ForwardCommandSpec
+
+
+class ForwardCommandController:
+    """Forwards what `set_command` says, on one interface.
+
+    What it reports as its reference: the position that it commands; with velocities, that velocity and the position
+    one period on; with efforts, what is measured.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        interface: what the commands are.
+        feed_forward: what shall be added to efforts.
+
+    Raises:
+        InvalidArgument: no or repeated joints.
+    """
+
+    role: Role = "other"
+    senses_contact = False
+
+    def __init__(
+        self, *, name: str, joints: Sequence[str], interface: Interface, feed_forward: FeedForward = "none"
+    ) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        self.interfaces: tuple[Interface, ...] = (interface,)
+        self.feed_forward: FeedForward = feed_forward
+        n = len(self.joints)
+        if n == 0 or len(set(self.joints)) != n:
+            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
+        self._interface = interface
+        self._output = ControllerOutput.of(n, 1)
+        self._wanted = np.zeros(n)
+        self._told = False
+
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    def set_command(self, values: npt.ArrayLike) -> None:
+        """What is commanded from the next update on, until it is deactivated.
+
+        Args:
+            values: (n) rad, rad/s or N m; m, m/s or N.
+
+        Raises:
+            InvalidArgument: not as many finite numbers as joints; the command before stays.
+        """
+        self._wanted = finite_values(self.name, self.joints, values)
+        self._told = True
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Forgets what it was told; the next update holds."""
+        self._told = False
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
+        output, command = self._output, self._output.command
+        if not self._told:
+            self._told = True
+            self._wanted = np.array(measured.position) if self._interface == "position" else np.zeros(len(self.joints))
+        command[:] = self._wanted
+        if self._interface == "position":
+            output.position[:] = command
+        elif self._interface == "velocity":
+            output.velocity[:] = command
+            np.multiply(command, period, out=output.position)
+            np.add(output.position, measured.position, out=output.position)
+        else:
+            output.position[:] = measured.position
+            output.velocity[:] = measured.velocity
+        return output
+
+
+def finite_values(name: str, joints: Sequence[str], values: npt.ArrayLike) -> Array:
+    """(n) a copy of finite numbers, one a joint.
+
+    Raises:
+        InvalidArgument: they are not.
+    """
+    given = np.array(values, dtype=np.float64)
+    if given.shape != (len(joints),):
+        message = f"controller '{name}': values of shape {given.shape}; expected {len(joints)}, one a joint"
+        raise InvalidArgument("CTRL181", message, hint=f"joints: {', '.join(joints)}")
+    bad = np.flatnonzero(~np.isfinite(given))
+    if len(bad):
+        message = f"controller '{name}': {given[bad[0]]} for joint '{joints[bad[0]]}'; expected a finite number"
+        raise InvalidArgument("CTRL181", message)
+    return given
+
+
+def build(name: str, spec: ForwardCommandSpec, fit: Fit) -> ForwardCommandController:
+    """The controller of a spec."""
+    wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
+    return ForwardCommandController(name=name, joints=spec.joints, interface=spec.command_interface, feed_forward=wants)
+
+
+def check(spec: ForwardCommandSpec, robot: RobotModel) -> Iterator[Problem]:
+    """An effort added where there is none."""
+    if spec.gravity_compensation and spec.command_interface != "effort":
+        message = f"gravity_compensation adds an effort, but its interface is {spec.command_interface}"
+        yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
+
+
+MEMBER = ControllerMember(name="forward_command", spec=ForwardCommandSpec, build=build, check=check)

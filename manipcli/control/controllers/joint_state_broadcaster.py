@@ -1,0 +1,115 @@
+"""Offers measured joints to Python; claims nothing and commands nothing.
+
+    controllers:
+      joint_state_broadcaster:
+        type: joint_state_broadcaster
+        joints: [joint_1, joint_2]
+        state_interfaces: [position, velocity]
+
+The log has all joints in /joint_states, whoever is loaded; this one is for files that name it, and for programs that
+want some joints at a rate of their own: `manager["joint_state_broadcaster"].state`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array, frozen
+from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
+from manipcli.spec.controllers import Interface, Role
+from manipcli.spec.other_controllers import JointStateBroadcasterSpec
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BroadcastState:
+    """sensor_msgs/JointState: (n) copies in the order of `names`; empty arrays for what is not broadcast.
+
+    Attributes:
+        time: [s] of the update.
+        names: (n) of the joints.
+        position, velocity, effort: rad or m, per second, N m or N.
+    """
+
+    time: float
+    names: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+
+
+class JointStateBroadcaster:
+    """Keeps what was measured at its last update.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        state_interfaces: what of them is offered.
+
+    Raises:
+        InvalidArgument: repeated joints, or an interface that is not measured.
+    """
+
+    role: Role = "other"
+    senses_contact = False
+    interfaces: tuple[Interface, ...] = ()
+    feed_forward: FeedForward = "none"
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        state_interfaces: Sequence[Interface] = ("position", "velocity", "effort"),
+    ) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        if len(set(self.joints)) != len(self.joints):
+            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct")
+        if not {*state_interfaces} <= {"position", "velocity", "effort"}:
+            raise InvalidArgument("CTRL183", f"controller '{name}': {list(state_interfaces)} are not all measured")
+        self._wanted = tuple(word in state_interfaces for word in ("position", "velocity", "effort"))
+        self._output = ControllerOutput.published(0)
+        self._seen = np.zeros((3, len(self.joints)))
+        self._time = 0.0
+
+    @property
+    def output(self) -> ControllerOutput:
+        """Nothing: it commands nothing."""
+        return self._output
+
+    @property
+    def state(self) -> BroadcastState:
+        """What was measured at the last update; zeros before the first."""
+        rows = [frozen(row) if wanted else frozen([]) for row, wanted in zip(self._seen, self._wanted, strict=True)]
+        return BroadcastState(self._time, self.joints, *rows)
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Nothing ends."""
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s]."""
+        seen, self._time = self._seen, time
+        seen[0], seen[1], seen[2] = measured.position, measured.velocity, measured.effort
+        return self._output
+
+
+def build(name: str, spec: JointStateBroadcasterSpec, fit: Fit) -> JointStateBroadcaster:
+    """The controller of a spec."""
+    joints = spec.joints or fit.robot.joint_names
+    return JointStateBroadcaster(name=name, joints=joints, state_interfaces=spec.state_interfaces)
+
+
+def check(spec: JointStateBroadcasterSpec, robot: RobotModel) -> Iterator[Problem]:
+    """Nothing: the joints are looked at for every controller."""
+    return iter(())
+
+
+MEMBER = ControllerMember(name="joint_state_broadcaster", spec=JointStateBroadcasterSpec, build=build, check=check)

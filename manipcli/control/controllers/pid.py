@@ -1,0 +1,206 @@
+"""Leads each joint to a reference with a PID of its own.
+
+    controllers:
+      wrist_controller:
+        type: pid
+        joints: [joint_6, joint_7]
+        command_interface: effort
+        reference_and_state_interfaces: [position, velocity]
+        gains: {joint_6: {p: 80, i: 20, d: 3, i_clamp: 5}, joint_7: {p: 30, d: 0.4, feedforward_gain: 0.1}}
+
+    manager["wrist_controller"].set_reference([0.3, -0.2])
+
+u = ff r + PID(r - x, d/dt). With one interface, r is the reference of it, and the PID takes the derivative of the error
+itself: (e - last e) / period, the first one from 0. With two, the PID is given the error of the second, and ff goes
+with the second reference: u = ff r' + PID(r - x, r' - x').
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controllers.forward_command import finite_values
+from manipcli.control.gains import build_pid, strangers
+from manipcli.control.pid import Compat
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.model.condition import Problem
+from manipcli.model.robot import JointType, RobotModel
+from manipcli.spec.controllers import Interface, Role
+from manipcli.spec.other_controllers import PidGainsSpec, PidSpec
+
+
+class PidController:
+    """ROS 2's `pid_controller/PidController`.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        gains: by joint name.
+        interface: what the command is.
+        led: what the reference is of: position, position and velocity, or velocity.
+        types: (n) joint types: the position error of a `continuous` joint is the shortest angle, unless its gains say.
+        hold_first: hold what is measured at activation until a reference is set; otherwise command 0 until then.
+        feed_forward: what shall be added to efforts.
+        compat: order of the PID integration.
+
+    Raises:
+        InvalidArgument: no or repeated joints, gains that are missing, all zero, or of other joints; other `led`.
+    """
+
+    role: Role = "other"
+    senses_contact = False
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        gains: Mapping[str, PidGainsSpec],
+        interface: Interface = "effort",
+        led: Sequence[Interface] = ("position",),
+        types: Sequence[JointType] | None = None,
+        hold_first: bool = True,
+        feed_forward: FeedForward = "none",
+        compat: Compat | None = None,
+    ) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        self.interfaces: tuple[Interface, ...] = (interface,)
+        self.feed_forward: FeedForward = feed_forward
+        n = len(self.joints)
+        if n == 0 or len(set(self.joints)) != n:
+            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
+        if tuple(led) not in (("position",), ("position", "velocity"), ("velocity",)):
+            raise InvalidArgument("CTRL182", f"controller '{name}': {list(led)} cannot be led together")
+        for joint in {*gains} ^ {*self.joints}:
+            kind = "is not one of its joints" if joint in gains else "has no gains"
+            raise InvalidArgument("CTRL102", f"controller '{name}': '{joint}' {kind}")
+        own = tuple(gains[joint] for joint in self.joints)
+        # What is fed forward makes a joint move, too.
+        counted = tuple(g.model_copy(update={"ff_velocity_scale": g.feedforward_gain}) for g in own)
+        self._pid = build_pid(name, self.joints, counted, compat)
+        self._forward = np.array([g.feedforward_gain for g in own])
+        self._saves = np.array([g.save_i_term for g in own])
+        if self._saves.any() != self._saves.all():
+            raise InvalidArgument("CTRL182", f"controller '{name}': save_i_term differs between its joints")
+        endless = [kind == "continuous" for kind in types] if types is not None else [False] * n
+        self._wraps = np.array(
+            [led[0] == "position" and (e if g.angle_wraparound is None else g.angle_wraparound)
+             for g, e in zip(own, endless, strict=True)], dtype=np.float64,
+        )  # fmt: skip
+        self._led_velocity = led[0] == "velocity"
+        self._given_rates = len(led) == 2
+        self._hold_first = hold_first
+
+        self._output = ControllerOutput.of(n, 1)
+        self._error, self._error_rate, self._fed = np.zeros((3, n))
+        self._reference, self._rate = np.zeros((2, n))
+        self._told = self._activated = False
+
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
+        """What the joints shall have from the next update on, until it is deactivated.
+
+        Args:
+            values: (n) rad or m; of velocities, rad/s or m/s.
+            rates: (n) rad/s or m/s, only with positions and velocities; 0 by default.
+
+        Raises:
+            InvalidArgument: not as many finite numbers as joints, or rates that are not led.
+        """
+        if rates is not None and not self._given_rates:
+            message = f"controller '{self.name}' does not lead a second interface"
+            raise InvalidArgument("CTRL182", message, hint="reference_and_state_interfaces: [position, velocity]")
+        reference = finite_values(self.name, self.joints, values)
+        self._rate = np.zeros(len(self.joints)) if rates is None else finite_values(self.name, self.joints, rates)
+        self._reference = reference
+        self._told = True
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Forgets its reference, and the integral unless that is saved."""
+        self._told = self._activated = False
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
+        output = self._output
+        state = measured.velocity if self._led_velocity else measured.position
+        if not self._activated:
+            self._activated = True
+            self._pid.reset(keep_integral=bool(self._saves.all()))
+            if not self._told and self._hold_first:
+                self._told = True
+                self._reference, self._rate = np.array(state), np.zeros(len(self.joints))
+        if not self._told:
+            output.rows[:] = 0.0
+            output.position[:] = measured.position
+            return output
+        error = np.subtract(self._reference, state, out=self._error)
+        if self._wraps.any():
+            turns = np.maximum(np.ceil(np.abs(error) / math.tau - 0.5), 0.0)
+            error -= self._wraps * math.tau * np.copysign(turns, error)
+        rate = np.subtract(self._rate, measured.velocity, out=self._error_rate) if self._given_rates else None
+        command = output.command
+        command[:] = self._pid.update(error, period, rate)
+        np.multiply(self._forward, self._rate if self._given_rates else self._reference, out=self._fed)
+        command += self._fed
+        if self._led_velocity:
+            output.velocity[:] = self._reference
+            np.multiply(self._reference, period, out=output.position)
+            np.add(output.position, measured.position, out=output.position)
+        else:
+            output.position[:] = self._reference
+            output.velocity[:] = self._rate
+        return output
+
+
+def build(name: str, spec: PidSpec, fit: Fit) -> PidController:
+    """The controller of a spec."""
+    return PidController(
+        name=name,
+        joints=spec.joints,
+        gains=spec.gains,
+        interface=spec.command_interface,
+        led=spec.reference_and_state_interfaces,
+        types=[fit.robot.joint(joint).type for joint in spec.joints],
+        hold_first=spec.set_current_state_as_first_setpoint,
+        feed_forward="gravity" if spec.gravity_compensation else "none",
+        compat=fit.compat,
+    )
+
+
+def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
+    """Gains of joints that it does not have, that are missing or all zero; interfaces that cannot be led together."""
+    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    for joint in spec.joints:
+        own = spec.gains.get(joint)
+        if own is None or own.p == own.i == own.d == own.feedforward_gain == 0.0:
+            what = "has no gains" if own is None else "has gains that are all zero"
+            loc = ("gains",) if own is None else ("gains", joint)
+            yield Problem(loc, f"joint '{joint}' {what}; it would not move", f"give gains.{joint}.p", "CTRL103")
+        elif own.ff_velocity_scale:
+            message, hint = "a `pid` controller feeds its reference forward", "say feedforward_gain"
+            yield Problem(("gains", joint, "ff_velocity_scale"), message, hint, "CTRL182")
+    if len({gains.save_i_term for gains in spec.gains.values()}) > 1:
+        yield Problem(("gains",), "save_i_term differs between its joints", "use a controller for each", "CTRL182")
+    if spec.reference_and_state_interfaces not in (("position",), ("position", "velocity"), ("velocity",)):
+        message = f"{list(spec.reference_and_state_interfaces)} cannot be led together"
+        hint = "[position], [position, velocity] or [velocity]"
+        yield Problem(("reference_and_state_interfaces",), message, hint, "CTRL182")
+    if spec.gravity_compensation and spec.command_interface != "effort":
+        message = f"gravity_compensation adds an effort, but its interface is {spec.command_interface}"
+        yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
+
+
+MEMBER = ControllerMember(name="pid", spec=PidSpec, build=build, check=check)

@@ -1,0 +1,160 @@
+"""Force/torque sensors against statics: what hangs on a joint pulls with its weight, wherever it is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from manipcli.control.command import JointCommand, Mode
+from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
+from manipcli.control.controllers.forward_command import ForwardCommandController
+from manipcli.control.manager import ControllerManager
+from manipcli.core.geometry import Array, Transform, cross, frozen
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, JointType, Link, RobotModel, Sphere
+from manipcli.model.scene import Body, Scene
+from manipcli.simulate.engine import Engine, EngineSettings
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.session import Session
+
+STEP = 1e-3
+G = np.array([0.0, 0.0, -9.81])
+MASSES = {"upper": 1.5, "wrist": 0.4, "tray": 0.8}
+COM = {"upper": (0.1, 0.02, -0.03), "wrist": (0.03, 0.0, 0.01), "tray": (0.05, -0.04, 0.02)}
+
+
+def _joint(name: str, kind: JointType, parent: str, child: str, X: Transform, axis: Sequence[float]) -> Joint:
+    return Joint(name, kind, parent, child, X, frozen(axis), JointLimits(-3.0, 3.0, 5.0, 200.0))
+
+
+def robot(driven: JointType) -> RobotModel:
+    """A driven joint, a fixed one that carries a wrist and, on another fixed one, a tray; inertial frames turned."""
+    turned = Transform.of(xyz=(0.0, 0.0, 1.0), rpy=(0.3, -0.4, 0.7))
+    joints = (
+        _joint("drive", driven, "base", "upper", turned, (0.0, 0.6, 0.8)),
+        _joint("mount", "fixed", "upper", "wrist", Transform.of(xyz=(0.3, 0.1, 0.0), rpy=(-0.5, 0.9, 0.2)), (1, 0, 0)),
+        _joint("glue", "fixed", "wrist", "tray", Transform.of(xyz=(0.1, 0.0, 0.0)), (1, 0, 0)),
+    )
+    tensor = frozen([[0.01, 0.002, 0.001], [0.002, 0.012, -0.001], [0.001, -0.001, 0.015]])
+    links = [Link("base", None, (), ())]
+    for name, mass in MASSES.items():
+        links.append(Link(name, Inertial(mass, Transform.of(xyz=COM[name], rpy=(0.2, 0.1, -0.6)), tensor), (), ()))
+    return RobotModel("testbot", "base", tuple(links), joints, (), (), (), Transform.identity(), "")
+
+
+def scene(*bodies: Body) -> Scene:
+    return Scene(bodies, (), frozen(G))
+
+
+def expected(model: RobotModel, q: Array, link: str, extra: Sequence[tuple[float, Array]] = ()) -> Array:
+    """(6) the weight of everything from `link` on, and of `extra` (mass, place in the world), by the lever rule."""
+    kinematics = Kinematics(model)
+    X_WL = kinematics.forward(q, link)
+    weights = list(extra)
+    for name in sorted(model.descendants(link)):
+        X = kinematics.forward(q, name)
+        weights.append((MASSES[name], X.R @ np.array(COM[name]) + X.p))
+    force = sum((m * G for m, _ in weights), np.zeros(3))
+    torque = sum((cross(np.asarray(p - X_WL.p), m * G) for m, p in weights), np.zeros(3))
+    return np.concatenate([X_WL.R.T @ force, X_WL.R.T @ torque])
+
+
+def settled(engine: Engine, sensors: Sequence[Array], mode: Mode, effort: float = 0.0) -> tuple[Array, list[Array]]:
+    """The joint's position and what was measured after a second of holding still."""
+    command = JointCommand(1)
+    command.obey((mode,))
+    command.position[:] = engine.read().position
+    command.effort[:] = effort
+    for _ in range(1000):
+        engine.write(command)
+        engine.advance()
+        state = engine.read()
+    assert abs(state.velocity[0]) < 1e-6
+    return np.array(state.position), [np.array(sensor) for sensor in sensors]
+
+
+@pytest.mark.parametrize("driven", ["revolute", "prismatic", "continuous"])
+@pytest.mark.parametrize("mode", ["position", "velocity", "brake"])
+def test_what_hangs_at_rest_pulls_with_its_weight(driven: JointType, mode: Mode) -> None:
+    model = robot(driven)
+    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, 1, frozen([0.4])))
+    try:
+        sensors = [engine.sense_wrench(joint) for joint in ("drive", "mount", "glue")]
+        assert not np.array(sensors).any()
+        q, measured = settled(engine, sensors, mode)
+    finally:
+        engine.close()
+    for link, wrench in zip(("upper", "wrist", "tray"), measured, strict=True):
+        np.testing.assert_allclose(wrench, expected(model, q, link), atol=2e-3)  # the motor's solver leaves so much
+
+
+def test_an_effort_is_measured_along_its_own_axis() -> None:
+    """The reaction along the axis of a driven joint is the effort that holds it."""
+    model = robot("revolute")
+    q = np.array([0.4])
+    holds = float(Kinematics(model, gravity=tuple(G)).gravity(q)[0])
+    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, 1, frozen(q)))
+    try:
+        sensor = engine.sense_wrench("drive")
+        command = JointCommand(1)
+        command.obey(("effort",))
+        command.effort[:] = holds
+        engine.write(command)
+        engine.advance()
+        engine.read()
+    finally:
+        engine.close()
+    assert sensor[3:] @ np.array([0.0, 0.6, 0.8]) == pytest.approx(-holds, abs=1e-6)
+    np.testing.assert_allclose(sensor, expected(model, q, "upper"), atol=1e-3)
+
+
+def _ball(mass: float, at: Array) -> Body:
+    return Body(
+        name="ball", kind="sphere", geometries=(Geometry(Transform.identity(), Sphere(0.05)),), mass=mass,
+        X_OI=Transform.identity(), inertia=frozen(np.eye(3) * 0.4 * mass * 0.05**2), friction=0.8,
+        rolling_friction=0.01, spinning_friction=0.01, restitution=0.0, fixed=False, X_WO=Transform.of(xyz=at),
+        interior=None, size=frozen([0.1] * 3), centre=frozen(np.zeros(3)),
+    )  # fmt: skip
+
+
+def test_what_lies_on_a_link_is_measured_through_the_contact() -> None:
+    """A ball of 2 kg on a level tray, whose own mass is 0.8 kg."""
+    slide = _joint("drive", "prismatic", "base", "carriage", Transform.of(xyz=(0.0, 0.0, 1.0)), (0.0, 0.0, 1.0))
+    glue = _joint("glue", "fixed", "carriage", "tray", Transform.of(xyz=(0.2, 0.0, 0.0)), (1, 0, 0))
+    plate = Geometry(Transform.identity(), Box((0.4, 0.4, 0.02)))
+    solid = Inertial(0.8, Transform.identity(), frozen(np.eye(3) * 0.01))
+    links = (Link("base", None, (), ()), Link("carriage", solid, (), ()), Link("tray", solid, (plate,), (plate,)))
+    model = RobotModel("lift", "base", links, (slide, glue), (), (), (), Transform.identity(), "")
+    at = np.array([0.25, 0.03, 1.06])
+    engine = ENGINES["pybullet"].open(model, scene(_ball(2.0, at)), EngineSettings(STEP, 1, frozen([0.0])))
+    try:
+        q, (wrench,) = settled(engine, [engine.sense_wrench("glue")], "position")
+        ball = np.array(engine.read().body_position[0])
+    finally:
+        engine.close()
+    arm = ball - np.array([0.2, 0.0, 1.0 + q[0]])
+    np.testing.assert_allclose(wrench[:3], 2.8 * G, atol=2e-2)
+    np.testing.assert_allclose(wrench[3:], cross(arm, 2.0 * G), atol=2e-3)
+
+
+def test_a_session_attaches_the_broadcaster_and_an_ideal_engine_feels_nothing() -> None:
+    model = robot("revolute")
+    for name in ("pybullet", "kinematic"):
+        engine = ENGINES[name].open(model, scene(), EngineSettings(STEP, 1, frozen([0.4])))
+        sensor = ForceTorqueBroadcaster(name="sensor", link="wrist", joint="mount")
+        hold = ForwardCommandController(name="hold", joints=("drive",), interface="position")
+        manager = ControllerManager([hold, sensor], joints=model.joint_names, period=STEP)
+        session = Session(robot=model, scene=scene(), engine=engine, manager=manager, period=STEP)
+        try:
+            for _ in range(300):
+                state = session.tick()
+        finally:
+            engine.close()
+        wrench = sensor.wrench
+        measured = np.concatenate([wrench.force, wrench.torque])
+        assert wrench.time == pytest.approx(0.299)
+        assert (wrench.link, wrench.force.flags.writeable) == ("wrist", False)
+        wanted = np.zeros(6) if name == "kinematic" else expected(model, state.position, "wrist")
+        np.testing.assert_allclose(measured, wanted, atol=5e-3)
