@@ -55,20 +55,22 @@ def render(chart: Chart, *, columns: int, colours: bool) -> tuple[Line, ...]:
     lines: list[Line] = [(Piece(shorten(chart.title, width=max(columns, LEAST))),)]
     for panel in chart.panels:
         lines.append(())
-        lines.append((Piece(shorten(f"{panel.title_with_label}  {_unit(panel)}".rstrip(), width=max(columns, LEAST))),))
+        title = f"{panel.title_with_label}  {_unit(panel)}".rstrip()
+        lines.append((Piece(shorten(title, width=max(columns, LEAST))),))
         shown = panel.curves[:MOST]
+        below = _time_axis(chart, width)
+        if chart.steps and panel is chart.panels[-1]:
+            below += _steps(chart, width)
         if colours or len(shown) == 1:
             lines += _field(chart, shown, span_of(shown), width, HIGH)
-            lines += _legend(panel, shown, marked=colours and len(shown) > 1)
+            lines += below + _legend(panel, shown, marked=colours and len(shown) > 1)
         else:
             for curve in shown:
                 lines += _legend(panel, (curve,), marked=False)
                 lines += _field(chart, (curve,), span_of((curve,)), width, LOW)
+            lines += below
         if len(panel.curves) > MOST:
             lines.append((Piece(f"and {len(panel.curves) - MOST} more curves"),))
-        lines += _time_axis(chart, width)
-    if chart.steps:
-        lines += _steps(chart, width)
     return tuple(lines)
 
 

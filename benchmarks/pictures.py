@@ -1,0 +1,64 @@
+"""What it takes to look at a log: to open it, to draw pictures, films and figures of it.
+
+manipcli run tasks/pour.yaml
+python benchmarks/pictures.py [LOG]
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from manipcli.flow.chart import open_chart
+from manipcli.flow.replay import open_playback
+from manipcli.replay import figure
+from manipcli.replay.film import SIZE, cutting, write_film
+from manipcli.replay.sheet import sheet
+from manipcli.replay.shots import Shots
+
+ROUNDS = 3
+JOINT = "joint_states.position[joint_1]"
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """The median of `ROUNDS` after one that does not count."""
+    found = []
+    for _ in range(ROUNDS + 1):
+        began = time.perf_counter()
+        work()
+        found.append(time.perf_counter() - began)
+    return statistics.median(found[1:])
+
+
+def main() -> None:
+    """Prints the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("log", type=Path, nargs="?", default=Path("runs/pour.mcap"))
+    log = parser.parse_args().log
+    playback = open_playback(log)
+    film = cutting(playback, fps=10.0)
+    rows = [
+        ("open the log for pictures", f"{seconds(lambda: open_playback(log)):.2f} s"),
+        ("read one joint at the full rate", f"{1000.0 * seconds(lambda: open_chart([log], [JOINT])):.0f} ms"),
+        ("sheet of all steps", f"{seconds(lambda: sheet(playback)):.2f} s"),
+    ]
+    chart = open_chart([log], [])
+    rows += [
+        (f"overview as {kind}", f"{seconds(lambda k=kind: figure.render(chart, k)):.2f} s") for kind in figure.KINDS
+    ]
+    with tempfile.TemporaryDirectory() as folder, Shots(playback, size=SIZE) as shots:
+        for ending in ("webp", "gif", "mp4"):
+            path = Path(folder) / f"film.{ending}"
+            took = seconds(lambda path=path: write_film(path, shots, film))
+            rows.append((f"film, {SIZE[0]}x{SIZE[1]}, {ending}", f"{len(film.times) / took:.1f} frames/s"))
+    print("| of a log | takes |\n|---|---|")
+    for row in rows:
+        print(f"| {' | '.join(row)} |")
+
+
+if __name__ == "__main__":
+    main()
