@@ -16,7 +16,7 @@ void main() {
   if (flat_ > 0.5) { shown = vec4(colour.rgb * colour.a, colour.a); return; }
   vec3 m = normalize(gl_FrontFacing ? n : -n), to = normalize(eye - at), sun = normalize(vec3(0.45, 0.25, 0.86));
   float sky = 0.5 + 0.5 * m.z;
-  vec3 light = mix(vec3(0.46, 0.45, 0.46), vec3(0.74, 0.76, 0.79), sky) + 0.40 * max(dot(m, sun), 0.0)
+  vec3 light = mix(vec3(0.44, 0.43, 0.44), vec3(0.68, 0.70, 0.73), sky) + 0.36 * max(dot(m, sun), 0.0)
     + 0.10 * max(dot(m, to), 0.0);
   float shine = 0.16 * pow(max(dot(m, normalize(sun + to)), 0.0), 36.0);
   vec3 seen = min(colour.rgb * light + shine, vec3(1.0));

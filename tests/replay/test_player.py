@@ -1,0 +1,236 @@
+"""The page that plays by itself: complete, harmless, and true to the run; what it draws over the scene."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import time
+import zlib
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel, Sphere, Tool
+from manipcli.model.scene import Body, Scene
+from manipcli.model.state import Contact
+from manipcli.replay.curves_panel import thinned, with_cursor
+from manipcli.replay.drawing import draw
+from manipcli.replay.forces import Forces
+from manipcli.replay.playback import Phase, Playback, PlaybackStep
+from manipcli.replay.player import player_html, player_page
+from manipcli.replay.timeline import Clock
+
+HOSTILE = "</script><script>alert(1)</script><!-- \u2028 & 'x' \"y\""
+
+
+def _body(name: str, shape: Box | Sphere, z: float, *, fixed: bool) -> Body:
+    return Body(
+        name=name, kind="box", geometries=(Geometry(Transform.identity(), shape),), mass=1.0, X_OI=Transform.identity(),
+        inertia=frozen(np.eye(3)), friction=1.0, rolling_friction=0.0, spinning_friction=0.0, restitution=0.0,
+        fixed=fixed, X_WO=Transform.of(xyz=(1.0, 2.0, z)), interior=None, size=frozen([1.0] * 3),
+        centre=frozen([0.0] * 3),
+    )  # fmt: skip
+
+
+def _robot() -> RobotModel:
+    box = (Geometry(Transform.of(xyz=(0.0, 0.0, 0.1)), Box((0.05, 0.05, 0.2))),)
+    links = tuple(Link(name, None, box, box) for name in ("base", "upper", "slide"))
+    limits = JointLimits(-1.0, 1.0, 1.0, 1.0)
+    joints = (
+        Joint("turn", "revolute", "base", "upper", Transform.of(rpy=(0.3, 0, 0)), np.array([0, 0.6, 0.8]), limits),
+        Joint("push", "prismatic", "upper", "slide", Transform.of(xyz=(0, 0, 0.2)), np.array([1.0, 0, 0]), limits),
+    )
+    X_WB, tool = Transform.of(xyz=(1.0, 1.5, 0.5)), Tool("slide", Transform.of(xyz=(0.0, 0.0, 0.1)))
+    return RobotModel("two", "base", links, joints, (), (), (), X_WB, "<robot/>", tool)
+
+
+@pytest.fixture(scope="module")
+def playback() -> Playback:
+    """Half a second: joints move, a ball of radius 0.1 lies on a table whose top is at 0.5."""
+    times = np.arange(26) * 0.02
+    position = np.stack([np.sin(times), 0.2 * times], axis=1)
+    ball = np.tile([1.0, 2.0, 0.6, 0.0, 0.0, 0.0, 1.0], (26, 1, 1))
+    ball[:, 0, 0] += 0.1 * times
+    lies = Contact("ball", "table", 5.0, 0.0)
+    return Playback(
+        name=HOSTILE,
+        robot=_robot(),
+        scene=Scene(
+            (_body("table", Box((2.0, 2.0, 1.0)), 0.0, fixed=True), _body("ball", Sphere(0.1), 0.6, fixed=False)),
+            (),
+            frozen([0.0, 0.0, -9.8]),
+        ),
+        joint_names=("turn", "push"),
+        times=times,
+        position=position,
+        velocity=np.zeros_like(position),
+        effort=np.full_like(position, np.nan),
+        reference=np.stack([np.sin(times) + 0.01, np.full(26, np.nan)], axis=1),
+        body_position=ball[..., :3],
+        body_quat_xyzw=ball[..., 3:],
+        contacts=((lies,),) * 26,
+        steps=(
+            PlaybackStep("one", "move", "one", 0.0, 0.2, "done", phases=(Phase("move", 0.0, 0.2),)),
+            PlaybackStep("b", "wait", HOSTILE, 0.2, 0.5, "failed", text=HOSTILE),
+        ),
+    )
+
+
+class _Elements(HTMLParser):
+    """Every element, its attributes, and the text of each script."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self._in_script = False
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        self._in_script = tag == "script"
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in_script = False
+
+    def handle_data(self, data: str) -> None:
+        if self._in_script:
+            self.scripts.append(data)
+
+
+def _array(reference: list[object], data: str) -> np.ndarray:
+    kind, offset, count = reference
+    dtype = np.dtype({"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[str(kind)])
+    return np.frombuffer(zlib.decompress(base64.b64decode(data)), dtype, int(str(count)), int(str(offset)))
+
+
+def test_the_page_needs_nothing_but_itself(playback: Playback) -> None:
+    page = player_page(playback)
+    for tag, attributes in _Elements(page).found:
+        for name in ("src", "href", "data", "action", "poster", "srcset"):
+            value = attributes.get(name) or ""
+            assert value == "" or value == "data:,", (tag, name, value)
+    assert not re.search(r"https?://|@import|url\(|fetch\(|XMLHttpRequest|WebSocket|import\(", page)
+    assert "default-src 'none'" in page
+    assert player_page(playback) == page  # the same bytes every time
+
+
+def test_no_name_leaves_its_place(playback: Playback) -> None:
+    page = player_page(playback)
+    elements = _Elements(page)
+    assert len(elements.scripts) == 3
+    assert all("alert(1)" not in text for text in elements.scripts[1:])
+    head = json.loads(elements.scripts[0])
+    assert head["name"] == HOSTILE
+    assert [step["label"] for step in head["steps"]] == ["one", HOSTILE]
+    assert head["steps"][1]["text"] == HOSTILE
+
+
+def test_two_of_them_stand_in_one_page(playback: Playback) -> None:
+    elements = _Elements(player_html(playback) + player_html(playback))
+    assert len([1 for tag, attributes in elements.found if attributes.get("class") == "mc-player"]) == 2
+    assert [attributes["id"] for _, attributes in elements.found if "id" in attributes] == []
+
+
+def test_triangles_and_joints_are_those_of_the_run(playback: Playback) -> None:
+    head, data, _ = _Elements(player_page(playback)).scripts
+    told = json.loads(head)
+    np.testing.assert_allclose(_array(told["position"], data).reshape(-1, 2), playback.position, atol=1e-7)
+    np.testing.assert_allclose(_array(told["reference"], data).reshape(-1, 2)[:, 1], playback.position[:, 1], atol=1e-7)
+    drawing = draw(playback.robot, playback.scene)
+    visual = drawing.layer("visual")
+    assert [drawing.frames[one["frame"]] for one in told["drawables"]] == [one.frame for one in visual]
+    for shown, one in zip(told["drawables"], visual, strict=True):
+        surface = told["surfaces"][shown["surface"]]
+        places = _array(surface["places"], data).reshape(-1, 4)[:, :3] / 65535.0
+        at = np.array(surface["low"]) + np.array(surface["size"]) * places
+        np.testing.assert_allclose(at, one.surface.vertices, atol=2.0 / 65535.0)
+        np.testing.assert_array_equal(_array(surface["faces"], data).reshape(-1, 3), one.surface.faces)
+    # The three links look the same: their triangles are there once.
+    assert len(told["surfaces"]) == len(visual) - 2
+    place = {frame: k for k, frame in enumerate(told["order"])}
+    assert sorted(told["order"]) == list(range(len(drawing.frames)))
+    for k, frame in enumerate(told["frames"]):
+        assert place[frame.get("parent", 0)] <= place[k]
+
+
+def test_a_push_is_where_the_shapes_touch_and_towards_what_can_move(playback: Playback) -> None:
+    forces = Forces(playback, playback.poses())
+    for k in (0, 25):
+        (push,) = forces.at(k)
+        np.testing.assert_allclose(push.point, [1.0 + 0.1 * playback.times[k], 2.0, 0.5], atol=1e-6)
+        np.testing.assert_allclose(push.direction, [0.0, 0.0, 1.0], atol=1e-6)
+        tail, tip = forces.arrow(push)
+        np.testing.assert_allclose(tip, push.point)
+        assert tail[2] < tip[2]  # it pushes the ball up, from below
+
+
+def test_a_push_between_robot_and_world_is_on_the_robot(playback: Playback) -> None:
+    stands = Contact("robot/base", "table", 3.0, 0.0)
+    one = replace(playback, contacts=((stands,),) * 26)
+    (push,) = Forces(one, one.poses()).at(0)
+    assert push.direction[2] == pytest.approx(1.0)
+    assert push.point[2] == pytest.approx(0.5)
+
+
+def test_thinned_curves_keep_their_peaks() -> None:
+    rng = np.random.default_rng(3)
+    values = rng.normal(size=(10_003, 2))
+    values[4321, 0], values[77, 1] = 50.0, -60.0
+    times, few = thinned(np.arange(10_003) * 0.001, values, bins=100)
+    assert len(times) == len(few) < 350
+    assert (np.diff(times) > 0).all()
+    np.testing.assert_array_equal(few.max(axis=0), values.max(axis=0))
+    np.testing.assert_array_equal(few.min(axis=0), values.min(axis=0))
+    assert abs(times[np.argmax(few[:, 0])] - 4.321) < 0.11
+    short = np.arange(50.0)
+    assert thinned(short, values[:50], bins=100)[0] is short
+
+
+def test_the_line_of_now_stands_in_curves_without_gaps() -> None:
+    values = np.array([[np.nan, 0.0], [1.0, 2.0], [np.nan, 4.0], [3.0, 6.0]])
+    times, shown, cursor = with_cursor(np.arange(4.0), values, 1.5)
+    assert np.isfinite(shown).all() and np.isfinite(cursor).all()
+    np.testing.assert_array_equal(times, [0.0, 1.0, 1.5, 1.5, 1.5, 2.0, 3.0])
+    np.testing.assert_array_equal(shown[:, 0], [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 3.0])
+    np.testing.assert_array_equal(shown[2:5, 1], [3.0] * 3)
+    assert (times[np.argmax(cursor)], cursor.max(), cursor.min()) == (1.5, 6.0, 0.0)
+
+
+def test_a_clock_passes_stops_at_the_end_and_loops() -> None:
+    told: list[float] = []
+    clock = Clock(0.0, 0.2, told.append)
+    clock.begin()
+    try:
+        clock.speed = 4.0
+        clock.play(True)
+        _until(lambda: not clock.playing)
+        assert clock.time == 0.2
+        _until(lambda: told[-1] == 0.2)
+        assert told == sorted(told)
+        clock.seek(0.05)
+        _until(lambda: told[-1] == 0.05)
+        assert not clock.playing
+        clock.seek(7.0)
+        assert clock.time == 0.2
+        clock.loops = True
+        clock.play(True)  # from the end: from the beginning
+        _until(lambda: sum(after < before for before, after in pairwise(told)) >= 3)
+        assert clock.playing and max(told) <= 0.2
+    finally:
+        clock.stop()
+    count = len(told)
+    time.sleep(0.05)
+    assert len(told) == count
+
+
+def _until(condition: object, seconds: float = 10.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():  # type: ignore[operator]
+        assert time.monotonic() < end
+        time.sleep(0.005)

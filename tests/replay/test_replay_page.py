@@ -1,0 +1,156 @@
+"""Both pages of a run in a real browser: the one that is served and the one that plays by itself."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from manipcli.core.geometry import matrix_from_quat
+from manipcli.flow.replay import open_playback
+from manipcli.pipeline import run_task
+from manipcli.replay.drawing import draw
+from manipcli.replay.playback import Playback
+from manipcli.replay.player import player_page
+from manipcli.replay.replay import Replay
+
+ROOT = Path(__file__).parents[2]
+CLICK = """(text => {
+  const found = [...document.querySelectorAll("label, button")].find(e => e.textContent.includes(text));
+  if (found) found.click();
+  return !!found;
+})"""
+
+
+class Page(Protocol):
+    """What the fixture `browser` gives."""
+
+    requests: list[str]
+    complaints: list[str]
+
+    def open(self, url: str) -> None: ...
+    def evaluate(self, script: str) -> object: ...
+    def wait_for(self, script: str, seconds: float = 30.0) -> None: ...
+    def screenshot(self) -> bytes: ...
+
+
+@pytest.fixture(scope="module")
+def playback(tmp_path_factory: pytest.TempPathFactory) -> Playback:
+    """A pick of examples: a table, a block, contacts."""
+    folder = tmp_path_factory.mktemp("run")
+    task = next((ROOT / "examples" / "02_pick_a_block").glob("task*.yaml"))
+    run_task(task, log=folder / "run.mcap", overrides=["simulation.engine=pybullet"])
+    return open_playback(folder / "run.mcap", package_path=[ROOT / "robots"])
+
+
+def _picture(page: Page) -> np.ndarray:
+    """The left part of the page, which no panel covers and no notice."""
+    return np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)[170:560, :700]
+
+
+def _until(page: Page, condition: Callable[[np.ndarray], bool], seconds: float = 120.0) -> np.ndarray:
+    end = time.monotonic() + seconds
+    while not condition(seen := _picture(page)):
+        assert time.monotonic() < end, "the picture did not become what it should"
+        time.sleep(0.5)
+    return seen
+
+
+def _is_drawn(image: np.ndarray) -> bool:
+    """The table, in a colour that neither the background nor an empty page has."""
+    return bool((np.ptp(image, axis=2) > 50).sum() > 10_000)
+
+
+@pytest.mark.slow
+def test_the_page_of_its_own_plays(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    path = tmp_path / "run.html"
+    path.write_text(player_page(playback), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player').player")
+    player = "document.querySelector('.mc-player').player"
+    start = _until(browser, _is_drawn)
+
+    # The browser's kinematics against ours, on the times of the run and between them.
+    drawing = draw(playback.robot, playback.scene)
+    poses = playback.poses()
+    for k in np.linspace(0, len(playback.times) - 1, 4).astype(int).tolist():
+        found = json.loads(str(browser.evaluate(f"JSON.stringify({player}.poses({float(playback.times[k])!r}))")))
+        np.testing.assert_allclose([one["p"] for one in found], poses.position[k], atol=1e-5)
+        turned = matrix_from_quat([one["q"] for one in found])
+        np.testing.assert_allclose(turned, matrix_from_quat(poses.quat_xyzw[k]), atol=1e-5)
+    assert len(found) == len(drawing.frames)
+
+    labels = [step.label for step in playback.steps]
+    shown = browser.evaluate("[...document.querySelectorAll('.steps button')].map(e => e.innerText).join('\\n')")
+    assert all(label in str(shown) for label in labels)
+    chosen = playback.steps[2]
+    assert browser.evaluate(f"{CLICK}({json.dumps(chosen.label)})")
+    browser.wait_for(f"Math.abs({player}.time - {chosen.start}) < 1e-6")
+    browser.wait_for(f"document.querySelector('.steps .now').innerText.includes({json.dumps(chosen.label)})")
+    _until(browser, lambda image: np.abs(image - start).max(axis=2).mean() > 1.0)
+
+    assert browser.evaluate(f"{player}.seek(0)") is None
+    browser.evaluate("document.querySelector('[data-part=play]').click()")
+    browser.wait_for(f"{player}.time > 0.5")
+    assert browser.evaluate(f"{player}.playing")
+    browser.evaluate("document.querySelector('[data-part=play]').click()")
+    assert not browser.evaluate(f"{player}.playing")
+
+    assert [url for url in browser.requests if url != path.as_uri()] == []
+    assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_the_page_that_is_served_plays(browser: Page, playback: Playback) -> None:
+    with Replay(playback, port=0) as replay:
+        browser.open(replay.url)
+        browser.wait_for("document.querySelector('canvas') !== null")
+        start = _until(browser, _is_drawn)
+        chosen = playback.steps[2]
+        assert browser.evaluate(f"{CLICK}({json.dumps(chosen.label)})")
+        browser.wait_for(f"document.body.innerText.includes('{chosen.start:.2f} of')")
+        assert replay.clock.time == pytest.approx(chosen.start)
+        _until(browser, lambda image: np.abs(image - start).max(axis=2).mean() > 1.0)
+        browser.wait_for("document.querySelector('.uplot canvas') !== null")
+
+        replay.clock.seek(0.0)
+        replay.clock.loops = True
+        assert browser.evaluate(f"{CLICK}('Play')")
+        end = time.monotonic() + 30.0
+        while replay.clock.time < 0.4:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        browser.wait_for("document.body.innerText.includes('Pause')")
+        assert browser.evaluate(f"{CLICK}('Pause')")
+        browser.wait_for("document.body.innerText.includes('Play')")
+        assert not replay.clock.playing
+        assert browser.evaluate(f"{CLICK}('reference')")
+
+        outside = [url for url in browser.requests if not url.split(":", 1)[1].startswith(f"//127.0.0.1:{replay.port}")]
+        assert [url for url in outside if not url.startswith(("data:", "blob:"))] == []
+        assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_a_minute_of_a_log_opens_fast_enough(tmp_path: Path) -> None:
+    task = tmp_path / "long.yaml"
+    task.write_text(
+        f"task: long\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: {ROOT}/controllers/arm7_hand3.yaml\n"
+        "simulation: {engine: kinematic}\nsteps: [{wait: 60 s}]\nexpect: [{duration: {below: 70 s}}]\n"
+    )
+    run_task(task, log=tmp_path / "long.mcap", allow_outside=True)
+    shutil.copytree(ROOT / "robots" / "arm7_hand3", tmp_path / "arm7_hand3")
+    began = time.perf_counter()
+    shown = open_playback(tmp_path / "long.mcap")
+    with Replay(shown, port=0):
+        assert time.perf_counter() - began < 5.0
+    assert shown.end >= 60.0
+    assert shown.notes == ()
