@@ -8,8 +8,6 @@ from pathlib import Path
 
 from manipcli import __version__
 from manipcli.control.manager import ControllerManager
-from manipcli.control.controller import Controller
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.embedding import embeddable
 from manipcli.flow.load import Task
@@ -21,7 +19,7 @@ from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.scene_file import scene_from_json, scene_to_json
-from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.channels import ControllerChannel
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
@@ -61,7 +59,7 @@ def open_log(
         path,
         robot=task.robot,
         scene=task.scene,
-        controllers=[recorded(controller) for controller in manager.controllers],
+        controllers=[ControllerChannel(c.name, c.joints, c.interfaces) for c in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
             (TASK, YAML, resolved(_portable_task(task.spec)).encode()),
@@ -90,22 +88,6 @@ def open_log(
 
 def mesh_files(task: Task) -> dict[str, Path]:
     """Every mesh file of the robot and of the scene, by its URI, sorted."""
-def recorded(controller: Controller) -> Recorded:
-    """What the log keeps of a controller."""
-    if isinstance(controller, ForceTorqueBroadcaster):
-        return WrenchChannel(controller.name, controller.link)
-    if not controller.interfaces:
-        return None
-    return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
-
-
-def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:
-    """By which it takes goals."""
-    if is_follower(controller):
-        return "follow_joint_trajectory"
-    return "gripper_cmd" if is_hand(controller) else ""
-
-
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
     geometries += [g for body in task.scene.bodies for g in body.geometries]
     meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
