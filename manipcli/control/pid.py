@@ -210,9 +210,11 @@ class Pid:
             self._integrate_first(errors[0], dt)
         if self._has_i:
             command += self._term
-        unsaturated = self._unsaturated
-        unsaturated[:] = command
+        unsaturated = command
         if self._clamps_u:
+            if self._any_tracks or self._any_conditional:
+                unsaturated = self._unsaturated
+                unsaturated[:] = command
             np.maximum(command, self._u_min, out=command)
             np.minimum(command, self._u_max, out=command)
         if self._has_i and not self._ros1:

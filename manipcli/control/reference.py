@@ -55,11 +55,12 @@ class Reference:
         ended: whether the course is over.
         end: [s] of the course's clock.
         speed: of the clock.
+        scales: whether `rescale` changes it; a stop does not wait.
     """
 
     __slots__ = (
         "_before", "_course", "_dt", "_end_row", "_feeds", "_following", "_last", "_law", "_since", "_table", "end",
-        "ended", "feed", "moving", "rows", "speed",
+        "ended", "feed", "moving", "rows", "scales", "speed",
     )  # fmt: skip
 
     def __init__(self, rows: Array, feeds: Feeds) -> None:
@@ -74,21 +75,22 @@ class Reference:
         self.rows[:] = course.rest[:EFFORT]
         feed = self._law.of(course.rest[None])
         self.feed = None if feed is None else feed[0]
-        self.moving, self.ended = False, True
+        self.moving, self.ended, self.scales = False, True, False
         self.end, self._before, self._since, self.speed = 0.0, 0.0, time, 1.0
         self._table = np.zeros((0, EFFORT, self.rows.shape[1]))
         self._feeds: Array | None = None
         self._dt, self._last, self._end_row = math.inf, -1, 0
 
-    def follow(self, course: Course, samples: Array, *, time: float, period: float, speed: float = 1.0) -> None:
-        """From now on `course`, which begins at `time`; `samples` are its `ticks` of `period`."""
+    def follow(self, course: Course, samples: Array, *, time: float, period: float, speed: float | None = None) -> None:
+        """From now on `course`, which begins at `time`; `samples` are its `ticks` of `period`; `speed` None: 1."""
         self._course = course
+        self.scales = speed is not None
         self.end = course.end
-        self._before, self._since, self.speed = 0.0, time, speed
+        self._before, self._since, self.speed = 0.0, time, 1.0 if speed is None else speed
         self._table = samples[:, :EFFORT]
         self._feeds = self._law.of(np.concatenate([samples[1:], samples[-1:]]))
         self._dt = period
-        self._last = len(samples) - 1 if speed == 1.0 else -1
+        self._last = len(samples) - 1 if self.speed == 1.0 else -1
         self._end_row = len(samples) - 2
         self.feed = None
         self.moving, self.ended = True, False
@@ -99,7 +101,7 @@ class Reference:
 
     def rescale(self, speed: float, *, time: float) -> None:
         """From `time` on the clock runs so fast; the samples made beforehand are of no use any more."""
-        if self.moving and speed != self.speed:
+        if self.moving and self.scales and speed != self.speed:
             self._before, self._since = self.clock(time), time
             self._last = -1
             self.speed = speed

@@ -1,0 +1,379 @@
+"""The joint trajectory controller: what it does at each tick, and what it is told in between.
+
+The laws are told in `controllers/joint_trajectory.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from manipcli.control.action import ErrorCode, Feedback, GoalHandle
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState
+from manipcli.control.course import POSITION, Course
+from manipcli.control.followed_goal import FollowedGoal, Then
+from manipcli.control.gains import build_pid, joint_gains
+from manipcli.control.pid import Compat
+from manipcli.control.reference import Feeds, Reference
+from manipcli.control.tolerances import Tolerances
+from manipcli.control.trajectory_goal import (
+    Acceptance,
+    JointFacts,
+    TrajectoryGoal,
+    check_goal,
+    outside_limits,
+    shortest,
+)
+from manipcli.control.trajectory_interfaces import controlled_by_error, refused
+from manipcli.control.transitions import Transitions
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array
+from manipcli.model.robot import JointLimits, JointType
+from manipcli.plan.trajectory import Interpolation, JointTrajectory
+from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
+
+
+class JointTrajectoryController:
+    """One goal at a time; holds in between.
+
+    Activation (the first update) holds the measured position. A goal begins at the first update after `send_goal`, or
+    at its start time, from the reference (so that the command makes no step), and is sampled once for every tick of
+    that update's period. Until then, and for joints that it leaves out, the path before is followed. It succeeds at or
+    after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when a joint leaves
+    its path tolerance before (and at its first tick), or is outside its goal tolerance `goal_time` after the end. After
+    a success the last position is held at rest; after a cancel the reference is brought to rest and held.
+
+    Where ROS 1 and 2 differ, `compat` chooses; without it the safer of the two is done:
+
+        ==========================  =======================  ======================  ========================
+        what                        None                     ros1                    ros2
+        ==========================  =======================  ======================  ========================
+        integral of the PID         acts one step late       acts at once            acts one step late
+        after an abort              holds what is measured   the trajectory goes on  holds what is measured
+        goal_time: 0                no grace                 no grace                waits without end
+        a goal that is preempted    aborted, INVALID_GOAL    canceled                aborted, INVALID_GOAL
+        ==========================  =======================  ======================  ========================
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        command_interfaces: what the command is, one row each: [position], [position, velocity], [position, velocity,
+            acceleration], [velocity], [effort] or [position, effort].
+        state_interfaces: what may be read: [position], and velocity, and acceleration; needed by the commands.
+        gains: by joint name; needed for [effort] and [velocity].
+        constraints: tolerances; those of `stopped_velocity_tolerance` 0 and absent ones are not enforced.
+        limits: (n) of the joints; waypoints beyond them are refused.
+        types: (n) joint types: a `continuous` joint takes the shortest way and its error is the shortest angle.
+        feed_forward: what the manager shall add to the effort.
+        compat: see above.
+        allow_partial_joints_goal: accept goals that leave joints out.
+        allow_nonzero_velocity_at_trajectory_end: accept goals that do not end at rest; they are held at rest.
+        allow_integration_in_goal_trajectories: accept points of velocities or accelerations alone.
+        allow_trajectory_replacement: a new goal goes on from the path before; else that ends where the reference is.
+        interpolation_method: `splines`, or `none` to step to the next point.
+        interpolate_from_desired_state: goals start from the reference; else from what is measured.
+        cmd_timeout: [s] after its end a goal that is not reached is aborted, and its last position held; 0: never.
+            Only where it is above goal_time.
+        stop_trajectory_duration: [s] a cancel stops in this time; 0: by deceleration.
+        speed_scaling: seconds of a trajectory a second, at first.
+        positions_upsampling: points of positions alone get the velocities of a spline.
+
+    Attributes:
+        notes: what of this was not taken as it was said, and why.
+
+    Raises:
+        InvalidArgument: no or repeated joints, interfaces that do not go together, gains of an unknown joint, gains all
+            zero where they are needed, a negative time or speed.
+    """
+
+    role: Role = "follower"
+    senses_contact = False
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        command_interfaces: Sequence[Interface] = ("effort",),
+        state_interfaces: Sequence[str] = ("position", "velocity"),
+        gains: Mapping[str, GainsSpec] | None = None,
+        constraints: ConstraintsSpec | None = None,
+        limits: Sequence[JointLimits] | None = None,
+        types: Sequence[JointType] | None = None,
+        feed_forward: FeedForward = "none",
+        compat: Compat | None = None,
+        allow_partial_joints_goal: bool = False,
+        allow_nonzero_velocity_at_trajectory_end: bool = False,
+        allow_integration_in_goal_trajectories: bool = False,
+        allow_trajectory_replacement: bool = True,
+        interpolation_method: Interpolation = "splines",
+        interpolate_from_desired_state: bool = True,
+        cmd_timeout: float = 0.0,
+        stop_trajectory_duration: float = 0.0,
+        speed_scaling: float = 1.0,
+        positions_upsampling: bool = False,
+    ) -> None:
+        self.name = name
+        self.joints = tuple(joints)
+        self.interfaces: tuple[Interface, ...] = tuple(command_interfaces)
+        self.feed_forward: FeedForward = feed_forward
+        n = len(self.joints)
+        if n == 0 or len(set(self.joints)) != n:
+            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
+        wrong = refused(command_interfaces, state_interfaces)
+        if wrong is not None:
+            raise InvalidArgument("CTRL107", f"controller '{name}': {wrong[0]}", hint=wrong[1])
+        for what, value in (
+            ("cmd_timeout", cmd_timeout), ("stop_trajectory_duration", stop_trajectory_duration),
+            ("speed_scaling", speed_scaling),
+        ):  # fmt: skip
+            if not 0.0 <= value < np.inf:
+                raise InvalidArgument("CTRL108", f"controller '{name}': {what} is {value}; expected 0 or more")
+        self._compat = compat
+        self._facts = JointFacts.of(self.joints, limits, types)
+        self._constraints = constraints if constraints is not None else ConstraintsSpec()
+        self._accepted = Acceptance(
+            allow_partial_joints_goal, allow_nonzero_velocity_at_trajectory_end,
+            allow_integration_in_goal_trajectories, efforts="effort" in self.interfaces,
+        )  # fmt: skip
+        deceleration, together = Transitions.decelerations(self._facts, self._constraints)
+        self._transitions = Transitions(
+            facts=self._facts, replaces=allow_trajectory_replacement, from_desired=interpolate_from_desired_state,
+            smooth=positions_upsampling, interpolation=interpolation_method, stop_duration=stop_trajectory_duration,
+            deceleration=deceleration, together=together,
+        )  # fmt: skip
+        self._default_tolerances = Tolerances.of(self.joints, self._constraints, patient=compat == "ros2")
+        self.notes: tuple[str, ...] = ()
+        self._timeout = cmd_timeout if cmd_timeout > self._constraints.goal_time else np.inf
+        if 0.0 < cmd_timeout <= self._constraints.goal_time:
+            self.notes = (f"cmd_timeout {cmd_timeout:g} s is not above goal_time and counts for nothing",)
+
+        by_error = controlled_by_error(self.interfaces)
+        chosen = joint_gains(name, self.joints, gains or {})
+        self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
+        scale = np.array([each.ff_velocity_scale for each in chosen])
+        self._output = ControllerOutput.of(n, len(self.interfaces))
+        rows = self._output.rows
+        self._reference = Reference(rows[:3], Feeds(self.interfaces, velocity_scale=scale if by_error else None))
+        self._desired, self._desired_velocity = rows[0], rows[1]
+        self._commands, self._command = rows[3:], rows[3]
+        self._errors: Array = np.zeros((2, n))
+        self._error, self._error_rate = self._errors
+        self._all_errors = self._errors.reshape(-1)
+        self._wraps = self._facts.wraps
+        self._initial_speed = self._speed = speed_scaling
+        self._clear(time=0.0)
+
+    def _clear(self, *, time: float) -> None:
+        self._activated = False
+        self._waiting = True
+        self._time = time
+        self._goal: FollowedGoal | None = None
+        self._next: FollowedGoal | None = None
+        self._stop = False
+        self._bound = np.inf
+        self._speed = self._initial_speed
+
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Those of the goal, waiting or active, or else of the controller."""
+        goal = self._next or self._goal
+        return self._default_tolerances if goal is None else goal.tolerances
+
+    @property
+    def speed_scaling(self) -> float:
+        """Seconds of a trajectory a second."""
+        return self._speed
+
+    def set_speed_scaling(self, speed: float) -> bool:
+        """From the last update on, trajectories run so fast: 0 pauses, 1 is as they say. Stops are not scaled.
+
+        The reference's velocity is multiplied by `speed`, its acceleration by the square.
+
+        Returns:
+            False for a negative speed or none, which changes nothing.
+        """
+        if not 0.0 <= speed < np.inf:
+            return False
+        self._speed = float(speed)
+        self._reference.rescale(self._speed, time=self._time)
+        return True
+
+    def send_goal(
+        self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
+    ) -> GoalHandle:
+        """Accepts a trajectory, whose joints may stand in another order; a goal before it ends.
+
+        Args:
+            trajectory: starts at the next update; a `TrajectoryGoal` may say another time, and tolerances.
+            constraints: for this goal, instead of the controller's.
+
+        Raises:
+            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities over the limits,
+                points that differ in what they give or give what is not allowed, a velocity at the end, an end in the
+                past. The goal before then goes on.
+        """
+        goal = trajectory if isinstance(trajectory, TrajectoryGoal) else TrajectoryGoal(trajectory)
+        ordered = check_goal(goal, self._facts, self._accepted, self._time)
+        tolerances = self._default_tolerances
+        if constraints is not None:
+            tolerances = Tolerances.of(self.joints, constraints, patient=self._compat == "ros2")
+        tolerances, notes = tolerances.adopted(goal, self.joints)
+        for old in (self._goal, self._next):
+            if old is not None:
+                old.preempt(self._time, as_canceled=self._compat == "ros1")
+        self._goal = None
+        handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes)
+        self._next = FollowedGoal(self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout)
+        self._waiting = True
+        return handle
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        for goal in (self._goal, self._next):
+            if goal is not None:
+                goal.handle.end("aborted", ErrorCode.INVALID_GOAL, reason, time)
+        self._clear(time=time)
+
+    def update(
+        self,
+        time: float,
+        period: float,
+        measured: JointState,
+        *,
+        contact_force: Array | None = None,
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s]; see the module for the laws.
+
+        Args:
+            measured: (n) of the controller's joints.
+            contact_force: ignored.
+
+        Raises:
+            InvalidArgument: a period that is not above 0; a measured position or velocity that is not finite.
+        """
+        self._time = time
+        reference = self._reference
+        if reference.moving:
+            reference.advance(time, period)
+        if self._waiting:
+            self._turn(time, period, measured)
+        np.subtract(self._desired, measured.position, self._error)
+        np.subtract(self._desired_velocity, measured.velocity, self._error_rate)
+        if self._wraps:
+            shortest(self._error, self._facts)
+        # The largest error is at most their norm: nearly always this alone answers. NaN and infinity do not pass.
+        if not self._all_errors.dot(self._all_errors) < self._bound:
+            self._look_closer(time, measured)
+        if reference.ended and self._goal is not None:
+            late = reference.clock(time) - reference.end
+            self._go_on(self._goal.judge_end(self._errors, time, late), time, measured)
+        feed = reference.feed
+        if self._pid is None:
+            self._commands[:] = feed
+        else:
+            self._pid.apply(self._errors, period, self._command)
+            if feed is not None:
+                self._command += feed[0]
+        return self._output
+
+    def _compare(self, measured: JointState) -> None:
+        """Writes the errors of this tick, once more."""
+        np.subtract(self._desired, measured.position, out=self._error)
+        np.subtract(self._desired_velocity, measured.velocity, out=self._error_rate)
+        if self._wraps:
+            shortest(self._error, self._facts)
+
+    def _look_closer(self, time: float, measured: JointState) -> None:
+        """Ends the goal where a joint left its path tolerance."""
+        for what, values in (("position", measured.position), ("velocity", measured.velocity)):
+            if not np.isfinite(values).all():
+                j = int(np.flatnonzero(~np.isfinite(values))[0])
+                message = f"the measured {what} of joint '{self.joints[j]}' is {values[j]} at t = {time:.3f} s"
+                raise InvalidArgument("CTRL106", f"controller '{self.name}': {message}")
+        goal, reference = self._goal, self._reference
+        if goal is None:
+            return
+        clock = reference.clock(time)
+        if not reference.ended or clock <= 0.0:
+            then = goal.judge_path(self._errors, self._output.acceleration, measured.velocity, time, clock)
+            self._go_on(then, time, measured)
+
+    def _go_on(self, then: Then, time: float, measured: JointState) -> None:
+        if then == "go on":
+            return
+        self._forget()
+        if then == "hold measured" and self._compat != "ros1":
+            self._reference.hold(Course.hold(measured.position), time=time)
+            self._compare(measured)
+
+    def _forget(self) -> None:
+        self._goal = None
+        self._bound = np.inf
+
+    def _turn(self, time: float, period: float, measured: JointState) -> None:
+        """What was asked for since the last update: to be active, a new goal, to stop."""
+        if not 0.0 < period < np.inf:
+            raise InvalidArgument("CTRL105", f"controller '{self.name}': a period of {period} s; expected more than 0")
+        self._waiting = False
+        if not self._activated:
+            self._activated = True
+            if self._pid is not None:
+                self._pid.reset()
+            self._reference.hold(Course.hold(measured.position), time=time)
+        if self._next is not None:
+            self._begin(self._next, time, period, measured)
+        elif self._stop:
+            self._come_to_rest(time, period)
+        self._next, self._stop = None, False
+
+    def _begin(self, goal: FollowedGoal, time: float, period: float, measured: JointState) -> None:
+        """The waiting goal becomes the active one: its references for every tick, once."""
+        reference = self._reference
+        later = goal.start_time - time if goal.start_time > 0.0 else 0.0
+        at = (measured.position, measured.velocity)
+        course = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
+        samples = course.ticks(period)
+        broken = outside_limits(samples[:, POSITION], self._facts, period)
+        if broken is not None:
+            goal.handle.end("aborted", ErrorCode.INVALID_GOAL, f"controller '{self.name}': {broken}", time)
+            self._come_to_rest(time, period)
+            return
+        goal.begin = later
+        self._goal = goal
+        self._bound = goal.tolerances.bound
+        reference.follow(course, samples, time=time, period=period, speed=self._speed)
+        reference.advance(time, period)
+
+    def _come_to_rest(self, time: float, period: float) -> None:
+        course = self._transitions.to_rest(self._reference, time)
+        if course.parts:
+            self._reference.follow(course, course.ticks(period), time=time, period=period)
+            self._reference.advance(time, period)
+        else:
+            self._reference.hold(course, time=time)
+
+    def _cancel(self, handle: GoalHandle) -> None:
+        handle.end("canceled", ErrorCode.SUCCESSFUL, f"canceled at t = {self._time:.3f} s", self._time)
+        if self._next is not None and self._next.handle is handle:
+            self._next = None
+        if self._goal is not None and self._goal.handle is handle:
+            self._forget()
+            self._stop = self._waiting = True
+
+    def _feedback(self) -> Feedback:
+        goal, clock = self._goal, self._reference.clock(self._time)
+        return Feedback(
+            elapsed=clock if goal is None else clock - goal.begin,
+            desired=self._desired.copy(),
+            actual=self._desired - self._error,
+            index=0 if goal is None else goal.next_point(clock),
+            desired_velocity=self._desired_velocity.copy(),
+            actual_velocity=self._desired_velocity - self._error_rate,
+        )
