@@ -1,0 +1,185 @@
+"""What a log is opened with, and a log judged from nothing but itself."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from manipcli import __version__
+from manipcli.control.controller import Controller
+from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.flow.embedding import embeddable
+from manipcli.flow.load import Task
+from manipcli.flow.plan import Plan
+from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.judge import judge
+from manipcli.judge.verdict import Verdict
+from manipcli.model.build_robot import rebuild_robot
+from manipcli.model.robot import Mesh, RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.scene_file import scene_from_json, scene_to_json
+from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.messages import portable_name
+from manipcli.record.reading import open_recording
+from manipcli.record.recorder import Recorder
+from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec.load import load_robot_text, load_task_text
+from manipcli.spec.resolved import resolved
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
+
+RUNS = Path("runs")
+"""Where logs go that nobody asked elsewhere, below the working directory."""
+TASK, ROBOT, CONTROLLERS, URDF = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf"
+SCENE, PLAN = "scene.json", "plan.json"
+YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/json", "application/octet-stream"
+
+
+def default_log(task: Task) -> Path:
+    """`runs/<task>.mcap`; the folder is made."""
+    try:
+        RUNS.mkdir(exist_ok=True)
+    except OSError as error:
+        message = f"cannot make the folder '{RUNS}' for the log: {error.strerror}"
+        raise InvalidInput([Finding("LOG101", message, hint="say where it goes with --log PATH")]) from error
+    return RUNS / f"{task.name}.mcap"
+
+
+def open_log(
+    task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool = False
+) -> Recorder:
+    """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
+    meshes, too, so that the log is shown without any package."""
+    engine = ENGINES[task.spec.simulation.engine]
+    meshes = mesh_files(task)
+    embedded = embeddable(meshes) if embed_meshes else ()
+    return Recorder(
+        path,
+        robot=task.robot,
+        scene=task.scene,
+        controllers=[recorded(controller) for controller in manager.controllers],
+        period=task.spec.simulation.control_period,
+        attachments=[
+            (TASK, YAML, resolved(_portable_task(task.spec)).encode()),
+            (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
+            (CONTROLLERS, YAML, resolved(task.controllers).encode()),
+            (URDF, XML, task.robot.urdf.encode()),
+            (SCENE, JSON, scene_to_json(task.scene)),
+            (PLAN, JSON, plan.to_json()),
+            *((one.attachment, BYTES, one.path.read_bytes()) for one in embedded),
+        ],
+        metadata={
+            "run": {
+                "task": task.name,
+                "seed": str(task.spec.simulation.seed),
+                "engine": engine.name,
+                "physics": engine.physics,
+                "period": repr(task.spec.simulation.control_period),
+            },
+            "versions": {"manipcli": __version__, engine.name: engine.version()},
+            "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
+            **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),
+        },
+        overwrite=overwrite,
+    )
+
+
+def mesh_files(task: Task) -> dict[str, Path]:
+    """Every mesh file of the robot and of the scene, by its URI, sorted."""
+    geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
+    geometries += [g for body in task.scene.bodies for g in body.geometries]
+    meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
+    return {uri: meshes[uri] for uri in sorted(meshes)}
+
+
+def _portable_task(spec: TaskSpec) -> TaskSpec:
+    """The task without folders of this machine in the names of its files."""
+    scene = dict(spec.scene)
+    for name, body in scene.items():
+        for key, shape in (("mesh", body.mesh), ("urdf", body.urdf)):
+            if shape is not None:
+                portable = shape.model_copy(update={"file": portable_name(shape.file)})
+                scene[name] = body.model_copy(update={key: portable})
+    files = {"robot": portable_name(spec.robot), "controllers": portable_name(spec.controllers)}
+    return spec.model_copy(update={"scene": scene, **files})
+
+
+def _portable_robot(spec: RobotSpec) -> RobotSpec:
+    """The robot file without folders of this machine in the names of its descriptions."""
+    attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
+    return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
+
+
+def recorded(controller: Controller) -> Recorded:
+    """What the log keeps of a controller."""
+    if isinstance(controller, ForceTorqueBroadcaster):
+        return WrenchChannel(controller.name, controller.link)
+    if not controller.interfaces:
+        return None
+    return ControllerChannel(controller.name, controller.joints, controller.interfaces)
+
+
+def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
+    """The verdict on a log, from the log alone; a verdict stored in it is not looked at.
+
+    Args:
+        path: the log, or what a killed run left.
+        being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
+
+    Raises:
+        InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
+    """
+    return judge_recording(open_recording(path, being_written=being_written), path)
+
+
+def judge_recording(recording: Recording, path: Path) -> Verdict:
+    """The verdict on a log that is open already; see `judge_log`."""
+    task = load_task_text(_attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
+    expect = [(expected.name, expected.body) for expected in task.expect]
+    scene = recorded_scene(recording, path)
+    return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
+
+
+def recorded_robot(recording: Recording, path: Path) -> RobotModel:
+    """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
+    spec = load_robot_text(_attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
+    return rebuild_robot(spec, _attached(recording, path, URDF))
+
+
+def recorded_scene(recording: Recording, path: Path) -> Scene:
+    """The scene of a log at its start; no mesh is looked for."""
+    try:
+        return scene_from_json(_attached(recording, path, SCENE))
+    except ValueError as error:
+        message = f"{path.name}/{SCENE}: this is not the scene of a log"
+        raise InvalidInput([Finding("LOG103", message)]) from error
+
+
+def _attached(recording: Recording, path: Path, name: str) -> bytes:
+    """
+    Raises:
+        InvalidInput: the log has no such attachment.
+    """
+    if name not in recording.attachments:
+        message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
+        raise InvalidInput([Finding("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")])
+    return recording.attachments[name]
+
+
+def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:
+    """What the log keeps of its own verdict, for whoever looks at it without manipcli."""
+    return {
+        "verdict": {
+            "verdict": verdict.verdict,
+            "text": verdict.text,
+            **{f"step.{step.id}": step.outcome for step in verdict.steps},
+            **{
+                f"expect.{e.name}": f"{e.outcome} {'' if e.margin is None else repr(e.margin)} {e.unit}".strip()
+                for e in verdict.expectations
+            },
+        }
+    }
