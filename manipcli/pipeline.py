@@ -15,6 +15,7 @@ from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
+from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
@@ -79,6 +80,9 @@ def run_task(
         timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
         return RunReport(refused(task, refusal), wall_time=took, real_time_factor=0.0, log=None, timing=timing)
     planned = time.perf_counter()
+    doubts = gain_findings(task, plan)
+    if progress is not None and doubts:
+        progress.warned(doubts)
 
     manager = controllers(task, plan.planner.kinematics)
     where = log if log is not None else default_log(task)

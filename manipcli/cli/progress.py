@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, Self
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
+from manipcli.core.errors import Finding
 from manipcli.judge.verdict import StepOutcome
-from manipcli.report.text import describe_step
+from manipcli.report.text import describe, describe_step
 
 REDRAW_PERIOD = 0.1
 """[s] of wall time between two drawings: more would be felt at 1000 ticks a second, and seen by nobody."""
@@ -42,6 +44,12 @@ class StepProgress:
     def __exit__(self, *raised: object) -> None:
         if self._live:
             console.redraw("")
+
+    def warned(self, findings: Sequence[Finding]) -> None:
+        """What may go wrong, known before the first step."""
+        for finding in findings:
+            if not self._quiet:
+                console.talk(describe(finding))
 
     def step_started(self, step: NamedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""

@@ -300,8 +300,8 @@ class JointLimiter:
         self._joints = tuple(joints) if joints is not None else tuple(map(str, range(n)))
         self._limits = _Limits.of(limits)
         self._version, self._dt = -1, 0.0
-        nobody: tuple[Mode, ...] = ("brake",) * n
-        self._efforts = _Efforts(nobody, self._limits)
+        brake: Mode = "brake"
+        self._efforts = _Efforts((brake,) * n, self._limits)
         self._others: list[_Positions | _Velocities] = []
         self._cut = False
         self.saturations = np.zeros(n, dtype=np.int64)

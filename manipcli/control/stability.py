@@ -1,53 +1,198 @@
-"""Whether damping gains are stable at the control step.
+"""Whether sampled loops are stable: the poles of a robot's joints, held by gains, from one control tick to the next.
 
-A joint of reflected inertia I under the torque -kd v, held for a step h, ends at v (1 - kd h / I): above 1 the velocity
-changes its sign each step, at 2 and above it grows without bound.
+Between two ticks the effort is held, and the joints move as M a = u - B v (gravity and what depends on the velocity
+squared left out), in `substeps` steps of semi-implicit Euler as engines take them, v += s a, q += s v, or exactly where
+`substeps` is None. At each tick
+
+    u = -P q - D v - I z,    z the integral of q, a sum over the ticks
+
+or the u of `delay` ticks before. With x = (q, v, z, and the efforts on their way) x' = A x, and the loop is stable when
+all eigenvalues of A lie inside of the unit circle (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 4.3).
+
+For one joint without damping, delay and integral, exactly: kd > kp h / 2 and kd < 2 I / h. In one step of Euler: kd > 0
+and kd < 2 I / h - kp h / 2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 
-RINGING = 1.0
-UNSTABLE = 2.0
+MARGINAL: Final = 1e-9
+"""A pole this near to the unit circle counts as outside of it."""
+MOST_GAIN: Final = 1e6
+"""A margin that is larger is not looked for."""
 
 
-def damping_margin(damping: npt.ArrayLike, *, step: float, inertia: npt.ArrayLike) -> Array:
-    """kd h / I, shape (n): unstable from 2, ringing above 1.
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """Joints (n) held by gains.
 
-    Args:
-        damping: (n) N m s/rad or N s/m; the joint's own damping is not counted.
-        step: [s] how long a command is held.
-        inertia: (n) kg m2 or kg, the smallest that the joint has over its motion.
+    Attributes:
+        mass: (n, n) kg m2 or kg, symmetric.
+        p, d, i: (n) gains.
+        damping: (n) of the joints themselves, viscous.
+        period: [s] between two commands.
+        substeps: physics steps in a period; None: exact.
+        delay: (n) int, periods from a command to its effort.
     """
-    return np.asarray(np.asarray(damping, dtype=np.float64) * step / np.asarray(inertia, dtype=np.float64))
+
+    mass: Array
+    p: Array
+    d: Array
+    i: Array
+    damping: Array
+    period: float
+    substeps: int | None = 1
+    delay: npt.NDArray[np.int64] | None = None
+
+    @classmethod
+    def of_joint(
+        cls,
+        inertia: float,
+        *,
+        p: float,
+        d: float,
+        i: float = 0.0,
+        damping: float = 0.0,
+        period: float,
+        substeps: int | None = 1,
+        delay: int = 0,
+    ) -> Loop:
+        """One joint alone."""
+        return cls(
+            mass=np.array([[inertia]]),
+            p=np.array([p]),
+            d=np.array([d]),
+            i=np.array([i]),
+            damping=np.array([damping]),
+            period=period,
+            substeps=substeps,
+            delay=np.array([delay]),
+        )
+
+    def scaled(self, gains: float) -> Loop:
+        """With all gains this many times as large."""
+        return replace(self, p=self.p * gains, d=self.d * gains, i=self.i * gains)
 
 
-def damping_findings(
-    joints: Sequence[str], damping: npt.ArrayLike, *, step: float, inertia: npt.ArrayLike
-) -> tuple[Finding, ...]:
-    """Warnings for the joints (n) whose margin is above 1, with the gain at which it would be 1."""
-    inertias = np.broadcast_to(np.asarray(inertia, dtype=np.float64), (len(joints),))
-    gains = np.broadcast_to(np.asarray(damping, dtype=np.float64), (len(joints),))
-    findings = []
-    for name, kd, mass, margin in zip(
-        joints, gains, inertias, damping_margin(gains, step=step, inertia=inertias), strict=True
-    ):
-        if margin > RINGING:
-            state = "is unstable" if margin >= UNSTABLE else "rings"
-            findings.append(
-                Finding(
-                    code="CTRL150",
-                    message=f"{name}: kd {kd:.4g} {state} at a step of {step * 1e3:.4g} ms: "
-                    f"kd x step / inertia is {margin:.3g}, inertia {mass:.3g}",
-                    hint=f"stay below kd {RINGING * mass / step:.3g} (unstable from {UNSTABLE * mass / step:.3g})",
-                    severity="warning",
-                )
-            )
-    return tuple(findings)
+def transition(loop: Loop) -> Array:
+    """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z only where there is an integral gain."""
+    n = len(loop.p)
+    F, G = _held(loop)
+    has_i = bool(loop.i.any())
+    delay = np.zeros(n, dtype=np.int64) if loop.delay is None else loop.delay
+    most = int(delay.max(initial=0))
+    rows = (2 + has_i + most) * n
+    A = np.zeros((rows, rows))
+    q, v, z = slice(0, n), slice(n, 2 * n), slice(2 * n, 3 * n)
+    first = (2 + has_i) * n  # of the efforts on their way, the latest command first
+    law = np.zeros((n, rows))
+    law[:, q], law[:, v] = -np.diag(loop.p), -np.diag(loop.d)
+    if has_i:
+        law[:, z] = -np.diag(loop.i)
+        A[z, z], A[z, q] = np.eye(n), loop.period * np.eye(n)
+    applied = law.copy()
+    for k in range(n):
+        if delay[k]:
+            applied[k] = 0.0
+            applied[k, first + (delay[k] - 1) * n + k] = 1.0
+    A[: 2 * n] = G @ applied
+    A[: 2 * n, : 2 * n] += F
+    if most:
+        A[first : first + n] = law
+        for step in range(1, most):
+            A[first + step * n : first + (step + 1) * n, first + (step - 1) * n : first + step * n] = np.eye(n)
+    return A
+
+
+def _held(loop: Loop) -> tuple[Array, Array]:
+    """(F, G): (q, v)' = F (q, v) + G u while u is held for a period."""
+    n = len(loop.p)
+    inverse = np.linalg.inv(loop.mass)
+    drag = inverse * loop.damping  # M^-1 B
+    eye = np.eye(n)
+    if loop.substeps is None:
+        from scipy.linalg import expm
+
+        flow = np.zeros((3 * n, 3 * n))
+        flow[:n, n : 2 * n] = eye
+        flow[n : 2 * n, n : 2 * n], flow[n : 2 * n, 2 * n :] = -drag, inverse
+        whole = expm(flow * loop.period)
+        return whole[: 2 * n, : 2 * n], whole[: 2 * n, 2 * n :]
+    s = loop.period / loop.substeps
+    v_v, v_u = eye - s * drag, s * inverse
+    step = np.block([[eye, s * v_v], [np.zeros((n, n)), v_v]])
+    push = np.vstack([s * v_u, v_u])
+    F, G = np.eye(2 * n), np.zeros((2 * n, n))
+    for _ in range(loop.substeps):
+        F, G = step @ F, step @ G + push
+    return F, G
+
+
+def poles(loop: Loop) -> npt.NDArray[np.complex128]:
+    """Eigenvalues of the loop from tick to tick, the largest first."""
+    found = np.linalg.eigvals(transition(loop))
+    return np.asarray(found[np.argsort(-np.abs(found))], dtype=np.complex128)
+
+
+def is_stable(loop: Loop) -> bool:
+    """Whether all poles lie inside of the unit circle. A joint without a p gain has one at 1, which is left out."""
+    found = poles(loop)
+    resting = int(np.count_nonzero(loop.p == 0.0))
+    if resting:
+        found = found[np.argsort(np.abs(found - 1.0))][resting:]
+    return bool(np.all(np.abs(found) < 1.0 - MARGINAL))
+
+
+def gain_margin(loop: Loop) -> float:
+    """By what factor all gains may grow until the loop is unstable; 0 where it is already, at most `MOST_GAIN`."""
+    if not is_stable(loop):
+        return 0.0
+    return _boundary(loop.scaled)
+
+
+def largest_damping(loop: Loop) -> float:
+    """The largest d of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    unit = math.sqrt(float(loop.p[0]) * float(loop.mass[0, 0])) or float(loop.mass[0, 0]) / loop.period
+
+    def with_d(factor: float) -> Loop:
+        return replace(loop, d=np.array([unit * factor]))
+
+    # From the stable middle upwards: with little damping a loop may be unstable, too.
+    for start in 10.0 ** np.arange(-3.0, 4.0, 0.25):
+        if is_stable(with_d(float(start))):
+            return unit * _boundary(with_d, start=float(start))
+    return 0.0
+
+
+def largest_stiffness(loop: Loop) -> float:
+    """The largest p of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    unit = float(loop.mass[0, 0]) / loop.period**2
+
+    def with_p(factor: float) -> Loop:
+        return replace(loop, p=np.array([unit * factor]))
+
+    start = 1e-9
+    return unit * _boundary(with_p, start=start) if is_stable(with_p(start)) else 0.0
+
+
+def _boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
+    """The first factor above `start`, where the loop is stable, at which it is not; within 0.1 %."""
+    low = start
+    while is_stable(loop_at(2.0 * low)):
+        low *= 2.0
+        if low > MOST_GAIN:
+            return low
+    high = 2.0 * low
+    while high - low > 1e-3 * low:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_stable(loop_at(middle)) else (low, middle)
+    return low

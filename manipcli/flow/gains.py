@@ -1,38 +1,261 @@
-"""Are the gains of a task stable at its control period? Looked at where the robot starts."""
+"""Can the gains of a task work? Asked before anything moves, over the postures in which the robot will be.
+
+Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
+and whether there is effort enough for gravity, for the planned motions, and for standing near where it is to stand.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from manipcli.control.stability import damping_findings
-from manipcli.core.errors import Finding
+from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.stability import Loop, is_stable, largest_damping, largest_stiffness, poles, transition
+from manipcli.core.errors import Finding, NotPlannable, Place
+from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
-from manipcli.flow.plan import start_position
+from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.model.kinematics import Kinematics
-from manipcli.spec.controllers import GripperSpec, JointTrajectorySpec
+from manipcli.model.robot import RobotModel
+from manipcli.plan.hand import with_mimics
+from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
+
+PER_MOTION: Final = 12
+"""Postures that are looked at of each planned motion."""
+TOGETHER: Final = 16
+"""Postures at which all loops are looked at together: those in which they are tightest."""
+RINGING: Final = 0.5
+"""A pole that changes its sign every tick may be no larger."""
+SWINGING: Final = 0.1
+"""The least damping ratio that passes without a word: it overshoots by 73 %."""
 
 
-def gain_findings(task: Task) -> tuple[Finding, ...]:
-    """A warning for every joint whose damping gain rings or diverges at the control period.
+@dataclass(frozen=True, slots=True)
+class Held:
+    """One joint on an effort loop: its controller, gains, tolerance, and whether its weight is carried for it."""
 
-    The inertia that a joint's own torque meets while all others are free is 1 / (M^-1)_jj, the smallest it can be in
-    this posture.
+    controller: str
+    joint: str
+    gains: GainsSpec
+    ticks: int
+    weightless: bool
+    tolerance: float | None
+
+
+def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
+    """Warnings about gains, with the number that would do, each at its place in the controllers file.
+
+    Args:
+        task: what is run.
+        plan: of it; None: it is planned here, and where that is not possible the named poses are looked at.
     """
-    robot, file = task.robot, task.controllers_file
-    inertia = 1.0 / np.diag(np.linalg.inv(Kinematics(robot).mass_matrix(start_position(task))))
-    findings: list[Finding] = []
+    robot = task.robot
+    loops = _loops(task)
+    if not loops:
+        return ()
+    kinematics = Kinematics(robot, gravity=task.scene.gravity)
+    if plan is None:
+        try:
+            plan = plan_task(task)
+        except NotPlannable:
+            plan = None  # planning tells why
+    postures = (
+        _planned(task, plan) if plan is not None else Postures.at_rest(named_postures(robot, start_position(task)))
+    )
+    load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
+    return tuple(_findings(task, loops, load, planned=plan is not None))
+
+
+def named_postures(robot: RobotModel, start: Array) -> Array:
+    """(T, n): the start, and every named pose with the other joints as at the start."""
+    rows = [start]
+    for pose in robot.poses:
+        q = np.array(start)
+        q[robot.indices(pose.joints)] = pose.positions
+        rows.append(with_mimics(robot, q))
+    return np.array(rows)
+
+
+def _planned(task: Task, plan: Plan) -> Postures:
+    """Samples of all motions, the other joints as they are then."""
+    robot = task.robot
+    rows: list[tuple[Array, Array, Array]] = []
+    here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
+    rows.append((here, still, still))
+    for step in plan.steps:
+        for motion in step.plan.motions:
+            if motion.trajectory is None:
+                continue
+            at = robot.indices(motion.trajectory.names)
+            times = np.linspace(0.0, float(motion.trajectory.times[-1]), PER_MOTION)
+            for q, v, a in zip(*motion.trajectory.sample(times), strict=True):
+                row = (here.copy(), still.copy(), still.copy())
+                row[0][at], row[1][at], row[2][at] = q, v, a
+                rows.append((with_mimics(robot, row[0]), row[1], row[2]))
+            here = rows[-1][0]
+        here = np.array(step.plan.end.position)
+        rows.append((here, still, still))
+    position, velocity, acceleration = (np.array(part) for part in zip(*rows, strict=True))
+    return Postures(position, velocity, acceleration)
+
+
+def _loops(task: Task) -> tuple[Held, ...]:
+    period = task.spec.simulation.control_period
+    found = []
     for name, spec in task.controllers.controllers.items():
-        if "effort" not in spec.interfaces or not isinstance(spec, JointTrajectorySpec | GripperSpec):
+        if not spec.active or spec.interfaces != ("effort",) or not isinstance(spec, JointTrajectorySpec | GripperSpec):
             continue
-        for joint, gains in spec.gains.items():
-            place = file.place("controllers", name, "gains", joint)
-            found = damping_findings(
-                [joint],
-                [gains.d],
-                step=task.spec.simulation.control_period,
-                inertia=inertia[robot.indices((joint,))],
-            )
-            findings += [replace(finding, place=place) for finding in found]
-    return tuple(findings)
+        ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
+        weightless = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
+        for joint in spec.joints:
+            tolerance = None
+            if isinstance(spec, JointTrajectorySpec) and joint in spec.constraints.joints:
+                own = spec.constraints.joints[joint]
+                tolerance = own.goal if own.goal is not None else own.trajectory
+            gains = spec.gains.get(joint, GainsSpec())
+            found.append(Held(name, joint, gains, ticks, weightless, tolerance))
+    return tuple(found)
+
+
+def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -> Iterator[Finding]:
+    where = f"{'planned' if planned else 'named'} postures"
+    simulation = task.spec.simulation
+    substeps = round(simulation.control_period / simulation.step)
+    own, held = load.own_inertia, load.held_inertia
+    sound = True
+    for k, loop in enumerate(loops):
+        place = _place(task, loop)
+        gains = loop.gains
+        least, most = float(own[:, k].min()), float(held[:, k].max())
+        one = Loop.of_joint(
+            least,
+            p=gains.p,
+            d=gains.d,
+            i=gains.i,
+            damping=float(load.damping[k]),
+            period=loop.ticks * simulation.control_period,
+            substeps=loop.ticks * substeps,
+            delay=math.ceil(load.latency[k] / loop.ticks),
+        )
+        unit = _inertia_unit(task.robot, loop.joint)
+        finding = _unstable(loop.joint, one, f"inertia {least:.2g} {unit}, the least over the {where}")
+        if finding is None:
+            slow = Loop.of_joint(most, p=gains.p, d=gains.d, damping=float(load.damping[k]), period=one.period)
+            finding = _swings(loop.joint, slow, f"inertia {most:.2g} {unit}, the most over the {where}")
+        else:
+            sound = False
+        if finding is not None:
+            code, message, hint = finding
+            yield Finding(code, message, place, hint, "warning")
+        yield from _weak(task, loop, load, k, planned=planned)
+    if sound:
+        yield from _together(task, loops, load, substeps)
+
+
+def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
+    """(code, message, hint) of a loop that diverges or rings."""
+    p, d, i = float(loop.p[0]), float(loop.d[0]), float(loop.i[0])
+    at = f"at {1e3 * loop.period:.3g} ms"
+    if loop.delay is not None and loop.delay[0]:
+        at += f" and {int(loop.delay[0])} ticks of latency"
+    if is_stable(loop):
+        worst = next((z for z in poles(loop) if z.real < 0.0 and abs(z.imag) < 1e-9), 0.0)
+        if abs(worst) <= RINGING:
+            return None
+        most = largest_damping(loop)
+        message = f"{joint}: kd {d:.3g} rings {at}: its effort turns round every tick; {inertia}"
+        return "CTRL150", message, f"it is unstable above {most:.2g}; stay below half of that"
+    most = largest_damping(loop)
+    if 0.0 < most < d:
+        message = f"{joint}: kd {d:.3g} is unstable above {most:.2g} {at}; {inertia}"
+        return "CTRL150", message, f"stay below half of that: kd {0.5 * most:.2g}"
+    if most == 0.0:
+        stiffest = largest_stiffness(loop)
+        if 0.0 < stiffest < p:
+            message = f"{joint}: kp {p:.3g} with kd {d:.3g} is unstable above {stiffest:.2g} {at}; {inertia}"
+            return "CTRL150", message, "lower kp; `manipcli tune` proposes both"
+        message = f"{joint}: kp {p:.3g}, ki {i:.3g} and kd {d:.3g} are unstable {at}; {inertia}"
+        return "CTRL150", message, "`manipcli tune` proposes gains that are not"
+    need = 1.4 * math.sqrt(p * float(loop.mass[0, 0]))
+    message = f"{joint}: kp {p:.3g}{f', ki {i:.3g}' if i else ''} with kd {d:.3g} swings up {at}; {inertia}"
+    return "CTRL150", message, f"kd {min(need, 0.5 * most):.2g} damps it"
+
+
+def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
+    p, d = float(loop.p[0]), float(loop.d[0])
+    slowest = poles(loop)[0]
+    if abs(slowest.imag) < 1e-12 or not 0.0 < abs(slowest) < 1.0:
+        return None
+    s = complex(np.log(slowest)) / loop.period
+    ratio = -s.real / abs(s)
+    if ratio >= SWINGING:
+        return None
+    message = (
+        f"{joint}: kp {p:.3g} with kd {d:.3g} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
+        f"{ratio:.2g}; {inertia}"
+    )
+    return "CTRL153", message, f"kd {1.4 * math.sqrt(p * float(loop.mass[0, 0])):.2g} gives 0.7"
+
+
+def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Finding]:
+    """Too little effort for gravity or for the plan; too little stiffness to stand where it shall."""
+    unit = "N" if task.robot.joint(loop.joint).type == "prismatic" else "N m"
+    weight, needed = (float(np.abs(part[:, k]).max()) for part in (load.gravity, load.needed))
+    limit = float(load.effort[k])
+    place = _place(task, loop)
+    if weight > limit:
+        message = (
+            f"{loop.joint}: holding against gravity takes up to {weight:.3g} {unit}, its limit is {limit:.3g} {unit}"
+        )
+        yield Finding("CTRL155", message, place, "it will sink; check the effort limit and the masses", "warning")
+    elif planned and needed > limit:
+        message = f"{loop.joint}: the planned motions need up to {needed:.3g} {unit}, its limit is {limit:.3g} {unit}"
+        hint = f"it will lag behind; lower its acceleration limit (robot file, limits.{loop.joint}.acceleration)"
+        yield Finding("CTRL155", message, place, hint, "warning")
+    if loop.weightless or loop.gains.i > 0.0 or loop.gains.p == 0.0 or loop.tolerance is None:
+        return
+    sag = min(weight, limit) / loop.gains.p
+    if sag > loop.tolerance:
+        length = "m" if unit == "N" else "rad"
+        message = (
+            f"{loop.joint}: kp {loop.gains.p:.3g} gives way by {sag:.2g} {length} under {weight:.3g} {unit} of gravity"
+            f", more than its tolerance of {loop.tolerance:.2g} {length}"
+        )
+        yield Finding("CTRL156", message, place, "gravity_compensation: true carries it, or an i gain", "warning")
+
+
+def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Finding]:
+    """Loops that are stable one by one and not together, at the postures in which they are tightest."""
+    period = task.spec.simulation.control_period
+    if any(loop.ticks != 1 for loop in loops):
+        return  # of different rates there is no one tick to look at
+    p, d, i = (np.array([getattr(loop.gains, key) for loop in loops]) for key in ("p", "d", "i"))
+    tightest = np.argsort(-(d / load.own_inertia).max(axis=1))[:TOGETHER]
+    for posture in tightest:
+        latency = np.array(load.latency)
+        whole = Loop(load.mass[posture], p, d, i, load.damping, period, substeps, latency)
+        if is_stable(whole):
+            continue
+        values, vectors = np.linalg.eig(transition(whole))
+        n = len(loops)
+        share = np.abs(vectors[n : 2 * n, int(np.argmax(np.abs(values)))])
+        worst = [k for k in np.argsort(-share) if share[k] > 0.2 * share.max()][:3]
+        names = ", ".join(f"{loops[k].joint} (kd {d[k]:.3g})" for k in worst)
+        message = (
+            f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at "
+            f"{abs(values[np.argmax(np.abs(values))]):.3g}, mostly of {names}"
+        )
+        yield Finding("CTRL154", message, _place(task, loops[worst[0]]), "lower their kd", "warning")
+        return
+
+
+def _place(task: Task, loop: Held) -> Place:
+    return task.controllers_file.place("controllers", loop.controller, "gains", loop.joint)
+
+
+def _inertia_unit(robot: RobotModel, joint: str) -> str:
+    return "kg" if robot.joint(joint).type == "prismatic" else "kg m2"

@@ -1,24 +1,117 @@
-"""The margin of damping against the recurrence that it stands for."""
+"""Poles of sampled loops against the loops themselves, tick by tick, and against the closed forms."""
+
+from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from manipcli.control.stability import damping_findings, damping_margin
+from manipcli.control.stability import Loop, gain_margin, is_stable, largest_damping, largest_stiffness, poles
 
-
-@pytest.mark.parametrize(("kd", "settles"), [(1.5, True), (3.9, True), (4.1, False)])
-def test_a_margin_of_two_is_where_the_sampled_damper_stops_settling(kd, settles):
-    inertia, step = 0.002, 0.001
-    v = 1.0
-    for _ in range(2000):
-        v += step * (-kd * v) / inertia
-    assert (abs(v) < 1.0) == settles == bool(damping_margin(kd, step=step, inertia=inertia) < 2.0)
+H = 1e-3
 
 
-def test_findings_name_the_joint_and_the_gain_to_stay_below():
-    findings = damping_findings(["a", "b", "c"], [1.0, 3.0, 5.0], step=1e-3, inertia=np.full(3, 0.0021))
-    assert [f.message.split(":")[0] for f in findings] == ["b", "c"]
-    assert "rings" in findings[0].message
-    assert "unstable" in findings[1].message
-    assert "below kd 2.1" in findings[1].hint
-    assert {f.severity for f in findings} == {"warning"}
+def remains(loop: Loop, *, ticks: int = 3000) -> float:
+    """How much of a push is left after so many ticks: the recurrence as an engine and a PID go through it."""
+    inertia, b = float(loop.mass[0, 0]), float(loop.damping[0])
+    q, v, z = 1.0, 0.0, 0.0
+    waiting = [0.0] * (int(loop.delay[0]) if loop.delay is not None else 0)
+    step = loop.period / (loop.substeps or 400)
+    for _ in range(ticks):
+        waiting.append(-float(loop.p[0]) * q - float(loop.d[0]) * v - float(loop.i[0]) * z)
+        z += loop.period * q
+        u = waiting.pop(0)
+        for _ in range(loop.substeps or 400):
+            v += step * (u - b * v) / inertia
+            q += step * v
+        if abs(q) > 1e6:
+            return math.inf
+    return max(abs(q), abs(v) * loop.period)
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("delay", [0, 1, 2])
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_the_largest_damping_is_where_the_loop_itself_stops_to_settle(
+    substeps: int, delay: int, damping: float
+) -> None:
+    def loop(d: float) -> Loop:
+        return Loop.of_joint(
+            0.002, p=40.0, d=d, i=100.0, damping=damping, period=H, substeps=substeps, delay=delay
+        )  # fmt: skip
+
+    bound = largest_damping(loop(0.1))
+    assert is_stable(loop(0.98 * bound))
+    assert remains(loop(0.98 * bound)) < 1e-3
+    assert not is_stable(loop(1.02 * bound))
+    assert remains(loop(1.02 * bound)) > 1.0
+
+
+def test_held_exactly_the_bounds_are_those_of_the_double_integrator() -> None:
+    """kp h / 2 < kd < 2 I / h."""
+    inertia, p = 0.004, 800.0
+    loop = Loop.of_joint(inertia, p=p, d=1.0, period=H, substeps=None)
+    assert largest_damping(loop) == pytest.approx(2 * inertia / H, rel=2e-3)
+    assert largest_stiffness(loop) == pytest.approx(2 * 1.0 / H, rel=2e-3)
+    assert remains(Loop.of_joint(inertia, p=p, d=0.9 * p * H / 2, period=H, substeps=None), ticks=300) > 1.0
+
+
+@given(
+    st.floats(1e-4, 10.0), st.floats(0.1, 30.0), st.floats(0.1, 3.0), st.floats(1e-4, 1e-2)
+)  # fmt: skip
+@settings(max_examples=15, deadline=None)
+def test_in_one_step_of_euler_the_bound_is_two_inertias_less_half_the_stiffness(
+    inertia: float, hertz: float, ratio: float, period: float
+) -> None:
+    """kd < 2 I / h - kp h / 2."""
+    w = math.tau * hertz
+    p, d = inertia * w * w, 2 * ratio * inertia * w
+    bound = 2 * inertia / period - p * period / 2
+    loop = Loop.of_joint(inertia, p=p, d=d, period=period)
+    assert is_stable(loop) == (d < bound)
+    if bound > 0.0:
+        assert largest_damping(loop) == pytest.approx(bound, rel=5e-3)
+
+
+def test_many_small_steps_come_to_the_exact_ones() -> None:
+    one = Loop.of_joint(0.01, p=50.0, d=1.0, i=30.0, damping=0.2, period=5e-3, substeps=None, delay=1)
+    many = Loop.of_joint(0.01, p=50.0, d=1.0, i=30.0, damping=0.2, period=5e-3, substeps=4000, delay=1)
+    np.testing.assert_allclose(poles(many), poles(one), atol=1e-4)
+
+
+def test_slow_poles_are_those_of_the_continuous_loop() -> None:
+    """ln z / h = -zeta w -+ i w sqrt(1 - zeta^2)."""
+    w, ratio = 30.0, 0.5
+    found = np.log(poles(Loop.of_joint(2.0, p=2.0 * w * w, d=2 * ratio * 2.0 * w, period=1e-4, substeps=None))) / 1e-4
+    np.testing.assert_allclose(np.sort(found.imag), [-w * math.sqrt(0.75), w * math.sqrt(0.75)], rtol=2e-3)
+    np.testing.assert_allclose(found.real, -ratio * w, rtol=2e-3)
+
+
+def test_two_loops_that_are_stable_alone_may_not_be_together() -> None:
+    """Two joints that share a light link: the inertia that both push at once is less than each meets alone."""
+    mass = np.array([[1.0, 0.9], [0.9, 1.0]]) * 0.01
+    d = np.array([3.0, 3.0])
+    own = 1.0 / np.diag(np.linalg.inv(mass))
+    for k in range(2):
+        assert is_stable(Loop.of_joint(float(own[k]), p=1.0, d=float(d[k]), period=H))
+    whole = Loop(mass, np.ones(2), d, np.zeros(2), np.zeros(2), H)
+    assert not is_stable(whole)
+    # The softest way to push: (1, -1) / sqrt 2, of the inertia 0.01 (1 - 0.9).
+    assert largest_eigenvalue(mass, d) * H > 2.0
+    margin = gain_margin(Loop(mass, np.ones(2), d / 4, np.zeros(2), np.zeros(2), H))
+    assert margin == pytest.approx(2.0 / (largest_eigenvalue(mass, d / 4) * H), rel=0.01)
+
+
+def largest_eigenvalue(mass: np.ndarray, d: np.ndarray) -> float:
+    return float(np.max(np.linalg.eigvals(np.linalg.solve(mass, np.diag(d))).real))
+
+
+def test_a_loop_without_stiffness_is_stable_where_its_velocity_is() -> None:
+    for d, stable in ((3.9, True), (4.1, False)):
+        loop = Loop.of_joint(0.002, p=0.0, d=d, period=H)
+        assert is_stable(loop) is stable
+    assert gain_margin(Loop.of_joint(0.002, p=0.0, d=1.0, period=H)) == pytest.approx(4.0, rel=2e-3)
+    assert not is_stable(Loop.of_joint(0.002, p=1.0, d=0.0, period=H))  # swings for ever

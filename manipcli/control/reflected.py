@@ -1,0 +1,109 @@
+"""What the loops of a robot's joints meet: inertia as seen from the joints that are driven, gravity, and friction.
+
+A joint that follows another (mimic) moves with it, q = S q_driven + constant, and what is held (braked, or on another
+interface) does not move at all: M_driven = S^T M S, g_driven = S^T g.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.control.actuation import motor_effort_limits
+from manipcli.core.geometry import Array
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Postures:
+    """Where a robot is to be and how it moves there, arrays (T, n) of all its joints; at rest, two of them are 0."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @classmethod
+    def at_rest(cls, position: Array) -> Postures:
+        """(T, n) positions, without motion."""
+        return cls(position, np.zeros_like(position), np.zeros_like(position))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Load:
+    """What k driven joints meet in T postures.
+
+    Attributes:
+        joints: (k) names.
+        mass: (T, k, k) kg m2 or kg.
+        gravity: (T, k) N m or N that hold them at rest.
+        needed: (T, k) N m or N that the motion needs, gravity included.
+        damping: (k) of the joints, viscous [N m s/rad or N s/m].
+        effort: (k) the most that joints and actuators give; infinite where nothing says.
+        latency: (k) control ticks from a command to its effort.
+    """
+
+    joints: tuple[str, ...]
+    mass: Array
+    gravity: Array
+    needed: Array
+    damping: Array
+    effort: Array
+    latency: tuple[int, ...]
+
+    @property
+    def own_inertia(self) -> Array:
+        """(T, k) 1 / (M^-1)_jj: what a joint's own effort moves while the others are free; the least it can be."""
+        return np.asarray(1.0 / np.diagonal(np.linalg.inv(self.mass), axis1=1, axis2=2))
+
+    @property
+    def held_inertia(self) -> Array:
+        """(T, k) M_jj: what it moves while the others stand; the most it can be."""
+        return np.asarray(np.diagonal(self.mass, axis1=1, axis2=2))
+
+
+def load_of(robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], postures: Postures) -> Load:
+    """What these joints, independent ones, meet when no other is driven."""
+    S = _drives(robot, joints)
+    moving = robot.moving_joints
+    damping = np.array([joint.damping for joint in moving])
+    mass, gravity, needed = [], [], []
+    for q, v, a in zip(postures.position, postures.velocity, postures.acceleration, strict=True):
+        mass.append(S.T @ kinematics.mass_matrix(q) @ S)
+        gravity.append(S.T @ kinematics.gravity(q))
+        needed.append(S.T @ (kinematics.inverse_dynamics(q, v, a) + damping * v))
+    columns = robot.indices(tuple(joints))
+    latency = {actuator.name: actuator.latency for actuator in robot.actuators}
+    late = {
+        joint: max((latency.get(name, 0) for name in tag.actuators), default=0)
+        for tag in robot.transmissions
+        for joint in tag.joints
+    }
+    return Load(
+        joints=tuple(joints),
+        mass=np.array(mass),
+        gravity=np.array(gravity),
+        needed=np.array(needed),
+        damping=np.diag(S.T @ np.diag(damping) @ S).copy(),
+        effort=motor_effort_limits(robot)[columns],
+        latency=tuple(late.get(joint, 0) for joint in joints),
+    )
+
+
+def _drives(robot: RobotModel, joints: Sequence[str]) -> Array:
+    """S (n, k): velocities of all joints per velocity of the driven ones."""
+    ratio: dict[str, tuple[str, float]] = {}
+    for joint in robot.moving_joints:
+        driver, factor, mimic = joint.name, 1.0, joint.mimic
+        while mimic is not None:
+            driver, factor = mimic.joint, factor * mimic.multiplier
+            mimic = robot.joint(driver).mimic
+        ratio[joint.name] = (driver, factor)
+    S = np.zeros((len(robot.joint_names), len(joints)))
+    for row, name in enumerate(robot.joint_names):
+        driver, factor = ratio[name]
+        if driver in joints:
+            S[row, list(joints).index(driver)] = factor
+    return S

@@ -1,0 +1,52 @@
+"""What had no more effort to give is counted, in the log, and told where a step failed for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from manipcli.core.errors import Finding
+from manipcli.pipeline import run_task
+from manipcli.record.reading import open_recording
+
+HOME = Path(__file__).parents[2] / "tasks" / "home.yaml"
+
+
+class Listener:
+    """Keeps what is told before the first step."""
+
+    def __init__(self) -> None:
+        self.doubts: list[Finding] = []
+
+    def warned(self, findings: Sequence[Finding]) -> None:
+        self.doubts += findings
+
+    def step_started(self, *_: Any) -> None: ...
+    def step_ended(self, *_: Any) -> None: ...
+    def tick(self, *_: Any) -> None: ...
+
+
+def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Path) -> None:
+    listener, log = Listener(), tmp_path / "home.mcap"
+    report = run_task(
+        HOME,
+        log=log,
+        overrides=["robot.limits.joint_2.effort=20", "controllers.arm_controller.constraints.joints.joint_2={}"],
+        progress=listener,
+    )
+    (doubt,) = listener.doubts
+    assert "joint_2: holding against gravity takes up to" in doubt.message
+    assert report.verdict.verdict == "failed"
+    counts = {k: int(v) for k, v in open_recording(log).metadata["saturated joints"].items()}
+    told = re.search(r"; cut at its limits: joint 'joint_2' in (\d+) of (\d+) ticks", report.verdict.steps[0].text)
+    assert told is not None
+    assert 0 < int(told[1]) <= min(int(told[2]), counts["joint_2"])
+
+
+def test_a_run_in_which_nothing_is_cut_says_nothing(tmp_path: Path) -> None:
+    listener, log = Listener(), tmp_path / "home.mcap"
+    assert run_task(HOME, log=log, progress=listener).verdict.verdict == "passed"
+    assert listener.doubts == []
+    assert "saturated joints" not in open_recording(log).metadata
