@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import time as wall_clock
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
 
+from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
-from manipcli.core.errors import Finding, SimulationFailed
+from manipcli.core.errors import SimulationFailed
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.judge.verdict import StepOutcome
@@ -37,18 +39,14 @@ AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
-MOST_CUT: Final = 3
-"""Joints that are named as cut at their limits."""
+FEEDBACK_PERIOD: Final = 0.05
+"""[s] between two records of how far a goal is, as ROS's action servers tell it."""
 PROGRESS_TICKS: Final = 50
 """Control ticks between two times that are told to whoever shows the progress."""
 
 
 class Progress(Protocol):
     """Whoever shows how far a run is."""
-
-    def warned(self, findings: Sequence[Finding]) -> None:
-        """What may go wrong, known before the first step."""
-        ...
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""
@@ -63,6 +61,15 @@ class Progress(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """A goal on its way, and the number by which the log knows it."""
+
+    controller: str
+    number: int
+    handle: GoalHandle
+
+
 class Watch:
     """Hands every tick to the recorder, and now and then the time to whoever shows the progress."""
 
@@ -71,14 +78,35 @@ class Watch:
         self._progress = progress
         self._period = period
         self._began = wall_clock.perf_counter()
+        self._feedback_ticks = max(1, round(FEEDBACK_PERIOD / period))
+        self._next_tick = 0
+        self._goals: list[_Goal] = []
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         self._recorder.tick(tick, state, outputs)
+        self._next_tick = tick + 1
+        if self._goals:
+            self._follow(tick)
         if self._progress is not None and tick % PROGRESS_TICKS == 0:
             self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
         self._recorder.contacts(tick, contacts)
+
+    def goal(self, controller: str, handle: GoalHandle) -> None:
+        """A controller has a new goal; one that it had before may have ended by that."""
+        self._follow(self._next_tick)
+        self._goals.append(_Goal(controller, self._recorder.goal_sent(self._next_tick, controller), handle))
+
+    def _follow(self, tick: int) -> None:
+        """Records the ends of goals, and now and then how far they are."""
+        for goal in [*self._goals]:
+            result = goal.handle.result
+            if result is not None:
+                self._recorder.goal_ended(tick, goal.controller, goal.number, result, goal.handle.feedback())
+                self._goals.remove(goal)
+            elif tick % self._feedback_ticks == 0 and tick < self._next_tick:
+                self._recorder.goal_feedback(tick, goal.controller, goal.number, goal.handle.feedback())
 
 
 def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
@@ -114,23 +142,11 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
                 period=simulation.control_period,
             )
             _settle(task, session)
-            session.restart_clock(Watch(recorder, progress, simulation.control_period))
-            try:
-                _Run(task, plan, session, recorder, progress).steps()
-            finally:
-                for kind, ticks in _saturated_ticks(session).items():
-                    counts = {name: str(count) for name, count in ticks.items() if count}
-                    if counts:
-                        recorder.metadata(kind, counts)
+            watch = Watch(recorder, progress, simulation.control_period)
+            session.restart_clock(watch)
+            _Run(task, plan, session, recorder, progress, watch).steps()
     finally:
         engine.close()
-
-
-def _saturated_ticks(session: Session) -> dict[str, dict[str, int]]:
-    """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
-    joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
-    actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return {"saturated joints": joints, "saturated actuators": actuators}
 
 
 def _settle(task: Task, session: Session) -> None:
@@ -154,29 +170,19 @@ def _settle(task: Task, session: Session) -> None:
             raise SimulationFailed(f"'{body.name}' does not come to rest ({speed:.3g} m/s before the start)", time=0.0)
 
 
-def _cut_since(before: dict[str, dict[str, int]], session: Session, tick: int) -> str:
-    """What had nothing left to give since `tick`, the worst first; nothing where everything had."""
-    counts = {
-        f"{kind.removeprefix('saturated ').removesuffix('s')} '{name}'": count - before[kind][name]
-        for kind, ticks in _saturated_ticks(session).items()
-        for name, count in ticks.items()
-    }
-    worst = sorted((name for name, count in counts.items() if count), key=lambda name: -counts[name])[:MOST_CUT]
-    cut = ", ".join(f"{name} in {counts[name]}" for name in worst)
-    return f"; cut at its limits: {cut} of {session.ticks - tick} ticks" if cut else ""
-
-
 class _Run:
     """One pass over the steps."""
 
-    def __init__(self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None) -> None:
+    def __init__(
+        self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None, watch: Watch
+    ) -> None:
         self._task = task
         self._plan = plan
         self._session = session
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
-        self._executor = Executor(session, touch=self._physics)
+        self._executor = Executor(session, touch=self._physics, told=watch.goal)
         start = session.engine.read().map(np.copy)  # the state at time 0, for words such as `to: start`
         self._world = World(task.robot, task.scene, start)
 
@@ -195,17 +201,13 @@ class _Run:
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep) -> StepOutcome:
         place = self._task.log_place("steps", index)
-        started, ticks = self._session.time, self._session.ticks
-        saturated = _saturated_ticks(self._session)
+        started = self._session.time
         self._event("step_started", planned, "", "", place)
         try:
             end = self._motions(step, planned, started, place)
         except SimulationFailed as failure:
-            text = str(failure) + _cut_since(saturated, self._session, ticks)
-            self._event("step_ended", planned, "failed", text, place)
+            self._event("step_ended", planned, "failed", str(failure), place)
             raise
-        if end.outcome != "done":
-            end = MotionEnd(end.outcome, end.text + _cut_since(saturated, self._session, ticks))
         self._event("step_ended", planned, end.outcome, end.text, place)
         return StepOutcome(
             id=planned.id,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 from manipcli import __version__
 from manipcli.control.controller import Controller
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.manager import ControllerManager
+from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.embedding import embeddable
 from manipcli.flow.load import Task
@@ -88,6 +90,22 @@ def open_log(
     )
 
 
+def recorded(controller: Controller) -> Recorded:
+    """What the log keeps of a controller."""
+    if isinstance(controller, ForceTorqueBroadcaster):
+        return WrenchChannel(controller.name, controller.link)
+    if not controller.interfaces:
+        return None
+    return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+
+
+def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:
+    """By which it takes goals."""
+    if is_follower(controller):
+        return "follow_joint_trajectory"
+    return "gripper_cmd" if is_hand(controller) else ""
+
+
 def mesh_files(task: Task) -> dict[str, Path]:
     """Every mesh file of the robot and of the scene, by its URI, sorted."""
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
@@ -112,15 +130,6 @@ def _portable_robot(spec: RobotSpec) -> RobotSpec:
     """The robot file without folders of this machine in the names of its descriptions."""
     attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
     return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
-
-
-def recorded(controller: Controller) -> Recorded:
-    """What the log keeps of a controller."""
-    if isinstance(controller, ForceTorqueBroadcaster):
-        return WrenchChannel(controller.name, controller.link)
-    if not controller.interfaces:
-        return None
-    return ControllerChannel(controller.name, controller.joints, controller.interfaces)
 
 
 def judge_log(path: Path, *, being_written: bool = False) -> Verdict:

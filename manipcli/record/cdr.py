@@ -8,6 +8,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+from manipcli.core.geometry import Array
+
 ENCAPSULATION = b"\x00\x01\x00\x00"
 
 _I32, _U32, _F32, _F64 = (struct.Struct(code) for code in ("<i", "<I", "<f", "<d"))
@@ -56,6 +58,17 @@ class CdrWriter:
         """Bare doubles, one after the other; at least one."""
         offsets = [self.f64(float(value)) for value in values]
         return offsets[0]
+
+    def float64s(self, values: Array) -> None:
+        """A float64[] of the numbers in `values` (n)."""
+        self.u32(len(values))
+        if len(values):
+            self._data += b"\x00" * (-(len(self._data) - 4) % 8)
+            self._data += values.astype("<f8").tobytes()
+
+    def octets(self, data: bytes) -> None:
+        """A uint8[N] of a fixed length, as it is."""
+        self._data += data
 
     def time(self, ns: int) -> int:
         """builtin_interfaces/Time: whole seconds, nanoseconds."""

@@ -44,11 +44,15 @@ class Executor:
     Args:
         session: what is stepped.
         touch: whether anything can touch; where nothing can, a hand that closed on nothing is no failure.
+        told: is told of every goal: the name of the controller, and the handle.
     """
 
-    def __init__(self, session: Session, *, touch: bool = True) -> None:
+    def __init__(
+        self, session: Session, *, touch: bool = True, told: Callable[[str, GoalHandle], None] | None = None
+    ) -> None:
         self._session = session
         self._touch = touch
+        self._tell = told
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
         """Send the motion's goals and tick until all are reached and its duration is over.
@@ -112,13 +116,19 @@ class Executor:
             follower = manager.serving(motion.trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
-            handles.append(follower.send_goal(self._completed(motion.trajectory, follower)))
+            handle = follower.send_goal(self._completed(motion.trajectory, follower))
+            handles.append(self._announced(follower.name, handle))
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
-            handles.append(gripper.send_goal(_gripper_goal(gripper, motion.grip)))
+            handles.append(self._announced(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip))))
         return tuple(handles)
+
+    def _announced(self, controller: str, handle: GoalHandle) -> GoalHandle:
+        if self._tell is not None:
+            self._tell(controller, handle)
+        return handle
 
     def _completed(self, trajectory: JointTrajectory, follower: Follower) -> JointTrajectory:
         """The trajectory with the other joints of its controller, which stay where they are wanted now."""
