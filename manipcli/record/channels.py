@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from manipcli.record import schemas
 from manipcli.spec.controllers import Interface
@@ -30,11 +31,19 @@ TRANSIENT_LOCAL = (
 
 @dataclass(frozen=True, slots=True)
 class ControllerChannel:
-    """A controller whose reference, feedback, error and output are recorded; `interfaces`: what its output is."""
+    """A controller whose reference, feedback, error and output are recorded.
+
+    Attributes:
+        name: of the controller.
+        joints: in the order of its outputs.
+        interfaces: what its output is.
+        action: by which it takes goals; empty where it takes none.
+    """
 
     name: str
     joints: tuple[str, ...]
     interfaces: tuple[Interface, ...] = ("effort",)
+    action: Literal["", "follow_joint_trajectory", "gripper_cmd"] = ""
 
     @property
     def state_topic(self) -> str:
@@ -47,6 +56,18 @@ class ControllerChannel:
     @property
     def error_topic(self) -> str:
         return f"/{self.name}/error"
+
+    @property
+    def feedback_topic(self) -> str:
+        return f"/{self.name}/{self.action}/feedback"
+
+    @property
+    def status_topic(self) -> str:
+        return f"/{self.name}/{self.action}/status"
+
+    @property
+    def result_topic(self) -> str:
+        return f"/{self.name}/{self.action}/result"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,4 +119,11 @@ def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
             (controller.reference_topic, schemas.JOINT_STATE, False),
             (controller.error_topic, schemas.JOINT_STATE, False),
         ]
+        if controller.action:
+            feedback, result = schemas.ACTIONS[controller.action]
+            rows += [
+                (controller.feedback_topic, feedback, False),
+                (controller.status_topic, schemas.GOAL_STATUS_ARRAY, True),
+                (controller.result_topic, result, False),
+            ]
     return tuple(Channel(k, topic, kind, latched) for k, (topic, kind, latched) in enumerate(rows, start=1))

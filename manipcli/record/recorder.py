@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
+from manipcli.control.action import Feedback, GoalResult
 from manipcli.control.controller import ControllerOutput
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -26,6 +27,7 @@ from manipcli.record.contact_filter import ContactFilter
 from manipcli.record.container import Container
 from manipcli.record.contents import RECORD, Contents
 from manipcli.record.faults import RecordingRefused
+from manipcli.record.goals import GoalLog
 from manipcli.record.recording import TaskEvent
 from manipcli.record.rows import message_record
 from manipcli.record.schemas import schema_text
@@ -75,16 +77,32 @@ class Recorder:
         self._container = Container(path, overwrite=overwrite)
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._writing: Future[None] | None = None
-        _declare(self._container, table)
-        for name, media_type, data in attachments:
-            self._container.attachment(name, media_type, data)
         holds = Contents(
             period=period,
             joints=robot.joint_names,
             bodies=tuple(body.name for body in scene.movable),
             controllers={c.name: c.joints for c in controllers if isinstance(c, ControllerChannel)},
         )
-        self._container.metadata(RECORD, holds.metadata())
+        self._goals = {c.name: GoalLog(c) for c in controllers if isinstance(c, ControllerChannel) and c.action}
+        try:
+            self._begin(table, attachments, {RECORD: holds.metadata(), **metadata}, robot, scene)
+        except BaseException:
+            self._thread.shutdown()
+            self._container.close()
+            raise
+
+    def _begin(
+        self,
+        table: Sequence[Channel],
+        attachments: Sequence[tuple[str, str, bytes]],
+        metadata: Mapping[str, Mapping[str, str]],
+        robot: RobotModel,
+        scene: Scene,
+    ) -> None:
+        """Writes what is known before the first tick."""
+        _declare(self._container, table)
+        for name, media_type, data in attachments:
+            self._container.attachment(name, media_type, data)
         for name, values in metadata.items():
             self._container.metadata(name, values)
         self._single(topics.ROBOT_DESCRIPTION, 0, messages.string_message(robot.urdf))
@@ -116,6 +134,25 @@ class Recorder:
         event = TaskEvent(time=ns / 1e9, kind=kind, step=step, verb=verb, outcome=outcome, text=text, place=place)
         self._single(topics.EVENTS, ns, messages.event_message(ns, event))
         self._single(topics.ROSOUT, ns, messages.log_message(ns, event))
+
+    def goal_sent(self, tick: int, controller: str) -> int:
+        """A controller accepted a goal before `tick`; its number, by which the log knows it from now on."""
+        ns, goals = self._ns(tick), self._goals[controller]
+        number = goals.sent(ns)
+        self._single(goals.channel.status_topic, ns, goals.status(ns))
+        return number
+
+    def goal_feedback(self, tick: int, controller: str, number: int, feedback: Feedback) -> None:
+        """How far a goal is; ROS's action servers tell it 20 times a second."""
+        ns, goals = self._ns(tick), self._goals[controller]
+        self._single(goals.channel.feedback_topic, ns, goals.feedback(ns, number, feedback))
+
+    def goal_ended(self, tick: int, controller: str, number: int, result: GoalResult, feedback: Feedback) -> None:
+        """A goal is over; `feedback`: where it left the joints."""
+        ns, goals = self._ns(tick), self._goals[controller]
+        goals.ended(ns, number, result)
+        self._single(goals.channel.status_topic, ns, goals.status(ns))
+        self._single(goals.channel.result_topic, ns, goals.result(ns, result, feedback))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """More metadata behind all that was recorded so far; read back, later keys of a name replace earlier ones."""

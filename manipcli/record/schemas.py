@@ -11,6 +11,12 @@ TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 JOINT_STATE = "sensor_msgs/msg/JointState"
 CONTROLLER_STATE = "control_msgs/msg/JointTrajectoryControllerState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
+GOAL_STATUS_ARRAY = "action_msgs/msg/GoalStatusArray"
+ACTIONS = {
+    name: (f"control_msgs/action/{kind}_FeedbackMessage", f"control_msgs/action/{kind}_GetResult_Response")
+    for name, kind in (("follow_joint_trajectory", "FollowJointTrajectory"), ("gripper_cmd", "ParallelGripperCommand"))
+}
+"""Action of a controller -> types of its feedback and of its results."""
 LOG = "rcl_interfaces/msg/Log"
 MARKER_ARRAY = "visualization_msgs/msg/MarkerArray"
 CONTACTS = "manipcli_msgs/msg/Contacts"
@@ -59,6 +65,43 @@ DEFINITIONS: dict[str, str] = {
         "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_output\n"
         "float64 speed_scaling_factor\n"
     ),
+    "unique_identifier_msgs/UUID": "uint8[16] uuid\n",
+    "action_msgs/GoalInfo": "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp\n",
+    "action_msgs/GoalStatus": (
+        "int8 STATUS_UNKNOWN=0\nint8 STATUS_ACCEPTED=1\nint8 STATUS_EXECUTING=2\nint8 STATUS_CANCELING=3\n"
+        "int8 STATUS_SUCCEEDED=4\nint8 STATUS_CANCELED=5\nint8 STATUS_ABORTED=6\n"
+        "action_msgs/GoalInfo goal_info\nint8 status\n"
+    ),
+    "action_msgs/GoalStatusArray": "action_msgs/GoalStatus[] status_list\n",
+    "control_msgs/FollowJointTrajectory_Feedback": (
+        "std_msgs/Header header\nstring[] joint_names\n"
+        "trajectory_msgs/JointTrajectoryPoint desired\n"
+        "trajectory_msgs/JointTrajectoryPoint actual\n"
+        "trajectory_msgs/JointTrajectoryPoint error\n"
+        "string[] multi_dof_joint_names\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_desired\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_actual\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error\n"
+    ),
+    "control_msgs/FollowJointTrajectory_FeedbackMessage": (
+        "unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowJointTrajectory_Feedback feedback\n"
+    ),
+    "control_msgs/FollowJointTrajectory_Result": (
+        "int32 error_code\nint32 SUCCESSFUL=0\nint32 INVALID_GOAL=-1\nint32 INVALID_JOINTS=-2\n"
+        "int32 OLD_HEADER_TIMESTAMP=-3\nint32 PATH_TOLERANCE_VIOLATED=-4\nint32 GOAL_TOLERANCE_VIOLATED=-5\n"
+        "string error_string\n"
+    ),
+    "control_msgs/FollowJointTrajectory_GetResult_Response": (
+        "int8 status\ncontrol_msgs/FollowJointTrajectory_Result result\n"
+    ),
+    "control_msgs/ParallelGripperCommand_Feedback": "sensor_msgs/JointState state\n",
+    "control_msgs/ParallelGripperCommand_FeedbackMessage": (
+        "unique_identifier_msgs/UUID goal_id\ncontrol_msgs/ParallelGripperCommand_Feedback feedback\n"
+    ),
+    "control_msgs/ParallelGripperCommand_Result": "sensor_msgs/JointState state\nbool stalled\nbool reached_goal\n",
+    "control_msgs/ParallelGripperCommand_GetResult_Response": (
+        "int8 status\ncontrol_msgs/ParallelGripperCommand_Result result\n"
+    ),
     "rcl_interfaces/Log": (
         "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
         "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\n"
@@ -97,8 +140,11 @@ DEFINITIONS: dict[str, str] = {
 
 
 def schema_text(type_name: str) -> str:
-    """The whole `ros2msg` text of `package/msg/Name`: its own definition and those it depends on, each once."""
-    root = type_name.replace("/msg/", "/")
+    """The whole `ros2msg` text of `package/msg/Name`: its own definition and those it depends on, each once.
+
+    The messages of an action are `package/action/Name_...`.
+    """
+    root = type_name.replace("/msg/", "/").replace("/action/", "/")
     parts = [DEFINITIONS[root]]
     parts += [f"{'=' * 80}\nMSG: {name}\n{DEFINITIONS[name]}" for name in _dependencies(root, [])]
     return "".join(parts)

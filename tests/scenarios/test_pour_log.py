@@ -111,8 +111,8 @@ def test_goals_begin_with_phases_and_all_succeed(ours: Recording, theirs: Messag
             for one in message.status_list:
                 key = bytes(one.goal_info.goal_id.uuid)
                 if key not in last:
-                    sent.add(one.goal_info.stamp.sec * 10**9 + one.goal_info.stamp.nanosec)
-                    assert max(sent) <= time
+                    assert one.goal_info.stamp.sec * 10**9 + one.goal_info.stamp.nanosec == time
+                    sent.add(time)
                 last[key] = one.status
         assert set(last.values()) == {4}
         results = theirs[f"{topic}/result"]
