@@ -98,14 +98,14 @@ def field_lines(path: Path) -> tuple[FieldLine, ...]:
 
 
 class _Panels:
-    """Panels on their way, by the word that asks for them, the field, and the unit."""
+    """Panels on their way, by the word that asks for them, what they are of, and the unit."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[int, str, str], list[Curve]] = {}
         self._heads: dict[tuple[int, str, str], tuple[str, str]] = {}
         self._count = 0
 
-    def add(self, number: int, field: str, quantity: str, title: str, unit: str, curve: Curve) -> None:
+    def add(self, number: int, quantity: str, title: str, unit: str, curve: Curve) -> None:
         self._count += 1
         if self._count > MAX_CURVES:
             raise InvalidInput(
@@ -115,7 +115,7 @@ class _Panels:
                     )
                 ]
             )
-        key = (number, field, unit)
+        key = (number, title, unit)
         self._heads.setdefault(key, (title, quantity))
         self._found.setdefault(key, []).append(curve)
 
@@ -180,22 +180,29 @@ class _Log:
         for one, name, series in zip(wanted, names, everything, strict=True):
             if not series:
                 self._explain(one, name)
+            # The axes of a vector that is asked for as a whole share a panel.
+            together = len(one.way.parts[-1].name) == 1 and any(
+                other is not one and other.way.parts[:-1] == one.way.parts[:-1] for other in wanted
+            )
             for each in series:
-                self._curve(one, each, number, panels, several=len(group) > 1)
+                self._curve(one, each, number, panels, several=len(group) > 1, together=together)
 
-    def _curve(self, one: Wanted, each: Series, number: int, panels: _Panels, *, several: bool) -> None:
-        field = f"{one.topic.strip('/')}.{_short(one.message, [part.name for part in one.way.parts])}"
+    def _curve(self, one: Wanted, each: Series, number: int, panels: _Panels, *, several: bool, together: bool) -> None:
+        parts = [part.name for part in one.way.parts]
+        field = f"{one.topic.strip('/')}.{_short(one.message, parts)}"
+        name = f"{field}[{each.label}]" if each.label else field
         unit = unit_of(one.way, each.label, self._known_joints())
         label = each.label.replace("+", " – ").replace("robot/", "")
+        title, quantity = field, parts[-1]
         if several:
-            label = f"{field} {label}".strip()
-        name = f"{field}[{each.label}]" if each.label else field
-        quantity = one.way.parts[-1].name
-        if len(quantity) == 1 and len(one.way.parts) > 1:
-            quantity = f"{one.way.parts[-2].name} {quantity}"
+            # Words with commas between share a panel, whatever they are of, as long as the unit is the same.
+            title, label = "", f"{field} {label}".strip()
+        elif together:
+            title, label, quantity = field.rpartition(".")[0], f"{label} {quantity}".strip(), parts[-2]
+        elif len(quantity) == 1 and len(parts) > 1:
+            quantity = f"{parts[-2]} {quantity}"
         curve = Curve(name, label, self.name, each.times, each.values, each.held)
-        # Words with commas between share a panel, whatever they are of, as long as the unit is the same.
-        panels.add(number, "" if several else field, quantity, "" if several else field, unit, curve)
+        panels.add(number, quantity, title, unit, curve)
 
     def _topic(self, name: FieldName) -> Topic:
         topic = self.topics.all.get(name.topic)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.flow.chart import open_chart
 
 ROOT = Path(__file__).parents[2]
 
@@ -62,6 +63,21 @@ def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsy
     told = capsys.readouterr()
     assert "note: other: it was not finished" in told.err
     assert {row.partition(",")[0] for row in told.out.splitlines()} == {"log", "home", "other"}
+
+
+def test_the_axes_of_a_vector_share_a_panel_and_words_with_commas_too(log: Path) -> None:
+    def panels(*words: str) -> list[tuple[str, str, tuple[str, ...]]]:
+        return [(one.title, one.axis, one.labels) for one in open_chart([log], words).panels]
+
+    moves = open_chart([log], ["tf.translation.x"]).panels[0].labels[-1]
+    assert panels(f"tf[{moves}].translation") == [
+        ("tf.transform.translation", "translation [m]", (f"{moves} x", f"{moves} y", f"{moves} z"))
+    ]
+    assert panels(f"tf[{moves}].translation.z") == [("tf.transform.translation.z", "translation z [m]", (moves,))]
+    words = "joint_states.position[joint_1],arm_controller/controller_state.reference.positions[joint_1]"
+    ((title, _, labels),) = panels(words)
+    assert title == ""
+    assert [label.split()[0] for label in labels] == [word.partition("[")[0] for word in words.split(",")]
 
 
 def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
