@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 GHOST = (40, 115, 240)
 GHOST_OPACITY = 0.35
+OFF, OFF_ANGLE = 0.002, 0.01
+"""[m], [rad] by which a link is elsewhere than it should be."""
 PATH = (237, 107, 13)
 PATH_POINTS = 300
 """Of the way of the tool: it is sent again while the run plays."""
@@ -25,7 +27,9 @@ THICKNESS = 0.003
 
 
 class Ghost:
-    """The links of a robot once more, clear and blue; hidden at first.
+    """The links of a robot once more, clear and blue, those that are off; hidden at first.
+
+    Two surfaces in one place would flicker, so a link that is where it should be has no ghost.
 
     Args:
         server: where.
@@ -59,11 +63,16 @@ class Ghost:
     def visible(self, shown: bool) -> None:
         self._root.visible = shown
 
-    def place(self, poses: Poses) -> None:
-        """Move it to where the robot should be at one instant."""
+    def place(self, wanted: Poses, measured: Poses) -> None:
+        """Move it to where the robot should be at one instant, and is not."""
         for node, k in zip(self._nodes, self._frames, strict=True):
-            node.position = poses.position[k]
-            node.wxyz = np.roll(poses.quat_xyzw[k], 1)
+            p, q = wanted.position[k], wanted.quat_xyzw[k]
+            turned = 2.0 * float(np.arccos(min(abs(float(q @ measured.quat_xyzw[k])), 1.0)))
+            off = bool(np.linalg.norm(p - measured.position[k]) > OFF or turned > OFF_ANGLE)
+            if off:
+                node.position, node.wxyz = p, np.roll(q, 1)
+            if node.visible != off:
+                node.visible = off
 
 
 class ToolPath:

@@ -74,7 +74,10 @@ class Replay(LocalServer):
         gui = self.viser.gui
         with gui.add_folder("Run"):
             ghost = gui.add_checkbox(
-                "reference", False, disabled=self._ghost is None, hint="Where the robot should be, clear and blue."
+                "reference",
+                False,
+                disabled=self._ghost is None,
+                hint="Where the robot should be, clear and blue, as far as it is off by more than 2 mm.",
             )
             path = gui.add_checkbox("tool path", True)
             forces = gui.add_checkbox("forces", True, hint="Normal forces on what can move, at the points of contact.")
@@ -85,7 +88,8 @@ class Replay(LocalServer):
 
     def _show_ghost(self, shown: bool) -> None:
         if self._ghost is not None and self._wanted is not None:
-            self._ghost.place(_instant(self._wanted, self.playback.index(self.clock.time)))
+            k = self.playback.index(self.clock.time)
+            self._ghost.place(_instant(self._wanted, k), self._at(k))
             self._ghost.visible = shown
 
     def _at(self, k: int) -> Poses:
@@ -99,7 +103,7 @@ class Replay(LocalServer):
             with self.viser.atomic():
                 self.stage.place(self._at(k))
                 if self._ghost is not None and self._ghost.visible and self._wanted is not None:
-                    self._ghost.place(_instant(self._wanted, k))
+                    self._ghost.place(_instant(self._wanted, k), self._at(k))
                 if self._path is not None:
                     self._path.place(k)
                 self._forces.place(k)
