@@ -15,16 +15,19 @@ def run(pid, errors, dt=1.0):
 
 
 def test_proportional():
+    """Conformance 14: P = 1 repeats the error."""
     assert run(Pid(p=1.0), [-0.5, -1.0, 0.5]) == [-0.5, -1.0, 0.5]
 
 
 def test_integral_acts_one_step_late_and_in_ros1_at_once():
+    """Conformance 15: ROS 2 integrates after it commands (forward Euler), ROS 1 before."""
     errors = [-0.5, -0.5, 0.0, 0.0, 1.0, 0.0]
     assert run(Pid(i=1.0, u_min=-5, u_max=5), errors) == pytest.approx([0, -0.5, -1, -1, -1, 0])
     assert run(Pid(i=1.0, u_min=-5, u_max=5, compat="ros1"), errors[:5]) == pytest.approx([-0.5, -1, -1, -1, 0])
 
 
 def test_derivative_of_the_error():
+    """Conformance 16: the first derivative of ROS 2 is taken from 0; ROS 1 waits for a second error."""
     out = run(Pid(d=1.0), [-0.5, -0.5, -0.5, -1.0, -0.5], [1, 1, 0.1, 1, 1])
     assert out == pytest.approx([-0.5, 0, 0, -0.5, 0.5])
     assert run(Pid(d=1.0, compat="ros1"), [-0.5, -1.0]) == pytest.approx([0, -0.5])
@@ -32,10 +35,12 @@ def test_derivative_of_the_error():
 
 
 def test_all_terms():
+    """Conformance 17: the three terms add up."""
     assert run(Pid(p=1.0, i=1.0, d=1.0), [-0.5, -0.5, 0.0]) == pytest.approx([-1, -1, -0.5])
 
 
 def test_command_is_clamped_only_where_asked():
+    """Conformance 18: an output clamp of 1, its mirror, and none."""
     for sign in (1, -1):
         errors = [sign * e for e in (0.5, 1.0, 2.0, 100.0)]
         assert run(Pid(p=1.0, u_min=-1, u_max=1), errors) == [sign * u for u in (0.5, 1, 1, 1)]
@@ -43,6 +48,7 @@ def test_command_is_clamped_only_where_asked():
 
 
 def test_back_calculation_with_a_clamped_integral():
+    """Conformance 21: the clamp of the integral holds beside back calculation."""
     pid = Pid(i=2.0, i_min=-1, i_max=1, antiwindup="back_calculation", tracking_time=1.0)
     assert run(pid, [-1.0, -1.0, 0.5, 0.0]) == pytest.approx([0, -1, -1, 0])
 
@@ -63,6 +69,7 @@ def test_conditional_integration_stops_while_pushing_into_the_clamp():
 
 
 def test_ros1_windup_with_and_without_its_antiwindup():
+    """Conformance 23: ROS 1 winds up behind the clamp of the term, unless its antiwindup is true."""
     errors = [10.0, 10.0, -1.0, -1.0]
     clamp = {"i": 1.0, "i_min": -1, "i_max": 1, "compat": "ros1"}
     assert run(Pid(**clamp), errors) == [1, 1, 1, 1]
@@ -72,10 +79,12 @@ def test_ros1_windup_with_and_without_its_antiwindup():
 
 @pytest.mark.parametrize("compat", ["ros1", "ros2"])
 def test_an_integral_clamp_of_zero_means_no_integral(compat):
+    """Conformance 24: ROS 1's default clamp of 0 leaves P alone."""
     assert run(Pid(p=1.0, i=1.0, i_min=0, i_max=0, compat=compat), [1.0, 1.0]) == [1, 1]
 
 
 def test_back_calculation_without_integral_gain_does_nothing():
+    """Conformance 25: without an integral gain no tracking time is chosen, and nothing is integrated."""
     pid = Pid(u_min=-1, u_max=1, antiwindup="back_calculation")
     assert run(pid, [-1.0] * 3 + [10.0] * 3) == [0] * 6
     assert pid.tracking_time == pytest.approx([0.0])
@@ -89,6 +98,7 @@ def test_tracking_time_is_chosen_from_the_gains():
 
 
 def test_reset_forgets_the_integral_unless_told():
+    """Conformance 26: reset, with and without the integral."""
     pid = Pid(i=1.0)
     assert run(pid, [-0.5, 0.0]) == [0, -0.5]
     pid.reset(keep_integral=True)
@@ -98,6 +108,7 @@ def test_reset_forgets_the_integral_unless_told():
 
 
 def test_time_that_stands_still_repeats_and_time_that_runs_back_is_refused():
+    """Conformance 26: dt of 0 repeats the command, a negative dt is an error."""
     pid = Pid(p=2.0, i=1.0)
     assert pid.update(1.0, 1.0) == 2.0
     assert pid.update(7.0, 0.0) == 2.0
@@ -110,6 +121,7 @@ def test_time_that_stands_still_repeats_and_time_that_runs_back_is_refused():
 @pytest.mark.parametrize("compat", ["ros1", "ros2"])
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_an_error_that_is_no_number_gives_nan_and_keeps_the_state(compat, bad):
+    """Conformance 26: NaN gives NaN and leaves the integral alone."""
     pid = Pid(p=[1.0, 1.0], i=[1.0, 1.0], d=[0.0, 1.0], compat=compat)
     pid.update(np.array([1.0, 1.0]), 1.0)
     before = pid.i_term
@@ -131,11 +143,13 @@ def test_an_error_that_is_no_number_gives_nan_and_keeps_the_state(compat, bad):
         {"i_min": 0.1},
         {"i_max": -0.1},
         {"tracking_time": -1},
+        {"error_deadband": -1e-3},
         {"p": math.nan},
         {"i": math.inf},
     ],
 )
 def test_impossible_gains_are_refused_and_the_old_ones_stay(bad):
+    """Conformance 27: bounds that cross are refused by the constructor and by set_gains."""
     with pytest.raises(InvalidArgument):
         Pid(**{"p": 1.0, **bad})
     pid = Pid(p=2.0, u_min=-1, u_max=1)
@@ -175,3 +189,42 @@ def test_a_new_command_does_not_change_the_last_and_errors_are_not_touched():
     assert np.array_equal(error, [1.0, 2.0])
     with pytest.raises(InvalidArgument, match="2 joints"):
         pid.update(np.zeros(3), 0.1)
+
+
+@pytest.mark.parametrize("compat", ["ros1", "ros2"])
+def test_errors_inside_the_deadband_are_not_integrated(compat):
+    pid = Pid(i=1.0, error_deadband=0.1, compat=compat)
+    run(pid, [0.1, -0.05, 0.1])
+    assert pid.i_term == pytest.approx([0.0])
+    run(pid, [0.2])
+    assert pid.i_term == pytest.approx([0.2])
+
+
+def test_a_change_of_gain_makes_no_step():
+    pid = Pid(i=1.0)
+    run(pid, [1.0, 1.0])
+    pid.set_gains(i=50.0)
+    assert pid.update(0.0, 1.0) == 2.0
+
+
+def test_each_joint_has_its_own_antiwindup():
+    words = ("none", "back_calculation", "conditional_integration")
+    gains = {"p": 1.0, "i": 1.0, "u_min": -1.0, "u_max": 1.0, "tracking_time": 2.0}
+    together = Pid(**{k: [v] * 3 for k, v in gains.items()}, antiwindup=words)
+    single = [Pid(**gains, antiwindup=word) for word in words]
+    for error in (5.0, 3.0, -0.5, -4.0, 0.2):
+        assert together.update(np.full(3, error), 0.5) == pytest.approx([pid.update(error, 0.5) for pid in single])
+    with pytest.raises(InvalidArgument, match="2 kinds of anti-windup"):
+        Pid(p=[1.0] * 3, antiwindup=("none", "none"))
+
+
+@pytest.mark.parametrize("compat", ["ros1", "ros2"])
+def test_in_place_it_is_the_same_law(compat):
+    gains = {"p": [2.0, 1.0], "i": [3.0, 0.0], "d": [0.5, 0.1], "u_min": [-1.0, -9.0], "u_max": [1.0, 9.0]}
+    one, other = Pid(**gains, compat=compat), Pid(**gains, compat=compat)
+    rng = np.random.default_rng(2)
+    command = np.empty(2)
+    for _ in range(20):
+        errors = rng.normal(size=(2, 2))
+        other.apply(errors, 0.01, command)
+        assert np.array_equal(command, one.update(errors[0], 0.01, errors[1]))

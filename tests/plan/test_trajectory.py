@@ -29,6 +29,7 @@ def values(trajectory, time):
 
 
 def test_positions_alone_are_joined_by_lines_and_held_at_rest_after_the_end():
+    """Conformance 29: points 1, 2, 3 at 1, 2, 3 s from 0."""
     trajectory = one_joint(at(1, 1.0), at(2, 2.0), at(3, 3.0), start=at(0, 0.0))
     assert values(trajectory, 0.5) == pytest.approx((0.5, 1.0, 0.0))
     assert values(trajectory, 1.5)[0] == pytest.approx(1.5)
@@ -38,6 +39,7 @@ def test_positions_alone_are_joined_by_lines_and_held_at_rest_after_the_end():
 
 
 def test_nothing_is_known_before_the_first_point():
+    """Conformance 29: no sample before the first point."""
     with pytest.raises(InvalidArgument, match=r"begins at 1 s"):
         one_joint(at(1, 1.0), at(2, 2.0)).sample(0.999)
     with pytest.raises(ValueError, match="cannot sample"):
@@ -47,6 +49,7 @@ def test_nothing_is_known_before_the_first_point():
 
 
 def test_cubic_reproduces_x3_minus_2x():
+    """Conformance 30: x^3 - 2x over 2 s."""
     trajectory = one_joint(at(4, 2.0, velocity=10), start=at(0, 0.0, velocity=-2))
     assert values(trajectory, math.sqrt(2)) == pytest.approx((0.0, 4.0, 6 * math.sqrt(2)), abs=1e-12)
     assert values(trajectory, 2.0) == pytest.approx((4.0, 10.0, 12.0), abs=1e-12)
@@ -62,11 +65,13 @@ def test_cubic_reproduces_x3_minus_2x():
     ],
 )
 def test_rest_to_rest_in_one_second(acceleration, time, expected):
+    """Conformance 32: cubic and quintic from 0 to 1."""
     trajectory = one_joint(at(0, 0.0, 0.0, acceleration), at(1, 1.0, 0.0, acceleration))
     assert values(trajectory, time) == pytest.approx(expected, abs=1e-12)
 
 
 def test_accelerations_count_only_where_both_ends_give_them():
+    """Conformance 33: an end alone makes no quintic."""
     mixed = one_joint(at(0, 0.0, 0.0), at(1, 1.0, 0.0, 5.0))
     cubic = one_joint(at(0, 0.0, 0.0), at(1, 1.0, 0.0))
     for time in (0.0, 0.3, 0.999):
@@ -76,6 +81,7 @@ def test_accelerations_count_only_where_both_ends_give_them():
 
 
 def test_a_start_lacks_nothing_that_the_first_point_gives():
+    """Conformance 33: what the start lacks counts as 0."""
     lacking = one_joint(at(1, 1.0, 0.0, 0.0), start=at(0, 0.0))
     full = one_joint(at(1, 1.0, 0.0, 0.0), start=at(0, 0.0, 0.0, 0.0))
     assert values(lacking, 0.25) == pytest.approx(values(full, 0.25))
@@ -84,6 +90,93 @@ def test_a_start_lacks_nothing_that_the_first_point_gives():
 
 def test_no_lead_in_when_the_first_point_is_at_the_start():
     assert values(one_joint(at(5, 0.0), at(6, 1.0), start=at(0, 0.0)), 0.0)[0] == 5.0
+
+
+def test_velocities_alone_are_integrated():
+    """Conformance 34: 1, 2, 1 at 1, 2, 3 s from rest, by the trapezoid rule."""
+    points = [TrajectoryPoint(velocities=[v], time_from_start=k + 1) for k, v in enumerate((1, 2, 1))]
+    trajectory = one_joint(*points, start=at(0, 0.0))
+    assert trajectory.sample(np.array([1.0, 2.0, 3.0]))[0][:, 0] == pytest.approx([0.5, 2.0, 3.5])
+    assert trajectory.integrated
+    # The velocity of the cubics is then linear between the points: p = t^2 / 2 in the first second.
+    assert values(trajectory, 0.6) == pytest.approx((0.18, 0.6, 1.0))
+
+
+def test_accelerations_alone_are_integrated_twice():
+    """Conformance 34: the same numbers as accelerations."""
+    points = [TrajectoryPoint(accelerations=[a], time_from_start=k + 1) for k, a in enumerate((1, 2, 1))]
+    position, velocity, acceleration = one_joint(*points, start=at(0, 0.0)).sample(np.array([1.0, 2.0, 3.0]))
+    assert position[:, 0] == pytest.approx([0.25, 1.5, 4.25])
+    assert velocity[:, 0] == pytest.approx([0.5, 2.0, 3.5])
+    assert acceleration[:, 0] == pytest.approx([1.0, 2.0, 1.0])
+
+
+def test_integrated_points_without_a_start_cannot_be_sampled():
+    points = [TrajectoryPoint(velocities=[1.0, 2.0], time_from_start=1.0)]
+    trajectory = JointTrajectory(("a", "b"), points)
+    with pytest.raises(InvalidArgument, match="gives no positions"):
+        trajectory.sample(1.0)
+    start = TrajectoryPoint([10.0, 20.0])
+    placed = JointTrajectory(("b", "a"), trajectory.of_joints(("b", "a")).source, start)
+    assert placed.sample(1.0)[0] == pytest.approx([11.0, 20.5])
+
+
+def test_without_interpolation_the_next_point_holds_at_once():
+    """Conformance 35: before the first point the start; inside a segment its end."""
+    points = [at(1, 1.0), at(2, 2.0), at(3, 3.0)]
+    trajectory = JointTrajectory(("j",), points, at(0.5, 0.0), interpolation="none")
+    times = np.array([0.0, 0.99, 1.0, 1.5, 2.5, 3.0, 30.0])
+    assert trajectory.sample(times)[0][:, 0].tolist() == [0.5, 0.5, 2, 2, 3, 3, 3]
+    assert not trajectory.sample(times)[1].any()
+    with pytest.raises(InvalidArgument, match="expected 'splines' or 'none'"):
+        JointTrajectory(("j",), points, interpolation="cubic")
+
+
+def test_positions_alone_get_the_velocities_of_a_spline():
+    """Conformance 37: 0, 0.1, 0.3 each 0.1 s: 2.25 in between, rest at both ends; equal times are refused."""
+    trajectory = one_joint(at(0, 0.0), at(0.1, 0.1), at(0.3, 0.2))
+    smooth = trajectory.with_spline_velocities()
+    assert smooth.velocities[:, 0] == pytest.approx([0.0, 2.25, 0.0])
+    # Its acceleration does not jump at the point in the middle: the spline is the one of least curvature.
+    left, right = smooth.sample(np.array([0.1 - 1e-9, 0.1 + 1e-9]))[2][:, 0]
+    assert left == pytest.approx(right, abs=1e-5)
+    moving = trajectory.with_spline_velocities(np.array([1.0]))
+    assert moving.velocities[0, 0] == 1.0
+    with pytest.raises(InvalidArgument, match="not later"):
+        one_joint(at(0, 0.0), at(0.1, 0.1), at(0.3, 0.1))
+
+
+def test_after_its_end_the_last_point_repeats():
+    trajectory = one_joint(at(0, 0.0, 0.0, 0.0), at(1, 1.0, 2.0, 3.0))
+    assert values(trajectory, 5.0) == (1.0, 2.0, 3.0)
+
+
+def test_efforts_are_linear_and_given_at_all_points():
+    points = [TrajectoryPoint([0], t, effort=[e]) for t, e in ((1.0, 2.0), (2.0, 6.0))]
+    trajectory = JointTrajectory(("j",), points, at(0, 0.0))
+    assert [trajectory.sample_effort(t)[0] for t in (0.5, 1.0, 1.25, 9.0)] == pytest.approx([1.0, 2.0, 3.0, 6.0])
+    assert one_joint(at(0, 0.0)).sample_effort(np.array([0.0, 1.0])).tolist() == [[0.0], [0.0]]
+    with pytest.raises(InvalidArgument, match="point 1 gives no efforts"):
+        one_joint(points[0], at(1, 2.0))
+
+
+def test_points_may_be_messages():
+    class Duration:
+        sec, nanosec = 1, 500_000_000
+
+    class Point:
+        positions, velocities, accelerations, effort = [2.0], [], [], []
+        time_from_start = Duration()
+
+    trajectory = JointTrajectory(["j"], [Point()], TrajectoryPoint([0.0]))
+    assert trajectory.duration == 1.5
+    assert values(trajectory, 0.75)[0] == pytest.approx(1.0)
+
+
+def test_some_joints_in_another_order():
+    some = dense().of_joints(("c", "a"))
+    for got, whole in zip(some.sample(0.0123), dense().sample(0.0123), strict=True):
+        assert np.array_equal(got, whole[[2, 0]])
 
 
 @given(
@@ -188,6 +281,8 @@ def test_what_cannot_be_followed_is_refused(changes, text):
         ([TrajectoryPoint(positions=[1, 2, 3])], "point 0 has 3 positions; expected 2"),
         ([TrajectoryPoint(positions=[1, 2], velocities=[1])], "point 0 has 1 velocities; expected 2"),
         ([TrajectoryPoint(positions=[1, 2], accelerations=[1, 1])], "accelerations but no velocities"),
+        ([TrajectoryPoint(positions=[1, 2], effort=[1])], "point 0 has 1 efforts; expected 2"),
+        ([TrajectoryPoint(velocities=[1])], "point 0 has 1 velocities; expected 2"),
     ],
 )
 def test_points_of_the_wrong_length_are_refused(points, text):
