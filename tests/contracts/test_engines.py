@@ -295,6 +295,16 @@ def test_effort_accelerates_by_the_inertia(member: EngineMember, opens: Opens, t
 
 
 @with_physics
+@pytest.mark.parametrize("substeps", [2, 5])
+def test_an_effort_acts_in_every_physics_step_of_a_control_tick(
+    member: EngineMember, opens: Opens, substeps: int
+) -> None:
+    engine = opens(member, pendulum(), scene(gravity=0.0), substeps=substeps)
+    states = run(engine, 21, lambda *_: np.array([10.0]))
+    assert states[20][1][0] == pytest.approx(10.0 * 20 * substeps * STEP / (2.0 * 0.25 + 0.01), rel=1e-6)
+
+
+@with_physics
 @every_interface
 def test_joints_do_not_jump(member: EngineMember, opens: Opens, interface: Mode) -> None:
     """Position changes are velocities times the step, whatever is commanded."""

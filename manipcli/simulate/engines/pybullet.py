@@ -198,6 +198,7 @@ class PybulletEngine:
         self._version = -1
         self._torques_at: slice | list[int] = []
         self._torque_joints: list[int] = []
+        self._torques: list[float] = []
         self._motors: list[tuple[int, int, Mode]] = []
         self._measures = False
         self._applied = np.zeros(n)
@@ -266,10 +267,7 @@ class PybulletEngine:
         if self._torque_joints:
             at = self._torques_at
             self._applied[at] = command.effort[at]
-            p.setJointMotorControlArray(
-                self._robot, self._torque_joints, p.TORQUE_CONTROL, forces=self._applied[at].tolist(),
-                physicsClientId=client,
-            )  # fmt: skip
+            self._torques = self._applied[at].tolist()
         for row, joint, mode in self._motors:
             if mode == "position":
                 p.setJointMotorControl2(
@@ -302,6 +300,7 @@ class PybulletEngine:
         torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
         self._torques_at = slice(None) if len(torques) == len(modes) else torques
         self._torque_joints = [self._joints[k] for k in torques]
+        self._torques = [0.0] * len(torques)
         self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
         self._measures = bool(self._motors) or "brake" in modes
         self._applied[:] = 0.0
@@ -328,8 +327,13 @@ class PybulletEngine:
         return sensor.values
 
     def advance(self) -> None:
+        p, client, joints = self._p, self._client, self._torque_joints
         for _ in range(self._substeps):
-            self._p.stepSimulation(self._client)
+            if joints:  # Bullet forgets torques after a step
+                p.setJointMotorControlArray(
+                    self._robot, joints, p.TORQUE_CONTROL, forces=self._torques, physicsClientId=client
+                )
+            p.stepSimulation(client)
 
     def touches_changed(self) -> bool:
         points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
