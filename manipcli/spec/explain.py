@@ -18,7 +18,9 @@ Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not 
 | 211 | an expression (`2 * $tilt + 5 deg`) that cannot be computed |
 | 212 | an override (`--set a.b=value`) that fits nowhere |
 | 213 | the file needs a newer manipcli |
-| 214 | a parameter that ROS knows and manipcli does not serve (warning) |
+| 214 | something that ROS knows and manipcli does not serve (warning) |
+| 215 | of several controllers of ROS on one joint, one that is not started (note) |
+| 216 | an integral gain that ROS 1 would not let act (warning) |
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from manipcli.spec.kind import refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.ros_form import rewrite
+from manipcli.spec.ros import rewrite
 from manipcli.spec.salvage import salvage
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node
@@ -71,13 +71,15 @@ def kind_of(path: Path) -> FileKind:
     Raises:
         InvalidInput: it cannot be read, or is no YAML mapping.
     """
-    root = parse(read_bytes(path), str(path))
+    root = parse(read_bytes(path), str(path), infinite=True)
     if not isinstance(root, MappingNode):
         message = "expected the mapping of a task, robot or controllers file"
         raise InvalidInput([Finding("USE104", message, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
         return "task"
-    return "robot" if "robot" in root.entries or "description" in root.entries else "controllers"
+    # In a file of ROS `robot` may be a namespace.
+    named = "robot" in root.entries and not isinstance(root.get("robot"), MappingNode)
+    return "robot" if named or "description" in root.entries else "controllers"
 
 
 def load_task(
@@ -165,7 +167,7 @@ def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[s
 def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> Source:
     if kind is not None:
         refuse_description(name, kind)
-    root: Node | None = parse(text, name)
+    root: Node | None = parse(text, name, infinite=area == "CTRL")
     if kind is not None and root is not None:
         refuse_other_kind(root, name, kind)
     return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area)

@@ -47,16 +47,18 @@ _TRUE, _FALSE = re.compile(r"true|True|TRUE"), re.compile(r"false|False|FALSE")
 _INT = re.compile(r"[-+]?[0-9]+")
 _BASED = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
+_NOT_FINITE = re.compile(_INFINITE.pattern + r"|\.(nan|NaN|NAN)")
 _LONGEST_NUMBER = 400
 
 
-def parse(data: bytes | str, name: str) -> Node | None:
+def parse(data: bytes | str, name: str, *, infinite: bool = False) -> Node | None:
     """The tree of one YAML document; None when there is nothing but comments.
 
     Args:
         data: the file's bytes, or its text.
         name: what places call the file.
+        infinite: take `.inf` as a number, for the files of others, who write it where there is no limit.
 
     Raises:
         InvalidInput: with every finding up to the first syntax error.
@@ -78,7 +80,7 @@ def parse(data: bytes | str, name: str) -> Node | None:
                 )
             ]
         )
-    composer = _Composer(name=name, text=text)
+    composer = _Composer(name=name, text=text, infinite=infinite)
     try:
         root = composer.document(_events(text))
     except yaml.YAMLError as error:
@@ -218,6 +220,7 @@ class _Limit(yaml.YAMLError):
 class _Composer:
     name: str
     text: str
+    infinite: bool
     findings: list[Finding] = field(default_factory=list)
     anchors: dict[str, _Composed | None] = field(default_factory=dict)
     nodes: int = 0
@@ -347,6 +350,8 @@ class _Composer:
         whole, based = _INT.fullmatch(text), _BASED.fullmatch(text)
         if (whole or based) and len(text) <= _LONGEST_NUMBER:
             return int(text) if whole else int(text, 0)
+        if self.infinite and _INFINITE.fullmatch(text):
+            return -math.inf if text.startswith("-") else math.inf
         if _NOT_FINITE.fullmatch(text):
             self.tell("YAML111", f"'{text}' is not a finite number", event, "quotes make it a text")
             return 0.0

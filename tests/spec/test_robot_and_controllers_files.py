@@ -33,7 +33,7 @@ arm:
   ros__parameters:
     joints: [a, b]
     command_interfaces: [effort]
-    gains: {a: {p: 3.0, i_clamp_max: 1.0, i_clamp_min: -1.0, u_clamp_max: 3.0}}
+    gains: {a: {p: 3.0, i_clamp_max: 1.0, i_clamp_min: -1.0, normalize_error: true}}
     constraints: {goal_time: 0.5, a: {goal: 0.0, trajectory: 0.1}}
 """
 OWN = """\
@@ -72,15 +72,14 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
     arm = located.spec.controllers["arm"]
     assert isinstance(arm, JointTrajectorySpec)
     assert (arm.joints, arm.interfaces) == (("a", "b"), ("effort",))
-    assert (arm.gains["a"].p, arm.gains["a"].i_clamp) == (3.0, 1.0)
+    assert (arm.gains["a"].p, arm.gains["a"].i_clamp_min, arm.gains["a"].i_clamp_max) == (3.0, -1.0, 1.0)
     assert (arm.constraints.joints["a"].goal, arm.constraints.joints["a"].trajectory) == (None, 0.1)
-    assert list(located.spec.controllers) == ["arm"]
+    assert list(located.spec.controllers) == ["joint_state_broadcaster", "arm"]
     assert lines(located.findings) == [
-        "c.yaml:3:5: warning[CTRL214]: controller_manager: ROS knows 'update_rate', manipcli does not serve it: "
+        "c.yaml:3:5: note[CTRL214]: controller_manager: the control rate is the task's, not this 'update_rate': "
         "left out",
-        "c.yaml:4:37: note[CTRL214]: controller 'joint_state_broadcaster' is not needed: "
-        "joint states are always recorded",
-        "c.yaml:10:62: warning[CTRL214]: arm: ROS knows 'u_clamp_max', manipcli does not serve it: left out",
+        "c.yaml:10:62: warning[CTRL214]: arm.gains.a: ROS knows 'normalize_error', manipcli does not serve it: "
+        "left out",
     ]
 
 
@@ -107,16 +106,16 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
         ),
         (
             PAPER.replace("goal: 0.05", "gaol: 0.05"),
-            "c.yaml:8:7: error[CTRL201]: controllers.arm_controller.constraints.joints.joint1: unknown key 'gaol'",
+            "c.yaml:8:7: error[CTRL201]: arm_controller.constraints.joint1: unknown key 'gaol'",
         ),
         (
             PAPER.replace("goal_time", "goal_tim"),
-            "c.yaml:6:5: error[CTRL201]: controllers.arm_controller.constraints: unknown key 'goal_tim'",
+            "c.yaml:6:5: error[CTRL201]: arm_controller.constraints: unknown key 'goal_tim'",
         ),
         (
             PAPER.replace("effort_controllers", "efort_controllers"),
-            "c.yaml:2:9: error[CTRL203]: the controller type "
-            "'efort_controllers/JointTrajectoryController' is not served",
+            "c.yaml:2:9: error[CTRL203]: controller 'arm_controller': the type "
+            "'efort_controllers/JointTrajectoryController' is not known",
         ),
         (
             ROS2 + "amr: {ros__parameters: {}}\n",

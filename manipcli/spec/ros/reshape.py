@@ -1,0 +1,85 @@
+"""What no table can say: where a type of ROS stores the same thing in another shape."""
+
+from __future__ import annotations
+
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+
+
+def joint_trajectory(node: MappingNode) -> MappingNode:
+    """`velocity_ff` beside the gains goes into them; tolerances stand below `joints`, and 0 means not enforced."""
+    node = _feed_forward(node)
+    constraints = node.entries.get("constraints")
+    if constraints is None or not isinstance(constraints.node, MappingNode):
+        return node
+    kept: dict[str, Entry] = {}
+    joints: dict[str, Entry] = {}
+    for key, entry in constraints.node.entries.items():
+        if key != "joints" and isinstance(entry.node, MappingNode):
+            joints[key] = Entry(entry.key_place, without_zeros(entry.node))
+        else:
+            kept[key] = entry
+    place = constraints.node.place
+    if joints and "joints" not in kept:
+        kept["joints"] = Entry(place, MappingNode(joints, place))
+    return node.with_entry("constraints", Entry(constraints.key_place, MappingNode(kept, place)))
+
+
+def one_joint(node: MappingNode) -> MappingNode:
+    """ROS 1 has controllers of one `joint`."""
+    entry = node.entries.get("joint")
+    if entry is None or "joints" in node.entries or not isinstance(entry.node, ScalarNode):
+        return node
+    listed: Node = SequenceNode((entry.node,), entry.node.place)
+    return MappingNode(
+        {
+            ("joints" if key == "joint" else key): (Entry(one.key_place, listed) if key == "joint" else one)
+            for key, one in node.entries.items()
+        },
+        node.place,
+    )
+
+
+def pid(node: MappingNode) -> MappingNode:
+    """ROS 1 writes `pid` beside the one `joint`, or below the name of each of several."""
+    alone = node.get("joint")
+    gains: dict[str, Entry] = {}
+    if isinstance(alone, ScalarNode) and isinstance(alone.value, str) and "pid" in node.entries:
+        gains[alone.value] = node.entries["pid"]
+        node = node.without("pid")
+    joints = node.get("joints")
+    for item in joints.items if isinstance(joints, SequenceNode) else ():
+        name = item.value if isinstance(item, ScalarNode) else None
+        own = node.get(name) if isinstance(name, str) else None
+        if isinstance(name, str) and isinstance(own, MappingNode) and own.entries.keys() == {"pid"}:
+            gains[name] = own.entries["pid"]
+            node = node.without(name)
+    if gains and "gains" not in node.entries:
+        place = next(iter(gains.values())).key_place
+        node = node.with_entry("gains", Entry(place, MappingNode(gains, place)))
+    return one_joint(node)
+
+
+def without_zeros(block: MappingNode) -> MappingNode:
+    """Tolerances of 0 are not enforced in ROS: the same as none."""
+    zeros = [
+        key
+        for key in ("goal", "trajectory")
+        if isinstance(found := block.get(key), ScalarNode) and found.value in (0, 0.0)
+    ]
+    return block.without(*zeros)
+
+
+def _feed_forward(node: MappingNode) -> MappingNode:
+    scales, gains = node.get("velocity_ff"), node.get("gains")
+    if not isinstance(scales, MappingNode) or not (gains is None or isinstance(gains, MappingNode)):
+        return node
+    entries = {} if gains is None else dict(gains.entries)
+    for joint, scale in scales.entries.items():
+        own = entries.get(joint)
+        block = MappingNode({}, scale.key_place) if own is None else own.node
+        if isinstance(block, MappingNode):
+            key_place = scale.key_place if own is None else own.key_place
+            entries[joint] = Entry(key_place, block.with_entry("ff_velocity_scale", scale))
+    made = MappingNode(entries, scales.place if gains is None else gains.place)
+    key = node.entries["velocity_ff" if gains is None else "gains"].key_place
+    return node.without("velocity_ff").with_entry("gains", Entry(key, made))

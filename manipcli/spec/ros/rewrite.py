@@ -1,0 +1,283 @@
+"""From a tree in one of ROS's forms to one in ours, and what is to be told of it."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel
+
+from manipcli.core.errors import Finding, Place, Severity
+from manipcli.core.text import did_you_mean
+from manipcli.spec.controllers import Role
+from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
+from manipcli.spec.ros.table import Block, Table, model_below, models, value
+from manipcli.spec.ros.tables import BY_TYPE, OTHER_NODES, UNSERVED_TYPES
+from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
+
+_CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
+
+
+def rewrite(root: Node) -> tuple[Node, list[Finding]]:
+    """The tree in our form (`controllers: {NAME: ...}`) and findings; a tree in our form comes back as it is."""
+    work = _Rewriting()
+    if not isinstance(root, MappingNode) or not root.entries:
+        return root, []
+    version = {key: entry for key, entry in root.entries.items() if key == "version"}
+    wrapped = root.entries.get("controllers")
+    if is_ros2(root):
+        found = work.of_nodes(root.without("version"))
+        place, rest = root.place, MappingNode(version, root.place)
+    elif wrapped is None:
+        work.ros1 = True
+        found = work.of_blocks(root.without("version"))
+        place, rest = root.place, MappingNode(version, root.place)
+    elif isinstance(wrapped.node, MappingNode):
+        found = [Found((key,), entry.key_place, entry.node) for key, entry in wrapped.node.entries.items()]
+        place, rest = wrapped.key_place, root
+    else:
+        return root, []
+    entries = {
+        name: Entry(one.key_place, node)
+        for name, one in named(found)
+        if (node := work.controller(name, one.node)) is not None
+    }
+    inner = root.place if wrapped is None else wrapped.node.place
+    made = MappingNode(work.started(entries), inner)
+    findings = sorted(work.findings, key=lambda f: (f.place.line, f.place.column) if f.place is not None else (0, 0))
+    return rest.with_entry("controllers", Entry(place, made)), findings
+
+
+class _Rewriting:
+    """One file.
+
+    `foreign`: the controllers that ROS's files do not say of whether they are started. `ros1`: it is not in the form of
+    ROS 2, so that a type of ROS is meant as in ROS 1.
+    """
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+        self.models = models()
+        self.ros1 = False
+        self.foreign: list[str] = []
+
+    def tell(
+        self, code: str, place: Place, message: str, *, hint: str | None = None, severity: Severity = "error"
+    ) -> None:
+        self.findings.append(Finding(code, message, place, hint=hint, severity=severity))
+
+    def of_blocks(self, root: MappingNode) -> list[Found]:
+        """The controllers of ROS 1 or of our form without `controllers:`."""
+        found = []
+        for one in in_namespaces(root):
+            if one.name in OTHER_NODES and not has_type(one.node):
+                self.tell("CTRL214", one.key_place, f"'{one.name}' is no controller: left out", severity="warning")
+            else:
+                found.append(one)
+        return found
+
+    def of_nodes(self, root: MappingNode) -> list[Found]:
+        """The controllers of ROS 2: their types stand at the controller manager, or at their own nodes."""
+        nodes = list(at_nodes(root))
+        managers = [one for one in nodes if one.name == MANAGER or not one.path]
+        own = [one for one in nodes if one not in managers]
+        declared = [found for manager in managers for found in self.declared(manager)]
+        used: list[Found] = []
+        found = []
+        for one in declared:
+            blocks = [node for node in own if node.path == one.path] or [n for n in own if _may_be(n, one)]
+            used += blocks
+            merged = dict(mapping(one.node).entries)
+            for block in blocks:
+                merged.update(mapping(block.node).entries)
+            # What is missing in a controller is missing in its own block, where there is one.
+            nearest = blocks[-1] if blocks else one
+            place = nearest.key_place if blocks else one.node.place
+            found.append(Found(one.path, nearest.key_place, MappingNode(merged, place)))
+        names = [one.name for one in declared]
+        for node in own:
+            if node in used:
+                continue
+            if has_type(node.node):
+                found.append(node)
+            elif node.name in OTHER_NODES:
+                self.tell("CTRL214", node.key_place, f"'{node.name}' is no controller: left out", severity="warning")
+            else:
+                hint = did_you_mean(node.name, names, kind="it names")
+                message = f"the controller_manager names no controller '{node.name}'"
+                self.tell("CTRL203", node.key_place, message, hint=hint)
+        return found
+
+    def declared(self, manager: Found) -> list[Found]:
+        """The controllers that a manager names; its own parameters are told of."""
+        found, names = [], []
+        above = manager.path[:-1]
+        for key, entry in mapping(manager.node).entries.items():
+            if has_type(entry.node):
+                found.append(Found((*above, key), entry.key_place, entry.node))
+            else:
+                names.append(key)
+        for key in names:
+            self.managers_own(key, mapping(manager.node).entries[key], [one.name for one in found])
+        return found
+
+    def managers_own(self, key: str, entry: Entry, declared: list[str]) -> None:
+        if key == "update_rate":
+            rate, hint = plain(entry.node), None
+            if isinstance(rate, int | float) and not isinstance(rate, bool) and rate > 0:
+                hint = f"say `simulation: {{control_period: {1.0 / rate:g} s}}` in the task"
+            message = f"{MANAGER}: the control rate is the task's, not this 'update_rate': left out"
+            self.tell("CTRL214", entry.key_place, message, hint=hint, severity="note")
+        elif not _neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
+            hint = did_you_mean(key, [*MANAGER_BLOCK.names, *declared], kind="known")
+            self.tell("CTRL201", entry.key_place, f"{MANAGER}: unknown key '{key}'", hint=hint)
+
+    def controller(self, name: str, node: Node) -> Node | None:
+        """One controller in our form; None when there is nothing to build for it."""
+        if not isinstance(node, MappingNode) or not has_type(node):
+            return node
+        word, entry = node.get("type"), node.entries["type"]
+        if not isinstance(word, ScalarNode) or not isinstance(word.value, str) or "/" not in word.value:
+            return node
+        table = BY_TYPE.get(word.value)
+        model = None if table is None else self.models.get(table.own)
+        if table is None or model is None:
+            self.unknown_type(name, word.value, word.place)
+            return None
+        own = ScalarNode(table.own, word.place, written=word.value)
+        node = node.with_entry("type", Entry(entry.key_place, own))
+        node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
+        if table.needs and table.needs not in node.entries:
+            message = f"controller '{name}': nothing says its '{table.needs}': left out"
+            self.tell("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
+            return None
+        self.foreign.append(name)
+        if word.value in table.differing:
+            message = f"controller '{name}' {table.differing[word.value]}"
+            self.tell("CTRL214", word.place, message, severity="warning")
+        served = self.served(name, node, table.parameters, model)
+        self.unclamped(name, mapping(mapping(served).get("gains")))
+        return served
+
+    def unclamped(self, name: str, gains: MappingNode) -> None:
+        """Integrals that do nothing in ROS 1, and much here."""
+        for joint, entry in gains.entries.items() if self.ros1 else ():
+            block = mapping(entry.node)
+            gain = block.entries.get("i")
+            if gain is None or plain(gain.node) in (0, 0.0) or _CLAMPS & block.entries.keys():
+                continue
+            message = f"{name}.gains.{joint}: in ROS 1 an 'i' without 'i_clamp' has no effect; here it is not clamped"
+            self.tell("CTRL216", gain.key_place, message, hint="add i_clamp, or leave i out", severity="warning")
+
+    def unknown_type(self, name: str, word: str, place: Place) -> None:
+        if word in UNSERVED_TYPES:
+            message = f"controller '{name}': ROS knows the type '{word}', manipcli does not serve it: left out"
+            self.tell("CTRL214", place, message, severity="warning")
+            return
+        hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="served")
+        self.tell("CTRL203", place, f"controller '{name}': the type '{word}' is not known", hint=hint)
+
+    def served(self, where: str, node: Node, block: Block, model: type[BaseModel] | None) -> Node:
+        """`node` without the parameters that ROS knows and the spec does not have; what nobody knows is told."""
+        if not isinstance(node, MappingNode):
+            return node
+        node = _renamed(node, block)
+        kept: dict[str, Entry] = {}
+        fields = () if model is None else tuple(model.model_fields)
+        for key, entry in node.entries.items():
+            if _neutral(block, key, entry.node):
+                continue
+            given = plain(entry.node)
+            if given in block.unserved.get(key, ()):
+                message = f"{where}: ROS knows '{key}: {given}', manipcli does not serve it: left out"
+                self.tell("CTRL214", entry.key_place, message, severity="warning")
+            elif block.joint is not None and isinstance(entry.node, MappingNode) and key not in fields:
+                inner = self.served(f"{where}.{key}", entry.node, block.joint, model)
+                kept[key] = Entry(entry.key_place, inner)
+            elif key in fields:
+                below = block.inner.get(key)
+                inner = entry.node
+                if below is not None:
+                    path = where if key == "joints" else f"{where}.{key}"  # ROS has no such level
+                    inner = self.served(path, inner, below, model_below(model, key))
+                kept[key] = Entry(entry.key_place, inner)
+            elif block.joint is not None:
+                kept[key] = entry  # no block: the validation says what was expected
+            elif not self.unserved(where, key, entry, block):
+                hint = did_you_mean(key, [*fields, *block.names], kind="known")
+                self.tell("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+        return MappingNode(kept, node.place)
+
+    def unserved(self, where: str, key: str, entry: Entry, block: Block) -> bool:
+        """Whether ROS knows it; then it is left out, which is told."""
+        if key not in block.names:
+            return False
+        severity: Severity = "note" if key in block.quiet else "warning"
+        message = f"{where}: ROS knows '{key}', manipcli does not serve it: left out"
+        self.tell("CTRL214", entry.key_place, message, severity=severity)
+        return True
+
+    def role(self, node: Node) -> Role:
+        word = mapping(node).get("type")
+        model = self.models.get(str(word.value)) if isinstance(word, ScalarNode) else None
+        return "other" if model is None else model.role
+
+    def started(self, entries: dict[str, Entry]) -> dict[str, Entry]:
+        """ROS's files do not say who is started: of several that command a joint, the first is that steps can use."""
+        owners: dict[str, str] = {}
+        result = dict(entries)
+        for name in sorted(entries, key=lambda name: self.role(entries[name].node) == "other"):
+            entry = entries[name]
+            node = entry.node
+            if isinstance(node, MappingNode) and name in self.foreign and "active" not in node.entries:
+                joints = _joints(node)
+                taken = next((joint for joint in joints if joint in owners), None)
+                if taken is not None:
+                    message = f"controller '{name}' starts inactive: '{owners[taken]}' commands '{taken}'"
+                    hint = "say `active: true` or `false`, or add a step `switch_controllers`"
+                    self.tell("CTRL215", entry.key_place, message, hint=hint, severity="note")
+                    off = Entry(entry.key_place, ScalarNode(False, entry.key_place))
+                    entry = Entry(entry.key_place, node.with_entry("active", off))
+                else:
+                    owners.update(dict.fromkeys(joints, name))
+            result[name] = entry
+        return result
+
+
+def _joints(node: MappingNode) -> list[str]:
+    """The joints that a controller commands."""
+    word, joints = node.get("type"), node.get("joints")
+    if not isinstance(word, ScalarNode) or not isinstance(joints, SequenceNode) or "broadcaster" in str(word.value):
+        return []
+    return [item.value for item in joints.items if isinstance(item, ScalarNode) and isinstance(item.value, str)]
+
+
+def _may_be(node: Found, controller: Found) -> bool:
+    """Whether these parameters are this controller's: the same name, and one of them does not say its namespace."""
+    return node.name == controller.name and 1 in (len(node.path), len(controller.path))
+
+
+def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
+    """With what the type of ROS says beyond ours."""
+    for key, words in table.types[str(word.value)].items():
+        if key in node.entries:
+            continue
+        plural = key.endswith("interfaces")
+        items = tuple(ScalarNode(value(one), word.place) for one in words.split())
+        said: Node = SequenceNode(items, word.place) if plural else items[0]
+        node = node.with_entry(key, Entry(word.place, said))
+    return node
+
+
+def _neutral(block: Block, key: str, node: Node) -> bool:
+    given = plain(node)
+    return any(given == nothing and type(given) is type(nothing) for nothing in block.neutral.get(key, ()))
+
+
+def _renamed(node: MappingNode, block: Block) -> MappingNode:
+    """With our names instead of ROS's; where both stand, ours counts and the other is unknown."""
+    return MappingNode(
+        {
+            (key if (own := block.renamed.get(key)) is None or own in node.entries else own): entry
+            for key, entry in node.entries.items()
+        },
+        node.place,
+    )

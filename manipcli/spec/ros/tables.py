@@ -1,0 +1,225 @@
+"""The tables: what ros_controllers and ros2_controllers know, a type of controller each.
+
+Sources: the parameter definitions of ros2_controllers and what the controllers of ros_controllers read.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
+from manipcli.spec.ros.table import Block, Table
+from manipcli.spec.tree import Plain
+
+_EVERYWHERE: Final = frozenset({"use_sim_time", "publish_state", "state_publish_rate", "publish_rate"})
+"""About publishing and clocks: every log has every tick, and simulated time is the only one."""
+_ANY: Final = frozenset(
+    {"is_async", "async_parameters", "thread_priority", "cpu_affinity", "fallback_controllers", "params_file"}
+)
+_NEUTRAL: Final[dict[str, tuple[Plain, ...]]] = {
+    "is_async": (False,), "fallback_controllers": ([],), "params_file": ([], ""), "cpu_affinity": ([],),
+    "update_rate": (0,),
+}  # fmt: skip
+"""In ROS 2 an update rate of 0 is that of the manager."""
+_GAINS: Final = Block(
+    known=frozenset(
+        {
+            "p", "i", "d", "i_clamp", "i_clamp_min", "i_clamp_max", "u_clamp_min", "u_clamp_max", "antiwindup",
+            "antiwindup_strategy", "tracking_time_constant", "error_deadband", "ff_velocity_scale", "feedforward_gain",
+            "normalize_error", "angle_wraparound", "save_i_term", "saturation",
+        }
+    ),
+    quiet=frozenset({"publish_state", "activate_state_publisher"}),
+    neutral={
+        **dict.fromkeys(("i_clamp_min", "i_clamp_max", "u_clamp_min", "u_clamp_max"), (math.inf, -math.inf)),
+        "i_clamp": (math.inf,), "normalize_error": (False,), "angle_wraparound": (False,), "saturation": (False, 0.0),
+    },
+    unserved={"antiwindup_strategy": ("legacy",)},
+)  # fmt: skip
+_INTERFACES: Final = ("position", "velocity", "effort")
+
+JOINT_TRAJECTORY: Final = Table(
+    own="joint_trajectory",
+    types={
+        **{f"{one}_controllers/JointTrajectoryController": {"command_interfaces": one} for one in _INTERFACES},
+        "pos_vel_controllers/JointTrajectoryController": {"command_interfaces": "position velocity"},
+        "pos_vel_acc_controllers/JointTrajectoryController": {"command_interfaces": "position velocity acceleration"},
+        "joint_trajectory_controller/JointTrajectoryController": {},
+    },
+    parameters=Block(
+        known=_ANY | {"command_joints", "hold_trajectory_duration", "velocity_ff"}
+        | {"set_last_command_interface_value_as_state_on_activation"},
+        quiet=_EVERYWHERE | {"action_monitor_rate"},
+        renamed={"open_loop_control": "interpolate_from_desired_state"},
+        inner={
+            "gains": Block(joint=_GAINS),
+            "constraints": Block(inner={"joints": Block(joint=Block())}),
+            "speed_scaling": Block(
+                known=frozenset({"state_interface", "command_interface"}),
+                neutral={"state_interface": ("",), "command_interface": ("",)},
+            ),
+        },
+        neutral=_NEUTRAL | {"command_joints": ([],)},
+    ),
+    reshape=joint_trajectory,
+)  # fmt: skip
+
+GRIPPER: Final = Table(
+    own="gripper",
+    types={
+        "effort_controllers/GripperActionController": {},
+        "position_controllers/GripperActionController": {},
+        "parallel_gripper_action_controller/GripperActionController": {},
+    },
+    differing=dict.fromkeys(
+        ("position_controllers/GripperActionController", "parallel_gripper_action_controller/GripperActionController"),
+        "commands efforts here, not positions, so that its grip has a force: it needs `gains`",
+    ),
+    parameters=Block(
+        known=_ANY | {"allow_stalling", "max_effort_interface", "max_velocity_interface"},
+        quiet=_EVERYWHERE | {"state_interfaces", "action_monitor_rate"},
+        renamed={
+            "stall_velocity_threshold": "stall_velocity", "stall_timeout": "stall_time", "max_velocity": "speed",
+        },
+        inner={"gains": Block(joint=_GAINS)},
+        neutral=_NEUTRAL | {
+            "max_effort_interface": ("",), "max_velocity_interface": ("",), "allow_stalling": (True,),
+            "max_effort": (0, 0.0),
+        },
+    ),
+    reshape=one_joint,
+)  # fmt: skip
+
+FORWARD: Final = Table(
+    own="forward_command",
+    types={
+        "forward_command_controller/ForwardCommandController": {},
+        "position_controllers/JointGroupPositionController": {"command_interface": "position"},
+        "velocity_controllers/JointGroupVelocityController": {"command_interface": "velocity"},
+        "effort_controllers/JointGroupEffortController": {"command_interface": "effort"},
+        "position_controllers/JointPositionController": {"command_interface": "position"},
+        "velocity_controllers/JointVelocityController": {"command_interface": "velocity"},
+        "effort_controllers/JointEffortController": {"command_interface": "effort"},
+    },
+    parameters=Block(
+        known=_ANY,
+        quiet=_EVERYWHERE,
+        renamed={"interface_name": "command_interface"},
+        neutral=_NEUTRAL,
+    ),
+    reshape=one_joint,
+)
+
+PID: Final = Table(
+    own="pid",
+    types={
+        "pid_controller/PidController": {},
+        "effort_controllers/JointPositionController": {"command_interface": "effort"},
+        "effort_controllers/JointGroupPositionController": {"command_interface": "effort"},
+        "velocity_controllers/JointPositionController": {"command_interface": "velocity"},
+        "effort_controllers/JointVelocityController": {
+            "command_interface": "effort", "reference_and_state_interfaces": "velocity",
+        },
+    },
+    parameters=Block(
+        known=_ANY | {
+            "reference_and_state_dof_names", "use_external_measured_states", "enable_feedforward",
+            "measured_state_suffix", "export_params",
+        },
+        quiet=_EVERYWHERE,
+        renamed={"dof_names": "joints"},
+        inner={"gains": Block(joint=_GAINS)},
+        neutral=_NEUTRAL | {"reference_and_state_dof_names": ([],), "use_external_measured_states": (False,)},
+    ),
+    reshape=pid,
+)  # fmt: skip
+
+JOINT_STATES: Final = Table(
+    own="joint_state_broadcaster",
+    types={"joint_state_broadcaster/JointStateBroadcaster": {}, "joint_state_controller/JointStateController": {}},
+    parameters=Block(
+        known=_ANY | {"extra_joints", "map_interface_to_joint_state"},
+        quiet=_EVERYWHERE | {"use_local_topics", "use_urdf_to_filter", "frame_id", "publish_dynamic_joint_states"},
+        renamed={"interfaces": "state_interfaces"},
+        neutral=_NEUTRAL | {
+            "state_interfaces": ([],), "joints": ([],), "extra_joints": ([],),
+            "map_interface_to_joint_state": ({one: one for one in _INTERFACES},),
+        },
+    ),
+)  # fmt: skip
+
+WRENCH: Final = Table(
+    own="force_torque_broadcaster",
+    types={
+        "force_torque_sensor_broadcaster/ForceTorqueSensorBroadcaster": {},
+        "force_torque_sensor_controller/ForceTorqueSensorController": {},
+    },
+    parameters=Block(
+        known=_ANY | {"additional_frames_to_publish", "sensor_filter_chain", "offset", "multiplier"},
+        quiet=_EVERYWHERE | {"sensor_name", "interface_names"},
+        renamed={"frame_id": "link"},
+        neutral=_NEUTRAL | {"additional_frames_to_publish": ([],)},
+    ),
+    needs="link",
+)  # fmt: skip
+
+TABLES: Final = (JOINT_TRAJECTORY, GRIPPER, FORWARD, PID, JOINT_STATES, WRENCH)
+BY_TYPE: Final = {name: table for table in TABLES for name in table.types}
+
+UNSERVED_TYPES: Final = frozenset(
+    {
+        "ackermann_steering_controller/AckermannSteeringController",
+        "admittance_controller/AdmittanceController",
+        "battery_state_broadcaster/BatteryStateBroadcaster",
+        "bicycle_steering_controller/BicycleSteeringController",
+        "chained_filter_controller/ChainedFilter",
+        "diff_drive_controller/DiffDriveController",
+        "forward_command_controller/MultiInterfaceForwardCommandController",
+        "four_wheel_steering_controller/FourWheelSteeringController",
+        "gpio_controllers/GpioCommandController",
+        "gps_sensor_broadcaster/GPSSensorBroadcaster",
+        "imu_sensor_broadcaster/IMUSensorBroadcaster",
+        "imu_sensor_controller/ImuSensorController",
+        "magnetometer_broadcaster/MagnetometerBroadcaster",
+        "mecanum_drive_controller/MecanumDriveController",
+        "motion_primitives_controllers/MotionPrimitivesForwardController",
+        "omni_wheel_drive_controller/OmniWheelDriveController",
+        "pose_broadcaster/PoseBroadcaster",
+        "range_sensor_broadcaster/RangeSensorBroadcaster",
+        "state_interfaces_broadcaster/StateInterfacesBroadcaster",
+        "tricycle_controller/TricycleController",
+        "tricycle_steering_controller/TricycleSteeringController",
+    }
+)
+"""Controllers that ROS has and manipcli does not: left out with a warning."""
+
+MANAGER: Final = Block(
+    known=frozenset(
+        {
+            "allow_controller_activation_with_inactive_hardware", "defaults", "enforce_command_limits",
+            "deactivate_controllers_on_hardware_self_deactivate", "handle_exceptions",
+            "hardware_components_initial_state", "shutdown_on_initial_state_failure",
+        }
+    ),
+    quiet=frozenset(
+        {
+            "cpu_affinity", "controller_plugins", "diagnostics", "lock_memory", "overruns", "robot_description",
+            "thread_priority", "update_rate", "use_sim_time",
+        }
+    ),
+    neutral={"enforce_command_limits": (True,), "handle_exceptions": (True,)},
+)  # fmt: skip
+"""Parameters of ROS 2's controller manager itself."""
+
+OTHER_NODES: Final = frozenset(
+    {
+        "controller_list", "controller_manager", "controller_manager_ns", "controller_names", "controller_stopper",
+        "gazebo_ros_control", "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
+        "joint_group_limits", "joint_limits", "joint_state_publisher", "joint_state_publisher_gui", "move_group",
+        "moveit_controller_manager", "moveit_manage_controllers", "moveit_simple_controller_manager",
+        "robot_description", "robot_state_publisher", "ros2_control_node", "ros_control_namespace", "rviz2",
+        "servo_node", "sim_control_mode", "trajectory_execution", "use_sim_time",
+    }
+)  # fmt: skip
+"""What else stands in files of ROS that hold controllers, and is none."""
