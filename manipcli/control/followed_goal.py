@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalHandle
+from manipcli.control.course import INSTANT
 from manipcli.control.tolerances import Tolerances
 from manipcli.control.trajectory_goal import JointFacts
 from manipcli.core.geometry import Array
@@ -94,4 +95,4 @@ class FollowedGoal:
     def next_point(self, clock: float) -> int:
         """The point of its trajectory that comes next, or its last."""
         times = self.trajectory.times
-        return min(int(np.searchsorted(times, clock - self.begin, side="right")), len(times) - 1)
+        return min(int(np.searchsorted(times, clock - self.begin + INSTANT, side="right")), len(times) - 1)
