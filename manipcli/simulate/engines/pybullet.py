@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-import math
 import struct
 import tempfile
 from pathlib import Path
 from types import ModuleType
-from typing import Final, cast
+from typing import Final
 
 import numpy as np
 
-from manipcli.control.actuation import motor_effort_limits
-from manipcli.control.command import JointCommand, Mode
+from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
-from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.normalise import engine_urdf, massless_joints
-from manipcli.model.robot import Box, Cylinder, Mesh, RobotModel, Sphere
-from manipcli.model.scene import Body, Scene
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines.pybullet_contacts import NONE, ContactMerger, Pair, Vector, touching_pairs
+from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
+from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensor
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
 MAX_JOINTS: Final = 127
 """Moving and fixed; with one more `getJointState` fails, with thousands the process."""
-UNLIMITED_EFFORT: Final = 1e6
-"""Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
-POSITION_TIME: Final = 0.01
-"""A position command is approached with this time constant [s], whatever the physics step; ros_gz's default gain of
-0.1 at 1 kHz is nearly that."""
-MIMIC_ERP: Final = 0.2
-MIMIC_EFFORT: Final = 200.0
-"""What a mimic coupling may carry [N m or N]."""
 
 
 class PybulletEngine:
@@ -70,10 +61,10 @@ class PybulletEngine:
             physicsClientId=client,
         )
         with tempfile.TemporaryDirectory(prefix="manipcli-") as folder:
-            self._bodies = [self._add_body(body, Path(folder)) for body in scene.bodies]
+            self._bodies = [add_body(p, client, body, Path(folder)) for body in scene.bodies]
             self._load_robot(robot, scene, Path(folder))
         self._movable = [
-            (k, *_centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
+            (k, *centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
         self._start(robot, settings)
         n, m = len(self._joints), len(self._movable)
@@ -92,56 +83,6 @@ class PybulletEngine:
         )
         self._pairs: set[Pair] = NONE
         self._substeps = settings.substeps
-        self._stiffness = -math.expm1(-settings.step / POSITION_TIME)
-
-    def _add_body(self, body: Body, folder: Path) -> int:
-        p, client = self._p, self._client
-        kinds, half, radii, lengths, positions, quats = [], [], [], [], [], []
-        files, scales = [], []
-        for geometry in body.geometries:
-            X_IS = body.X_OI.inverse() @ geometry.X_LS
-            shape = geometry.shape
-            kinds.append(_geometry_kind(p, shape))
-            half.append([s / 2 for s in shape.size] if isinstance(shape, Box) else [0.0, 0.0, 0.0])
-            radii.append(shape.radius if isinstance(shape, Sphere | Cylinder) else 0.0)
-            lengths.append(shape.length if isinstance(shape, Cylinder) else 0.0)
-            files.append(str(clean_mesh(shape, folder)) if isinstance(shape, Mesh) else "")
-            scales.append(list(shape.scale) if isinstance(shape, Mesh) else [1.0, 1.0, 1.0])
-            positions.append(list(X_IS.p))
-            quats.append(list(X_IS.quat_xyzw))
-        collision = p.createCollisionShapeArray(
-            shapeTypes=kinds,
-            halfExtents=half,
-            radii=radii,
-            lengths=lengths,
-            fileNames=files,
-            meshScales=scales,
-            collisionFramePositions=positions,
-            collisionFrameOrientations=quats,
-            physicsClientId=client,
-        )
-        X_WI = body.X_WO @ body.X_OI
-        k = p.createMultiBody(
-            baseMass=0.0 if body.fixed else body.mass,
-            baseCollisionShapeIndex=collision,
-            basePosition=list(X_WI.p),
-            baseOrientation=list(X_WI.quat_xyzw),
-            physicsClientId=client,
-        )
-        p.changeDynamics(
-            k,
-            -1,
-            lateralFriction=body.friction,
-            rollingFriction=body.rolling_friction,
-            spinningFriction=body.spinning_friction,
-            restitution=body.restitution,
-            linearDamping=0.0,
-            angularDamping=0.0,
-            physicsClientId=client,
-        )
-        if not body.fixed:
-            p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
-        return cast(int, k)
 
     def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
         p, client = self._p, self._client
@@ -184,51 +125,9 @@ class PybulletEngine:
         p, client = self._p, self._client
         for k, position in zip(self._joints, settings.start, strict=True):
             p.resetJointState(self._robot, k, float(position), 0.0, physicsClientId=client)
-        p.setJointMotorControlArray(
-            self._robot,
-            self._joints,
-            p.VELOCITY_CONTROL,
-            forces=[0.0] * len(self._joints),
-            physicsClientId=client,
-        )
-        for joint in robot.moving_joints:
-            if joint.mimic is not None:
-                self._couple(robot, joint.name, joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
-        n = len(self._joints)
-        self._version = -1
-        self._torques_at: slice | list[int] = []
-        self._torque_joints: list[int] = []
-        self._torques: list[float] = []
-        self._motors: list[tuple[int, int, Mode]] = []
-        self._measures = False
-        self._applied = np.zeros(n)
+        couple_mimics(p, client, robot, self._robot, self._joints)
         add_rotors(p, client, robot, self._robot, self._joints)
-        limits = [joint.limits for joint in robot.moving_joints]
-        self._efforts = [min(float(effort), UNLIMITED_EFFORT) for effort in motor_effort_limits(robot)]
-        self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
-
-    def _couple(self, robot: RobotModel, follower: str, driver: str, multiplier: float, offset: float) -> None:
-        """A gear constraint between the two joints' child links: follower - multiplier * driver = offset."""
-        p, client = self._p, self._client
-        constraint = p.createConstraint(
-            self._robot,
-            self._joints[robot.joint_names.index(follower)],
-            self._robot,
-            self._joints[robot.joint_names.index(driver)],
-            jointType=p.JOINT_GEAR,
-            jointAxis=list(robot.joint(follower).axis),
-            parentFramePosition=[0, 0, 0],
-            childFramePosition=[0, 0, 0],
-            physicsClientId=client,
-        )
-        p.changeConstraint(
-            constraint,
-            gearRatio=-multiplier,
-            relativePositionTarget=offset,
-            erp=MIMIC_ERP,
-            maxForce=MIMIC_EFFORT,
-            physicsClientId=client,
-        )
+        self._motors = Motors(p, client, self._robot, self._joints, robot, settings.step)
 
     def read(self, *, velocities: bool = True) -> WorldState:
         p, client, state = self._p, self._client, self._state
@@ -243,11 +142,12 @@ class PybulletEngine:
             numbers += position if offset is None else _minus(position, _rotated(quat, offset))
             numbers += quat
         self._pack(self._buffer, 0, *numbers)
-        if self._measures:
+        motors = self._motors
+        if motors.measures:
             state.effort[:] = [s[3] for s in states]
-            state.effort[self._torques_at] += self._applied[self._torques_at]
+            state.effort[motors.torques_at] += motors.applied[motors.torques_at]
         else:
-            state.effort[:] = self._applied
+            state.effort[:] = motors.applied
         if velocities:
             for row, (k, offset, _) in enumerate(self._movable):
                 linear, angular = p.getBaseVelocity(k, client)
@@ -261,65 +161,7 @@ class PybulletEngine:
         return state
 
     def write(self, command: JointCommand) -> None:
-        if command.version != self._version:
-            self._obey(command)
-        p, client = self._p, self._client
-        if self._torque_joints:
-            at = self._torques_at
-            self._applied[at] = command.effort[at]
-            self._torques = self._applied[at].tolist()
-        for row, joint, mode in self._motors:
-            if mode == "position":
-                p.setJointMotorControl2(
-                    self._robot,
-                    joint,
-                    p.POSITION_CONTROL,
-                    targetPosition=float(command.position[row]),
-                    targetVelocity=float(command.velocity[row]),
-                    positionGain=self._stiffness,
-                    force=self._efforts[row],
-                    maxVelocity=self._velocities[row],
-                    physicsClientId=client,
-                )
-            else:
-                p.setJointMotorControl2(
-                    self._robot,
-                    joint,
-                    p.VELOCITY_CONTROL,
-                    targetVelocity=float(command.velocity[row]),
-                    force=self._efforts[row],
-                    physicsClientId=client,
-                )
-
-    def _obey(self, command: JointCommand) -> None:
-        """What each joint obeys has changed: motors on or off. A motor is Bullet's own constraint on a joint's speed,
-        with the joint's effort as its limit; where efforts are commanded it has none."""
-        p = self._p
-        self._version = command.version
-        modes = command.modes
-        torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
-        self._torques_at = slice(None) if len(torques) == len(modes) else torques
-        self._torque_joints = [self._joints[k] for k in torques]
-        self._torques = [0.0] * len(torques)
-        self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
-        self._measures = bool(self._motors) or "brake" in modes
-        self._applied[:] = 0.0
-        for k, mode in enumerate(modes):
-            if mode == "brake":
-                self._brake(k)
-        released = [self._joints[k] for k, mode in enumerate(modes) if mode in ("effort", "free")]
-        if released:
-            none = [0.0] * len(released)
-            p.setJointMotorControlArray(
-                self._robot, released, p.VELOCITY_CONTROL, forces=none, physicsClientId=self._client
-            )
-
-    def _brake(self, k: int) -> None:
-        p, joint = self._p, self._joints[k]
-        p.setJointMotorControl2(
-            self._robot, joint, p.VELOCITY_CONTROL, targetVelocity=0.0, force=self._efforts[k],
-            physicsClientId=self._client,
-        )  # fmt: skip
+        self._motors.write(command)
 
     def sense_wrench(self, joint: str) -> Array:
         sensor = WrenchSensor(self._p, self._client, self._robot, *self._sensed[joint])
@@ -327,13 +169,9 @@ class PybulletEngine:
         return sensor.values
 
     def advance(self) -> None:
-        p, client, joints = self._p, self._client, self._torque_joints
         for _ in range(self._substeps):
-            if joints:  # Bullet forgets torques after a step
-                p.setJointMotorControlArray(
-                    self._robot, joints, p.TORQUE_CONTROL, forces=self._torques, physicsClientId=client
-                )
-            p.stepSimulation(client)
+            self._motors.push()
+            self._p.stepSimulation(self._client)
 
     def touches_changed(self) -> bool:
         points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
@@ -351,24 +189,6 @@ class PybulletEngine:
         if self._client >= 0:
             self._p.disconnect(self._client)
             self._client = -1
-
-
-def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
-    if isinstance(shape, Box):
-        return cast(int, p.GEOM_BOX)
-    if isinstance(shape, Sphere):
-        return cast(int, p.GEOM_SPHERE)
-    if isinstance(shape, Cylinder):
-        return cast(int, p.GEOM_CYLINDER)
-    return cast(int, p.GEOM_MESH)
-
-
-def _centre(body: Body) -> tuple[Vector | None, tuple[float, ...] | None]:
-    """Where Bullet's frame of a body, which is that of its principal inertia, stands in the body's own: the position of
-    the one, and the rotation back; None where there is nothing to change."""
-    x, y, z = (float(v) for v in body.X_OI.p)
-    turned = None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
-    return (x, y, z) if x or y or z else None, turned
 
 
 # Plain floats: numpy costs ten times as much for three numbers.

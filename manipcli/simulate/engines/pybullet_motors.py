@@ -1,0 +1,131 @@
+"""Commands to Bullet's joints: torques, and the motors that stand in for servo drives.
+
+A motor is Bullet's own constraint on a joint's speed, with the joint's effort as its limit; gravity and contact act on
+it as on everything. Where efforts are commanded there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Final
+
+import numpy as np
+
+from manipcli.control.actuation import motor_effort_limits
+from manipcli.control.command import JointCommand, Mode
+from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
+
+UNLIMITED_EFFORT: Final = 1e6
+"""Stands for "no effort limit" where PyBullet wants a number [N m or N]."""
+POSITION_TIME: Final = 0.01
+"""A position command is approached with this time constant [s], whatever the physics step; ros_gz's default gain of
+0.1 at 1 kHz is nearly that."""
+
+
+class Motors:
+    """What the moving joints of one robot obey.
+
+    Attributes:
+        applied: (n) the efforts that act besides the motors' own [N m or N].
+        measures: whether there are motors, whose efforts Bullet tells.
+        torques_at: which joints `applied` is for.
+
+    Args:
+        p, client, body: PyBullet, its world, the robot in it.
+        joints: (n) Bullet's indices of the robot's moving joints.
+        robot: the robot.
+        step: [s] of the physics.
+    """
+
+    def __init__(
+        self, p: ModuleType, client: int, body: int, joints: Sequence[int], robot: RobotModel, step: float
+    ) -> None:
+        self._p, self._client, self._body, self._joints = p, client, body, list(joints)
+        self._stiffness = -math.expm1(-step / POSITION_TIME)
+        self._efforts = [min(float(effort), UNLIMITED_EFFORT) for effort in motor_effort_limits(robot)]
+        limits = [joint.limits for joint in robot.moving_joints]
+        self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
+        self._version = -1
+        self.applied: Array = np.zeros(len(self._joints))
+        self.measures = False
+        self.torques_at: slice | list[int] = []
+        self._torque_joints: list[int] = []
+        self._torques: list[float] = []
+        self._motors: list[tuple[int, int, Mode]] = []
+        self._release(self._joints)
+
+    def write(self, command: JointCommand) -> None:
+        """What holds until the next command."""
+        if command.version != self._version:
+            self._obey(command)
+        p, client = self._p, self._client
+        if self._torque_joints:
+            at = self.torques_at
+            self.applied[at] = command.effort[at]
+            self._torques = self.applied[at].tolist()
+        for row, joint, mode in self._motors:
+            if mode == "position":
+                p.setJointMotorControl2(
+                    self._body,
+                    joint,
+                    p.POSITION_CONTROL,
+                    targetPosition=float(command.position[row]),
+                    targetVelocity=float(command.velocity[row]),
+                    positionGain=self._stiffness,
+                    force=self._efforts[row],
+                    maxVelocity=self._velocities[row],
+                    physicsClientId=client,
+                )
+            else:
+                p.setJointMotorControl2(
+                    self._body,
+                    joint,
+                    p.VELOCITY_CONTROL,
+                    targetVelocity=float(command.velocity[row]),
+                    force=self._efforts[row],
+                    physicsClientId=client,
+                )
+
+    def _obey(self, command: JointCommand) -> None:
+        """What each joint obeys has changed: motors on or off."""
+        self._version = command.version
+        modes = command.modes
+        torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
+        self.torques_at = slice(None) if len(torques) == len(modes) else torques
+        self._torque_joints = [self._joints[k] for k in torques]
+        self._torques = [0.0] * len(torques)
+        self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
+        self.measures = bool(self._motors) or "brake" in modes
+        self.applied[:] = 0.0
+        for k, mode in enumerate(modes):
+            if mode == "brake":
+                self._brake(k)
+        released = [self._joints[k] for k, mode in enumerate(modes) if mode in ("effort", "free")]
+        self._release(released)
+
+    def _brake(self, k: int) -> None:
+        p, joint = self._p, self._joints[k]
+        p.setJointMotorControl2(
+            self._body, joint, p.VELOCITY_CONTROL, targetVelocity=0.0, force=self._efforts[k],
+            physicsClientId=self._client,
+        )  # fmt: skip
+
+    def _release(self, joints: list[int]) -> None:
+        """No motor holds these."""
+        p = self._p
+        if joints:
+            none = [0.0] * len(joints)
+            p.setJointMotorControlArray(
+                self._body, joints, p.VELOCITY_CONTROL, forces=none, physicsClientId=self._client
+            )
+
+    def push(self) -> None:
+        """Torques for the next physics step: Bullet forgets them after each."""
+        p = self._p
+        if self._torque_joints:
+            p.setJointMotorControlArray(
+                self._body, self._torque_joints, p.TORQUE_CONTROL, forces=self._torques, physicsClientId=self._client
+            )

@@ -1,0 +1,118 @@
+"""A scene and a robot as Bullet's bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Final, cast
+
+import numpy as np
+
+from manipcli.model.mesh_files import clean_mesh
+from manipcli.model.robot import Box, Cylinder, Mesh, Mimic, RobotModel, Sphere
+from manipcli.model.scene import Body
+from manipcli.simulate.engines.pybullet_contacts import Vector
+
+MIMIC_ERP: Final = 0.2
+MIMIC_EFFORT: Final = 200.0
+"""What a mimic coupling may carry [N m or N]."""
+
+
+def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
+    """Adds a body of the scene; its index. `folder` takes what Bullet reads meshes from."""
+    kinds, half, radii, lengths, positions, quats = [], [], [], [], [], []
+    files, scales = [], []
+    for geometry in body.geometries:
+        X_IS = body.X_OI.inverse() @ geometry.X_LS
+        shape = geometry.shape
+        kinds.append(_geometry_kind(p, shape))
+        half.append([s / 2 for s in shape.size] if isinstance(shape, Box) else [0.0, 0.0, 0.0])
+        radii.append(shape.radius if isinstance(shape, Sphere | Cylinder) else 0.0)
+        lengths.append(shape.length if isinstance(shape, Cylinder) else 0.0)
+        files.append(str(clean_mesh(shape, folder)) if isinstance(shape, Mesh) else "")
+        scales.append(list(shape.scale) if isinstance(shape, Mesh) else [1.0, 1.0, 1.0])
+        positions.append(list(X_IS.p))
+        quats.append(list(X_IS.quat_xyzw))
+    collision = p.createCollisionShapeArray(
+        shapeTypes=kinds,
+        halfExtents=half,
+        radii=radii,
+        lengths=lengths,
+        fileNames=files,
+        meshScales=scales,
+        collisionFramePositions=positions,
+        collisionFrameOrientations=quats,
+        physicsClientId=client,
+    )
+    X_WI = body.X_WO @ body.X_OI
+    k = p.createMultiBody(
+        baseMass=0.0 if body.fixed else body.mass,
+        baseCollisionShapeIndex=collision,
+        basePosition=list(X_WI.p),
+        baseOrientation=list(X_WI.quat_xyzw),
+        physicsClientId=client,
+    )
+    p.changeDynamics(
+        k,
+        -1,
+        lateralFriction=body.friction,
+        rollingFriction=body.rolling_friction,
+        spinningFriction=body.spinning_friction,
+        restitution=body.restitution,
+        linearDamping=0.0,
+        angularDamping=0.0,
+        physicsClientId=client,
+    )
+    if not body.fixed:
+        p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
+    return cast(int, k)
+
+
+def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
+    if isinstance(shape, Box):
+        return cast(int, p.GEOM_BOX)
+    if isinstance(shape, Sphere):
+        return cast(int, p.GEOM_SPHERE)
+    if isinstance(shape, Cylinder):
+        return cast(int, p.GEOM_CYLINDER)
+    return cast(int, p.GEOM_MESH)
+
+
+def centre(body: Body) -> tuple[Vector | None, tuple[float, ...] | None]:
+    """Where Bullet's frame of a body, which is that of its principal inertia, stands in the body's own: the position of
+    the one, and the rotation back; None where there is nothing to change."""
+    x, y, z = (float(v) for v in body.X_OI.p)
+    turned = None if np.allclose(body.X_OI.R, np.eye(3)) else tuple(body.X_OI.inverse().quat_xyzw)
+    return (x, y, z) if x or y or z else None, turned
+
+
+def couple_mimics(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int]) -> None:
+    """Makes the mimic joints of `body` follow; `joints`: Bullet's indices of the robot's moving joints."""
+    for joint, index in zip(robot.moving_joints, joints, strict=True):
+        if joint.mimic is not None:
+            driver = joints[robot.joint_names.index(joint.mimic.joint)]
+            _couple(p, client, body, index, driver, joint.axis.tolist(), joint.mimic)
+
+
+def _couple(p: ModuleType, client: int, body: int, follower: int, driver: int, axis: list[float], mimic: Mimic) -> None:
+    """A gear constraint between the two joints' child links: follower - multiplier * driver = offset."""
+    constraint = p.createConstraint(
+        body,
+        follower,
+        body,
+        driver,
+        jointType=p.JOINT_GEAR,
+        jointAxis=axis,
+        parentFramePosition=[0, 0, 0],
+        childFramePosition=[0, 0, 0],
+        physicsClientId=client,
+    )
+    p.changeConstraint(
+        constraint,
+        gearRatio=-mimic.multiplier,
+        relativePositionTarget=mimic.offset,
+        erp=MIMIC_ERP,
+        maxForce=MIMIC_EFFORT,
+        physicsClientId=client,
+    )
