@@ -186,6 +186,8 @@ class _Rewriting:
             if _neutral(block, key, entry.node):
                 continue
             given = plain(entry.node)
+            if key in block.filled and given == []:
+                self.tell("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
             if given in block.unserved.get(key, ()):
                 message = f"{where}: ROS knows '{key}: {given}', manipcli does not serve it: left out"
                 self.tell("CTRL214", entry.key_place, message, severity="warning")

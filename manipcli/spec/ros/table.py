@@ -28,6 +28,7 @@ class Block:
         joint: the block of every other mapping: one a joint.
         neutral: values that say no more than if the key were absent, as dumps of parameters have them.
         unserved: values that ROS knows for a key and manipcli does not.
+        filled: lists that are not to be empty, though ours may be.
     """
 
     known: frozenset[str] = frozenset()
@@ -37,6 +38,7 @@ class Block:
     joint: Block | None = None
     neutral: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     unserved: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
+    filled: frozenset[str] = frozenset()
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -61,6 +61,7 @@ JOINT_TRAJECTORY: Final = Table(
             ),
         },
         neutral=_NEUTRAL | {"command_joints": ([],)},
+        filled=frozenset({"command_interfaces"}),
     ),
     reshape=joint_trajectory,
 )  # fmt: skip
