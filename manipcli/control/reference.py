@@ -14,6 +14,8 @@ from manipcli.spec.controllers import Interface
 
 ON_TICK: Final = 1e-3
 """A time nearer than this, in periods, to a tick of the course is that tick."""
+BLOCK: Final = 32
+"""Ticks that are sampled at once where they were not before."""
 
 
 class Feeds:
@@ -41,8 +43,8 @@ class Feeds:
 class Reference:
     """Follows one course after the other, in a clock that runs `speed` seconds a second.
 
-    At the ticks of the period with which a course began, and at full speed, its samples were made beforehand; at all
-    other times they are made when asked for.
+    At the ticks of the period with which a course began, and at full speed, its samples were made beforehand; otherwise
+    they are made a block at a time.
 
     Args:
         rows: (3, n) written in place: position, velocity, acceleration; rad or m, per second, per second squared.
@@ -59,7 +61,7 @@ class Reference:
     """
 
     __slots__ = (
-        "_before", "_course", "_dt", "_end_row", "_feeds", "_following", "_last", "_law", "_since", "_table", "end",
+        "_before", "_course", "_dt", "_end_row", "_feeds", "_last", "_law", "_origin", "_since", "_table", "end",
         "ended", "feed", "moving", "rows", "scales", "speed",
     )  # fmt: skip
 
@@ -79,7 +81,7 @@ class Reference:
         self.end, self._before, self._since, self.speed = 0.0, 0.0, time, 1.0
         self._table = np.zeros((0, EFFORT, self.rows.shape[1]))
         self._feeds: Array | None = None
-        self._dt, self._last, self._end_row = math.inf, -1, 0
+        self._origin, self._dt, self._last, self._end_row = time, math.inf, -1, 0
 
     def follow(self, course: Course, samples: Array, *, time: float, period: float, speed: float | None = None) -> None:
         """From now on `course`, which begins at `time`; `samples` are its `ticks` of `period`; `speed` None: 1."""
@@ -87,12 +89,10 @@ class Reference:
         self.scales = speed is not None
         self.end = course.end
         self._before, self._since, self.speed = 0.0, time, 1.0 if speed is None else speed
-        self._table = samples[:, :EFFORT]
-        self._feeds = self._law.of(np.concatenate([samples[1:], samples[-1:]]))
-        self._dt = period
-        self._last = len(samples) - 1 if self.speed == 1.0 else -1
+        self._take(samples, time, period)
         self._end_row = len(samples) - 2
-        self.feed = None
+        if self.speed != 1.0:
+            self._last = -1
         self.moving, self.ended = True, False
 
     def clock(self, time: float) -> float:
@@ -108,30 +108,37 @@ class Reference:
 
     def advance(self, time: float, period: float) -> None:
         """Writes `rows`, `feed` and `ended` of `time` [s], where the next is a `period` later."""
-        ticks = (time - self._since) / self._dt
+        ticks = (time - self._origin) / self._dt
         row = int(ticks + 0.5)
-        if row < self._last and -ON_TICK < ticks - row < ON_TICK and period == self._dt:
-            self.rows[:] = self._table[row]
-            if self._feeds is not None:
-                self.feed = self._feeds[row]
-            self.ended = row >= self._end_row
-        else:
-            self._advance_between(time, period)
+        if not (row < self._last and -ON_TICK < ticks - row < ON_TICK and period == self._dt):
+            self._look_ahead(time, period)
+            row = 0
+        self.rows[:] = self._table[row]
+        if self._feeds is not None:
+            self.feed = self._feeds[row]
+        self.ended = row >= self._end_row
 
-    def _advance_between(self, time: float, period: float) -> None:
-        clock = max(0.0, self.clock(time))
-        now, ahead = self._sample(np.array([clock, clock + self.speed * period]))
-        self.rows[:] = now[:EFFORT]
-        feed = self._law.of(ahead[None])
-        self.feed = None if feed is None else feed[0]
-        self.ended = clock >= self.end - 1e-6 * period
-        if clock > self.end + 1e-6 * period:
+    def _look_ahead(self, time: float, period: float) -> None:
+        """Samples of the next ticks, for a time that is none of those that were sampled before."""
+        step = self.speed * period
+        clocks = np.maximum(self.clock(time) + step * np.arange(BLOCK + 1), 0.0)
+        self._take(self._sample(clocks), time, period)
+        self._end_row = int(np.searchsorted(clocks, self.end - 1e-6 * period))
+        if clocks[0] > self.end + 1e-6 * period:
             self.moving = False
+
+    def _take(self, samples: Array, time: float, period: float) -> None:
+        """Samples (T, 4, n) of the ticks from `time` on; of the last one only its feed is used."""
+        self._table = samples[:, :EFFORT]
+        self._feeds = self._law.of(samples[1:])
+        self.feed = None
+        self._origin, self._dt, self._last = time, period, len(samples) - 1
 
     def _sample(self, clock: Array) -> Array:
         rows = self._course.sample(clock)
-        rows[:, VELOCITY] *= self.speed
-        rows[:, ACCELERATION] *= self.speed**2
+        if self.speed != 1.0:
+            rows[:, VELOCITY] *= self.speed
+            rows[:, ACCELERATION] *= self.speed**2
         return rows
 
     def row(self, time: float) -> Array:
