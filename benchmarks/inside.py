@@ -87,6 +87,7 @@ class Watched(PybulletEngine):
             command.effort[:] = effort
             self._twin.write(command)
             for _ in range(self._twin._substeps):
+                self._twin._motors.push()
                 began = clock()
                 step(client)
                 bare += clock() - began
