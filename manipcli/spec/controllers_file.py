@@ -10,6 +10,7 @@ from pydantic import Field
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import GripperSpec, JointTrajectorySpec
 from manipcli.spec.other_controllers import (
+    CartesianImpedanceSpec,
     ComputedTorqueSpec,
     ForceTorqueBroadcasterSpec,
     ForwardCommandSpec,
@@ -22,6 +23,7 @@ AnyController = Annotated[
     JointTrajectorySpec
     | GripperSpec
     | ComputedTorqueSpec
+    | CartesianImpedanceSpec
     | ForwardCommandSpec
     | PidSpec
     | JointStateBroadcasterSpec

@@ -25,9 +25,7 @@ class ComputedTorqueSpec(ControllerSpec):
     bandwidth: Annotated[Frequency, Field(gt=0)] = Field(
         15.0, description="Natural frequency of the error [Hz], above 0: p = (2 pi f)^2. Default 15 Hz."
     )
-    damping_ratio: Positive = Field(
-        1.0, description="Of the error, above 0: d = 4 pi f ratio. Default 1."
-    )
+    damping_ratio: Positive = Field(1.0, description="Of the error, above 0: d = 4 pi f ratio. Default 1.")
     gains: dict[str, GainsSpec] = Field(
         {}, description="By joint, instead of the two: p [1/s2], i [1/s3], d [1/s]. They act on accelerations."
     )
@@ -50,7 +48,9 @@ class PostureSpec(Model):
     """What draws the joints to those of the reference where that does not move the tool."""
 
     stiffness: NotNegative = Field(10.0, description="Of each joint [N m/rad or N/m], 0 or more. Default 10.")
-    damping: NotNegative = Field(2.0, description="Of each joint [N m s/rad or N s/m], 0 or more. Default 2.")
+    damping_ratio: NotNegative = Field(
+        1.0, description="Damping 2 ratio sqrt(stiffness x inertia) of each joint, 0 or more. Default 1."
+    )
 
 
 class CartesianImpedanceSpec(ControllerSpec):
@@ -68,6 +68,9 @@ class CartesianImpedanceSpec(ControllerSpec):
     damping: TaskSpaceSpec | None = Field(None, description="Instead of the ratio [N s/m, N m s/rad]. Default: none.")
     axes: Literal["world", "tool"] = Field("world", description="Whose axes stiffness and damping mean. Default world.")
     posture: PostureSpec = Field(PostureSpec(), description="Of the joints that the tool leaves free.")
+    inverse_dynamics: bool = Field(
+        False, description="Add the effort that the reference's acceleration needs, to gravity. Default false."
+    )
     constraints: ConstraintsSpec = Field(
         ConstraintsSpec(),
         description="Tolerances of the joints and goal time; a contact brings a joint off its reference.",

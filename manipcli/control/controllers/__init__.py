@@ -4,6 +4,7 @@ from typing import Any
 
 from manipcli.control.controller import ControllerMember
 from manipcli.control.controllers import (
+    cartesian_impedance,
     computed_torque,
     force_torque_broadcaster,
     forward_command,
@@ -19,6 +20,7 @@ CONTROLLERS: Seam[ControllerMember[Any]] = Seam(
     members=(
         joint_trajectory.MEMBER,
         computed_torque.MEMBER,
+        cartesian_impedance.MEMBER,
         gripper.MEMBER,
         forward_command.MEMBER,
         pid.MEMBER,

@@ -11,7 +11,8 @@
     u = M(q) (a_r + d (v_r - v) + p (q_r - q)) + C(q, v) v + g(q) + D v_r
 
 so that, where the model is right, every error obeys e'' + d e' + p e = 0, with p = (2 pi f)^2 and d = 4 pi f ratio of
-the bandwidth f [Hz] and the damping ratio; the damping D of the joints themselves is on top of d. Siciliano et al., Robotics: Modelling, Planning and Control (2009), 8.5.2.
+the bandwidth f [Hz] and the damping ratio; the damping D of the joints themselves is on top of d. Siciliano et al.,
+Robotics: Modelling, Planning and Control (2009), 8.5.2.
 The manager's feed-forward multiplies by the inertia and adds the rest (see `ModelFeedForward`).
 """
 

@@ -1,0 +1,293 @@
+"""Holds the tool on its reference as a spring and a damper would; for work in contact.
+
+    controllers:
+      arm_controller:
+        type: cartesian_impedance
+        joints: [joint_1, joint_2, joint_3, joint_4, joint_5, joint_6, joint_7]
+        stiffness: {translation: [800, 800, 200], rotation: 40}
+        damping_ratio: 1
+        axes: tool
+        posture: {stiffness: 10}
+
+With the tool frame T at the measured joints q and its reference R, which is where the joints' reference q_r would put
+it, or what `set_pose` says, and with the Jacobian J of T:
+
+    u = J^T (K e + D J (v_r - v)) + N (k (q_r - q) + d (v_r - v)) + g(q)
+    e = (p_R - p_T, the rotation vector of R_WR R_WT^T)
+
+K [N/m, N m/rad] and D [N s/m, N m s/rad] are diagonal along the axes of the world or of R. By a damping ratio z,
+D_ii = 2 z sqrt(K_ii m_i) with the mass m_i = 1 / (J M^-1 J^T)_ii that the tool has along that axis. Joints that the
+tool leaves free are drawn to the posture q_r through N = 1 - J^T (J J^T + s^2)^-1 J, which takes from it what would push
+the tool. Nothing is inverted that can be singular: s bounds the one, and m_i only damps.
+
+Where the reference rests, a force F on the tool brings it off by K^-1 F. Hogan, Impedance control (1985); Ott,
+Cartesian Impedance Control of Redundant and Flexible-Joint Robots (2008), chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.control.action import GoalHandle
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
+from manipcli.control.gains import strangers
+from manipcli.control.pid import Compat
+from manipcli.control.trajectory_goal import TrajectoryGoal
+from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Array, Transform
+from manipcli.core.text import did_you_mean, listed
+from manipcli.model.condition import Problem
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import JointLimits, JointType, RobotModel
+from manipcli.plan.inverse_kinematics import rotation_vector
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import ConstraintsSpec, Interface, Role
+from manipcli.spec.other_controllers import CartesianImpedanceSpec, TaskSpaceSpec
+
+SINGULAR: Final = 1e-3
+"""s: directions of the tool that the joints move by less than this [m or rad per rad] are left to the posture."""
+LIGHTEST: Final = 1e-9
+"""[1/kg] or [1/(kg m2)]: mobilities below this count as this."""
+
+
+class CartesianImpedanceController:
+    """Serves trajectories of joints (goals, tolerances, results: see `JointTrajectoryController`), and poses.
+
+    Args:
+        name: of the controller.
+        joints: (n) distinct names.
+        kinematics: of the robot.
+        link, offset: the tool frame T stands at `offset` X_LT in the link.
+        stiffness: (6) along and about the axes [N/m, N m/rad].
+        damping_ratio: see the module.
+        damping: (6) [N s/m, N m s/rad], instead of the ratio.
+        axes: whose stiffness and damping mean.
+        posture_stiffness: of each joint [N m/rad or N/m].
+        posture_damping_ratio: d = 2 ratio sqrt(k M_jj).
+        feed_forward: `gravity`; `inverse_dynamics` adds what the reference's acceleration needs.
+        constraints, limits, types, compat: see `JointTrajectoryController`.
+
+    Raises:
+        InvalidArgument: no or repeated joints, numbers that are negative or not finite, no stiffness at all.
+    """
+
+    role: Role = "follower"
+    senses_contact = False
+    interfaces: tuple[Interface, ...] = ("effort",)
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        joints: Sequence[str],
+        kinematics: Kinematics,
+        link: str,
+        offset: Transform | None = None,
+        stiffness: npt.ArrayLike,
+        damping_ratio: float = 1.0,
+        damping: npt.ArrayLike | None = None,
+        axes: Literal["world", "tool"] = "world",
+        posture_stiffness: float = 10.0,
+        posture_damping_ratio: float = 1.0,
+        feed_forward: FeedForward = "gravity",
+        constraints: ConstraintsSpec | None = None,
+        limits: Sequence[JointLimits] | None = None,
+        types: Sequence[JointType] | None = None,
+        compat: Compat | None = None,
+    ) -> None:
+        self._follower = JointTrajectoryController(
+            name=name, joints=joints, command_interfaces=("position",), constraints=constraints, limits=limits,
+            types=types, compat=compat,
+        )  # fmt: skip
+        self.name, self.joints = self._follower.name, self._follower.joints
+        self.feed_forward: FeedForward = feed_forward
+        self._stiffness = self._six("stiffness", stiffness)
+        self._damping = None if damping is None else self._six("damping", damping)
+        for what, value in (
+            ("damping_ratio", damping_ratio), ("posture stiffness", posture_stiffness),
+            ("posture damping_ratio", posture_damping_ratio),
+        ):  # fmt: skip
+            if not 0.0 <= value < np.inf:
+                raise InvalidArgument("CTRL185", f"controller '{name}': {what} is {value}; expected 0 or more")
+        if not self._stiffness.any() and posture_stiffness == 0.0:
+            raise InvalidArgument("CTRL185", f"controller '{name}': no stiffness at all; it would not move")
+        self._scale = 2.0 * damping_ratio * np.sqrt(self._stiffness)
+        self._posture = posture_stiffness
+        self._posture_scale = 2.0 * posture_damping_ratio * np.sqrt(posture_stiffness)
+        self._kinematics, self._link, self._offset = kinematics, link, offset
+        self._turns = axes == "tool"
+        self._columns = kinematics.robot.indices(self.joints)
+        self._block = np.ix_(self._columns, self._columns)
+        self._q = np.zeros(len(kinematics.robot.joint_names))
+        self._singular = SINGULAR**2 * np.eye(6)
+        self._output = ControllerOutput.of(len(self.joints), 1)
+        self._error = np.zeros(6)
+        self._pose: Transform | None = None
+        self._held: Array | None = None
+        self._time = 0.0
+
+    def _six(self, what: str, values: npt.ArrayLike) -> Array:
+        given = np.array(values, dtype=np.float64)
+        if given.shape != (6,) or not (np.isfinite(given).all() and (given >= 0.0).all()):
+            message = f"controller '{self.name}': {what} {given.tolist()}; expected 6 numbers of 0 or more"
+            raise InvalidArgument("CTRL185", message)
+        return given
+
+    @property
+    def output(self) -> ControllerOutput:
+        """What the last update wrote."""
+        return self._output
+
+    @property
+    def error(self) -> Array:
+        """(6) e of the last update, in world axes: from the tool to its reference [m, rad]."""
+        return self._error.copy()
+
+    def send_goal(
+        self, trajectory: JointTrajectory | TrajectoryGoal, *, constraints: ConstraintsSpec | None = None
+    ) -> GoalHandle:
+        """Accepts a trajectory, see `JointTrajectoryController.send_goal`; a pose that was set is forgotten."""
+        if self._pose is None:
+            return self._follower.send_goal(trajectory, constraints=constraints)
+        self._follower.deactivate(self._time)
+        handle = self._follower.send_goal(trajectory, constraints=constraints)
+        self._pose = self._held = None
+        return handle
+
+    def set_pose(self, X_WT: Transform) -> None:
+        """The reference of the tool from the next update on; an active goal ends as aborted.
+
+        The spring pulls at once, as hard as the pose is far: lead far ways by trajectories. The posture stays that of
+        the moment, and is what counts as the joints' reference.
+
+        Raises:
+            InvalidArgument: numbers that are not finite.
+        """
+        if not (np.isfinite(X_WT.R).all() and np.isfinite(X_WT.p).all()):
+            raise InvalidArgument("CTRL185", f"controller '{self.name}': a pose that is not finite")
+        self._follower.deactivate(self._time, "preempted by a pose")
+        self._pose = X_WT
+
+    def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
+        """Ends its goal as aborted and forgets its state; the next update activates it again."""
+        self._follower.deactivate(time, reason)
+        self._pose = self._held = None
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
+        self._time = time
+        output, q, kinematics = self._output, self._q, self._kinematics
+        self._refer(time, period, measured)
+        if self._pose is None:
+            q[self._columns] = output.position
+            R_WR, p_WR, _ = kinematics.pose_and_jacobian(q, self._link, self._offset)
+        else:
+            R_WR, p_WR = self._pose.R, self._pose.p
+        q[self._columns] = measured.position
+        R_WT, p_WT, jacobian = kinematics.pose_and_jacobian(q, self._link, self._offset)
+        J = jacobian[:, self._columns]
+        mass = kinematics.mass_matrix(q)[self._block]
+        error, slip = self._error, output.velocity - measured.velocity
+        error[:3] = p_WR - p_WT
+        error[3:] = rotation_vector(R_WR @ R_WT.T)
+        along = error
+        if self._turns:
+            along = (error.reshape(2, 3) @ R_WR).reshape(6)
+            J = (R_WR.T @ J.reshape(2, 3, -1)).reshape(6, -1)
+        wrench = self._stiffness * along + self._damped(J, mass) * (J @ slip)
+        free = self._posture * (output.position - measured.position)
+        free += self._posture_scale * np.sqrt(mass.diagonal()) * slip
+        wrench -= np.linalg.solve(J @ J.T + self._singular, J @ free)
+        np.add(free, wrench @ J, out=output.command)
+        return output
+
+    def _refer(self, time: float, period: float, measured: JointState) -> None:
+        """Writes the reference of the joints."""
+        output = self._output
+        if self._pose is None:
+            output.rows[:3] = self._follower.update(time, period, measured).rows[:3]
+            return
+        if self._held is None:
+            self._held = np.array(measured.position)
+        output.position[:] = self._held
+        output.velocity[:] = 0.0
+        output.acceleration[:] = 0.0
+
+    def _damped(self, J: Array, mass: Array) -> Array:
+        """(6) the damping along the axes of `J`."""
+        if self._damping is not None:
+            return self._damping
+        mobility = np.einsum("ij,ji->i", J, np.linalg.solve(mass, J.T))
+        return np.asarray(self._scale / np.sqrt(np.maximum(mobility, LIGHTEST)))
+
+
+def build(name: str, spec: CartesianImpedanceSpec, fit: Fit) -> CartesianImpedanceController:
+    """The controller of a spec."""
+    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    link, offset = _frame(spec, fit.robot)
+    return CartesianImpedanceController(
+        name=name,
+        joints=spec.joints,
+        kinematics=fit.kinematics(),
+        link=link,
+        offset=offset,
+        stiffness=_six(spec.stiffness),
+        damping_ratio=spec.damping_ratio,
+        damping=None if spec.damping is None else _six(spec.damping),
+        axes=spec.axes,
+        posture_stiffness=spec.posture.stiffness,
+        posture_damping_ratio=spec.posture.damping_ratio,
+        feed_forward="inverse_dynamics" if spec.inverse_dynamics else "gravity",
+        constraints=spec.constraints,
+        limits=[joint.limits for joint in joints],
+        types=[joint.type for joint in joints],
+        compat=fit.compat,
+    )
+
+
+def _frame(spec: CartesianImpedanceSpec, robot: RobotModel) -> tuple[str, Transform | None]:
+    """The link that carries the tool frame, and X_LT."""
+    if spec.link is not None:
+        return spec.link, None
+    return ("", None) if robot.tool is None else (robot.tool.link, robot.tool.X_LT)
+
+
+def _six(spec: TaskSpaceSpec) -> Array:
+    return np.concatenate([np.broadcast_to(part, (3,)) for part in (spec.translation, spec.rotation)])
+
+
+def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
+    """Tolerances of joints that it does not have; a tool that is not there, that other joints move, too, or that one of
+    its joints does not move; no stiffness."""
+    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    if not _six(spec.stiffness).any() and spec.posture.stiffness == 0.0:
+        yield Problem(("stiffness",), "no stiffness at all; it would not move", "give stiffness.translation", "CTRL185")
+    link, _ = _frame(spec, robot)
+    names = [one.name for one in robot.links]
+    if link not in names:
+        if spec.link is None:
+            hint = "say `link`, or add `tool: {link: ...}` to the robot file"
+            yield Problem((), f"robot '{robot.name}' has no tool frame", hint, "CTRL186")
+        else:
+            hint = did_you_mean(link, names, kind="links") or ""
+            yield Problem(("link",), f"link '{link}' is not in robot '{robot.name}'", hint, "CTRL186")
+        return
+    movers = [joint.name for joint in robot.moving_joints if link in robot.descendants(joint.child)]
+    missing = [name for name in movers if name not in spec.joints]
+    if missing:
+        message = f"{listed(missing)} {'moves' if len(missing) == 1 else 'move'} link '{link}', too"
+        yield Problem(("joints",), message, "its joints are all between the base and the tool", "CTRL186")
+    for k, name in enumerate(spec.joints):
+        if name in robot.joint_names and name not in movers:
+            message = f"joint '{name}' does not move link '{link}'"
+            yield Problem(("joints", k), message, f"joints that do: {listed(movers)}", "CTRL186")
+
+
+MEMBER = ControllerMember(name="cartesian_impedance", spec=CartesianImpedanceSpec, build=build, check=check)
