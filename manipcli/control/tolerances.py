@@ -32,7 +32,6 @@ class Tolerances:
         path: on the way.
         goal: at the end.
         goal_time: [s] of grace after the end; infinite: without end.
-        bound: errors of position and velocity whose squares sum to less are inside every path tolerance.
     """
 
     path: Array
@@ -64,7 +63,10 @@ class Tolerances:
 
     @property
     def bound(self) -> float:
-        """Errors of position and velocity whose squares sum to less are inside; 0 where acceleration counts, too."""
+        """Errors of position and velocity whose squares sum to less are inside every path tolerance.
+
+        0 where an acceleration counts, too: they tell nothing of that.
+        """
         if np.isfinite(self.path[2]).any():
             return 0.0
         return float(self.path[:2].min()) ** 2

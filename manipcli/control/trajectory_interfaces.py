@@ -37,6 +37,6 @@ def refused(command_interfaces: Sequence[str], state_interfaces: Sequence[str]) 
     if "velocity" not in state_interfaces and (
         controlled_by_error(command_interfaces) or "effort" in command_interfaces
     ):
-        message = f"command_interfaces [{', '.join(command_interfaces)}] need the velocity"
-        return message, "say state_interfaces: [position, velocity]"
+        message = f"state_interfaces [{', '.join(state_interfaces)}] lack the velocity that commands of "
+        return message + f"[{', '.join(command_interfaces)}] need", "say state_interfaces: [position, velocity]"
     return None

@@ -21,7 +21,9 @@ from manipcli.control import (
     TrajectoryGoal,
     TrajectoryPoint,
 )
+from manipcli.control.controllers.joint_trajectory import check
 from manipcli.core.errors import InvalidArgument
+from manipcli.spec.controllers import JointTrajectorySpec
 
 JOINTS = ("joint1", "joint2", "joint3")
 START = np.array([1.1, 2.1, 3.1])
@@ -460,8 +462,33 @@ def goal_points(goal):
 )
 def test_64_interfaces_that_are_refused(commands, states):
     """Conformance 64: the text names the interfaces."""
-    with pytest.raises(InvalidArgument, match=r"interface.*|need the velocity") as refused:
+    with pytest.raises(InvalidArgument, match="interface") as refused:
         controller(*commands, state_interfaces=states) if commands else JointTrajectoryController(
             name="arm", joints=JOINTS, command_interfaces=()
         )
     assert refused.value.findings[0].code == "CTRL107"
+
+
+@pytest.mark.parametrize(
+    ("keys", "places"),
+    [
+        ({"command_interfaces": ["effort", "velocity"]}, ["command_interfaces"]),
+        ({"command_interface": "acceleration"}, ["command_interface"]),
+        ({"command_interfaces": ["position", "velocity"], "command_interface": "position"}, ["command_interfaces"]),
+        ({"command_interface": "velocity", "state_interfaces": ["position"]}, ["state_interfaces"]),
+        ({"command_interface": "position", "state_interfaces": ["effort"]}, ["state_interfaces"]),
+        ({"command_interface": "position", "state_interfaces": ["speed"]}, ["state_interfaces"]),
+        ({"command_interfaces": ["position", "effort"], "gravity_compensation": True}, []),
+        ({"command_interfaces": ["position"], "inverse_dynamics": True}, ["inverse_dynamics"]),
+        ({}, []),
+    ],
+)
+def test_64_a_file_is_told_where_its_interfaces_are_wrong(keys, places):
+    """Conformance 64: the same rules, at the place of the key; `command_interface` is short for a list of one."""
+    spec = JointTrajectorySpec.model_validate(
+        {"type": "joint_trajectory", "joints": JOINTS, "gains": {joint: {"p": 1} for joint in JOINTS}, **keys}
+    )
+    problems = list(check(spec, None))
+    assert [problem.loc[0] for problem in problems] == places
+    short = JointTrajectorySpec.model_validate({"type": "joint_trajectory", "joints": JOINTS})
+    assert short.interfaces == ("effort",)
