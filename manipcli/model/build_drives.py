@@ -95,7 +95,8 @@ def _compare_speeds(reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint]
     limits = [by_name[name].limits.velocity for name in tag.joints if name in by_name]
     if tag.type not in BY_TYPE or len(limits) < len(tag.joints) or None in limits:
         return
-    needed = np.abs(BY_TYPE[tag.type].of(tag, spec.compat or "ros2").maps.actuator_motion) @ np.array(limits, dtype=np.float64)
+    maps = BY_TYPE[tag.type].of(tag, spec.compat or "ros2").maps
+    needed = np.abs(maps.actuator_motion) @ np.array(limits, dtype=np.float64)
     for name, speed in zip(tag.actuators, needed, strict=True):
         own = spec.actuators.get(name)
         if own is None or own.velocity is None or speed <= own.velocity * (1.0 + 1e-9):
