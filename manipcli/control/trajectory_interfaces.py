@@ -33,7 +33,7 @@ def refused(command_interfaces: Sequence[str], state_interfaces: Sequence[str]) 
                 return f"unknown {what} interface '{one}'", did_you_mean(one, known, kind="interfaces") or ""
         if len(set(given)) < len(given) or set(given) not in [set(one) for one in legal]:
             sets = "; ".join(f"[{', '.join(one)}]" for one in legal)
-            return f"{what}_interfaces [{', '.join(given)}] do not go together", f"expected {sets}"
+            return f"{what}_interfaces [{', '.join(given)}] are not a set that it serves", f"expected {sets}"
     if "velocity" not in state_interfaces and (
         controlled_by_error(command_interfaces) or "effort" in command_interfaces
     ):
