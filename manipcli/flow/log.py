@@ -28,6 +28,7 @@ from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
 from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.record.selection import Selection
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
@@ -86,6 +87,7 @@ def open_log(
             "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
             **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),
         },
+        selection=Selection(task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out),
         overwrite=overwrite,
     )
 

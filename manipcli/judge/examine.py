@@ -67,7 +67,7 @@ def examine(
         ordered = order.applied(span)
         if evidence is None:
             start = ordered.states.map(lambda a: a[0])
-            evidence = Evidence(World(robot, scene, start), physics, steps)
+            evidence = Evidence(World(robot, scene, start), physics, steps, recording.absent)
         _ask(questions, "always", evidence, ordered)
         ending.add(ordered)
     if evidence is None:

@@ -19,6 +19,7 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import Condition, Problem, World, needs_physics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.record.channels import TF
 from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Unit
@@ -41,11 +42,19 @@ class Evidence:
         world: robot, scene, and the first recorded state as the start.
         physics: False when the engine moved no bodies and knew no contacts.
         steps: how the steps went.
+        absent: topics that the task told not to record.
     """
 
     world: World
     physics: bool
     steps: tuple[StepOutcome, ...]
+    absent: tuple[str, ...] = ()
+
+    def lacks(self, topic: str) -> str | None:
+        """Why nothing can be said that needs this topic; None where it is there."""
+        if topic not in self.absent:
+            return None
+        return f"the log holds no {topic}: `record:` of the task leaves it out"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +104,9 @@ def at_end(condition: Condition[Any]) -> Expectation[Any]:
             movable = {body.name for body in scene.movable}
             names = ", ".join(f"'{name}'" for name in condition.bodies(spec, scene) if name in movable)
             return NotEvaluated(f"the engine has no physics, so {names} never moved", condition.unit)
+        reason = evidence.lacks(TF)
+        if reason is not None and needs_physics(condition, spec, scene):
+            return NotEvaluated(reason, condition.unit)
         margins = condition.margin(spec, evidence.world, span.states)
         return worst(margins, span.states.time, condition.unit, describe(spec))
 

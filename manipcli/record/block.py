@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -20,19 +23,20 @@ from manipcli.record.channels import Channel, ControllerChannel, Recorded, Wrenc
 from manipcli.record.messages import WORLD
 from manipcli.record.rows import (
     RowBlock,
+    Template,
     Times,
     controller_state_template,
     joint_state_template,
     tf_template,
     wrench_template,
 )
+from manipcli.record.selection import Selection
 from manipcli.spec.controllers import Interface
-
-PLOT_PERIOD = 0.01
-"""[s] between two messages of the topics that only serve viewers (reference, error, actuators)."""
 
 Index = npt.NDArray[np.uint64]
 Places = npt.NDArray[np.intp]
+Ticks = slice | Places
+"""Rows of a block."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,10 @@ class ChunkContent:
     indexes: dict[int, Index]
 
 
+Values = Callable[[Ticks], list[Array]]
+_Source = tuple[str, Template, Values]
+"""A topic, the message of a tick, and its numbers at some ticks."""
+
 FIELDS: tuple[Interface, ...] = ("position", "velocity", "acceleration", "effort")
 """The order of the fields of a message."""
 
@@ -68,22 +76,48 @@ class _ControllerRows:
         self._columns = robot.indices(channel.joints)
         self._endless = np.array([robot.joint(name).type == "continuous" for name in channel.joints], dtype=bool)
 
-    def values(self, position: Array, velocity: Array, effort: Array) -> tuple[list[Array], list[Array]]:
-        """Numbers of the controller's messages from all measured joints (T, n): of its state, and of its plots."""
-        rows = self.rows[: len(position)]
+    def state(self, at: Ticks, position: Array, velocity: Array, effort: Array) -> list[Array]:
+        """Numbers of the controller's state at some ticks, where all joints (T, n) were measured so."""
+        rows = self.rows[at]
         feedback, speed, force = (a[:, self._columns] for a in (position, velocity, effort))
-        reference, reference_speed, acceleration = rows[:, 0], rows[:, 1], rows[:, 2]
-        error = reference - feedback
+        outputs = [rows[:, k] for k in self._outputs]
+        errors = self.errors(at, position, velocity)
+        return [*self.reference(at), rows[:, 2], feedback, speed, force, *errors, *outputs]
+
+    def reference(self, at: Ticks) -> list[Array]:
+        """What it wants: positions and velocities."""
+        rows = self.rows[at]
+        return [rows[:, 0], rows[:, 1]]
+
+    def errors(self, at: Ticks, position: Array, velocity: Array) -> list[Array]:
+        """What it wants less what is."""
+        reference, reference_speed = self.reference(at)
+        error = reference - position[:, self._columns]
         # A joint without limits errs the short way round.
         error[:, self._endless] = np.remainder(error[:, self._endless] + np.pi, 2 * np.pi) - np.pi
-        errors = [error, reference_speed - speed]
-        outputs = [rows[:, k] for k in self._outputs]
-        state = [reference, reference_speed, acceleration, feedback, speed, force, *errors, *outputs]
-        return state, [reference, reference_speed, *errors]
+        return [error, reference_speed - velocity[:, self._columns]]
+
+
+@dataclass(slots=True)
+class _Group:
+    """The messages of every `stride`-th tick: `values`, for each, gives its numbers at some ticks."""
+
+    stride: int
+    rows: RowBlock
+    values: list[Values]
+    written: int = 0
+
+    def fill(self, ticks: Times, times: Times) -> Places:
+        """Encodes what a block holds of them; at which of its ticks."""
+        picked = np.flatnonzero(ticks % self.stride == 0)
+        at: Ticks = slice(0, len(ticks)) if self.stride == 1 else picked
+        self.rows.fill(times[picked], self.written + 1, [run for values in self.values for run in values(at)])
+        self.written += len(picked)
+        return picked
 
 
 class Block:
-    """Room for `capacity` ticks. `ids`: topic -> channel id."""
+    """Room for `capacity` ticks. `channels`: those that are recorded."""
 
     def __init__(
         self,
@@ -91,47 +125,69 @@ class Block:
         scene: Scene,
         controllers: Sequence[Recorded],
         channels: Sequence[Channel],
+        selection: Selection,
         period: float,
         capacity: int,
     ) -> None:
-        ids = {channel.topic: channel.id for channel in channels}
-        joints, bodies = robot.moving_joints, scene.movable
-        n, m = len(joints), len(bodies)
+        n, m = len(robot.moving_joints), len(scene.movable)
         self.count = 0
         self.capacity = capacity
         self._robot = robot
         self._period = period
-        self._stride = max(1, round(PLOT_PERIOD / period))
         self._ticks = np.zeros(capacity, dtype=np.int64)
         self._position, self._velocity, self._effort = (np.zeros((capacity, n)) for _ in range(3))
         self._body_position, self._body_quat = np.zeros((capacity, m, 3)), np.zeros((capacity, m, 4))
-        claiming = [c for c in controllers if isinstance(c, ControllerChannel)]
-        sensing = [c for c in controllers if isinstance(c, WrenchChannel)]
-        self._controllers = [_ControllerRows(controller, robot, capacity) for controller in claiming]
-        self._wrenches = [np.zeros((capacity, 1, 6)) for _ in sensing]
-        rows = iter([*(of.rows for of in self._controllers)])
-        wrenches = iter(self._wrenches)
-        self._rows: list[Array | None] = [
-            next(rows) if isinstance(c, ControllerChannel) else None if c is None else next(wrenches)
-            for c in controllers
-        ]
-        frames = [(joint.parent, joint.child) for joint in joints] + [(WORLD, body.name) for body in bodies]
-        states = [controller_state_template(ids[c.state_topic], c.joints, c.interfaces) for c in claiming]
-        states += [wrench_template(ids[c.topic], c.link) for c in sensing]
         self._actuators = Drivetrain.of(robot)
-        plots = [
-            joint_state_template(ids[topic], c.joints, effort=False)
-            for c in claiming
-            for topic in (c.reference_topic, c.error_topic)
-        ]
-        if self._actuators.names:
-            turned = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
-            plots.append(turned)
-        measured = joint_state_template(ids[topics.JOINT_STATES], robot.joint_names, effort=True)
-        self._fast = RowBlock([measured, tf_template(ids[topics.TF], frames), *states], capacity)
-        self._slow = RowBlock(plots, capacity)
-        self._fast_written = 0
-        self._slow_written = 0
+        self._rows: list[Array | None] = []
+        self._ids = {channel.topic: channel.id for channel in channels}
+        sources = self._sources(robot, scene, controllers)
+        strides = [selection.stride(topic, period) for topic, _, _ in sources]
+        self._groups = []
+        for stride in sorted(set(strides)):
+            mine = [source for source, every in zip(sources, strides, strict=True) if every == stride]
+            rows = RowBlock([template for _, template, _ in mine], capacity)
+            self._groups.append(_Group(stride, rows, [values for _, _, values in mine]))
+
+    def _sources(self, robot: RobotModel, scene: Scene, controllers: Sequence[Recorded]) -> list[_Source]:
+        """Every message that is recorded by the clock; makes room for what controllers put out."""
+        frames = [(joint.parent, joint.child) for joint in robot.moving_joints]
+        frames += [(WORLD, body.name) for body in scene.movable]
+        ids = self._ids
+        states: list[_Source] = []
+        wrenches: list[_Source] = []
+        plots: list[_Source] = []
+        for c in controllers:
+            if isinstance(c, ControllerChannel):
+                of = _ControllerRows(c, robot, self.capacity)
+                self._rows.append(of.rows)
+                if c.state_topic in ids:
+                    template = controller_state_template(ids[c.state_topic], c.joints, c.interfaces)
+                    states.append((c.state_topic, template, partial(self._state, of)))
+                curves: list[tuple[str, Values]] = [
+                    (c.reference_topic, of.reference),
+                    (c.error_topic, partial(self._errors, of)),
+                ]
+                for topic, values in curves:
+                    if topic in ids:
+                        plots.append((topic, joint_state_template(ids[topic], c.joints, effort=False), values))
+            elif isinstance(c, WrenchChannel):
+                room = np.zeros((self.capacity, 1, 6))
+                self._rows.append(room)
+                if c.topic in ids:
+                    wrenches.append((c.topic, wrench_template(ids[c.topic], c.link), partial(_wrench, room)))
+            else:
+                self._rows.append(None)
+        found: list[_Source] = []
+        if topics.JOINT_STATES in ids:
+            template = joint_state_template(ids[topics.JOINT_STATES], robot.joint_names, effort=True)
+            found.append((topics.JOINT_STATES, template, self._measured))
+        if topics.TF in ids:
+            found.append((topics.TF, tf_template(ids[topics.TF], frames), self._frames))
+        found += [*states, *wrenches, *plots]
+        if self._actuators.names and topics.ACTUATOR_STATES in ids:
+            template = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
+            found.append((topics.ACTUATOR_STATES, template, lambda at: self._actuators.state(*self._measured(at))))
+        return found
 
     def add(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """Copies one tick; the caller may reuse its arrays. The block must not be full."""
@@ -150,68 +206,68 @@ class Block:
     def encode(self, singles: Sequence[Single]) -> ChunkContent | None:
         """Everything in the block, and `singles` behind the tick of their time; empties the block. None when empty."""
         T, self.count = self.count, 0
-        if T == 0 and not singles:
+        ticks = self._ticks[:T]
+        times = np.rint(ticks * self._period * 1e9).astype(np.int64)
+        picked = [group.fill(ticks, times) for group in self._groups]
+        if not singles and not any(map(len, picked)):
             return None
-        times = np.rint(self._ticks[:T] * self._period * 1e9).astype(np.int64)
-        plotted = np.flatnonzero(self._ticks[:T] % self._stride == 0)
-        self._fill(T, times, plotted)
-        return self._join(times, plotted, sorted(singles, key=lambda single: single.ns))
+        return self._join(times, picked, sorted(singles, key=lambda single: single.ns))
 
-    def _fill(self, T: int, times: Times, plotted: Places) -> None:
-        position, velocity, effort = self._position[:T], self._velocity[:T], self._effort[:T]
-        X_position, X_quat = relative_batch(self._robot, position)
+    def _measured(self, at: Ticks) -> list[Array]:
+        return [self._position[at], self._velocity[at], self._effort[at]]
+
+    def _frames(self, at: Ticks) -> list[Array]:
+        X_position, X_quat = relative_batch(self._robot, self._position[at])
         links = np.concatenate((X_position, X_quat), axis=2)
-        bodies = np.concatenate((self._body_position[:T], self._body_quat[:T]), axis=2)
-        fast = [position, velocity, effort, *links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
-        slow: list[Array] = []
-        for rows in self._controllers:
-            state, plots = rows.values(position, velocity, effort)
-            fast += state
-            slow += [values[plotted] for values in plots]
-        fast += [wrenches[:T, 0] for wrenches in self._wrenches]
-        if self._actuators.names:
-            slow += self._actuators.state(position[plotted], velocity[plotted], effort[plotted])
-        self._fast.fill(times, self._fast_written + 1, fast)
-        self._slow.fill(times[plotted], self._slow_written + 1, slow)
-        self._fast_written += T
-        self._slow_written += len(plotted)
+        bodies = np.concatenate((self._body_position[at], self._body_quat[at]), axis=2)
+        return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
 
-    def _join(self, times: Times, plotted: Places, singles: Sequence[Single]) -> ChunkContent:
+    def _state(self, of: _ControllerRows, at: Ticks) -> list[Array]:
+        return of.state(at, *self._measured(at))
+
+    def _errors(self, of: _ControllerRows, at: Ticks) -> list[Array]:
+        return of.errors(at, self._position[at], self._velocity[at])
+
+    def _join(self, times: Times, picked: Sequence[Places], singles: Sequence[Single]) -> ChunkContent:
         """Rows and singles in the order of time, and where each message stands.
 
-        A tick's row is followed by its row for plots, where it has one, and then by the singles up to the next tick.
+        A tick has the rows of its groups, the most frequent first, and then the singles up to the next tick.
         """
-        T, fast, slow = len(times), self._fast.size, self._slow.size
+        T = len(times)
         ns = np.array([single.ns for single in singles], dtype=np.int64)
         lengths = np.array([len(single.record) for single in singles], dtype=np.int64)
-        behind = np.searchsorted(times, ns, side="right")  # rows before each single
-        single_bytes = np.bincount(behind, weights=lengths, minlength=T + 1).cumsum().astype(np.int64)
-        k = np.arange(T)
-        row_at = k * fast + np.searchsorted(plotted, k) * slow + single_bytes[:T]
-        single_at = behind * fast + np.searchsorted(plotted, behind) * slow + lengths.cumsum() - lengths
+        behind = np.searchsorted(times, ns, side="right")  # ticks before each single
+        before = np.zeros(T + 1, dtype=np.int64)  # bytes before each tick, and before the end
+        for group, ticks in zip(self._groups, picked, strict=True):
+            before[1:] += np.bincount(ticks, minlength=T).cumsum() * group.rows.size if T else 0
+        single_at = before[behind] + lengths.cumsum() - lengths
+        before += np.bincount(behind, weights=lengths, minlength=T + 1).cumsum().astype(np.int64)
 
         indexes: dict[int, Index] = {}
-        for rows, when, at in ((self._fast, times, row_at), (self._slow, times[plotted], row_at[plotted] + fast)):
-            if len(when):
-                indexes |= {i: _index(when, at + start) for i, start in zip(rows.channels, rows.starts, strict=True)}
+        parts: list[tuple[int, bytes | memoryview]] = []
+        within = np.zeros(T, dtype=np.int64)  # bytes of a tick so far
+        for group, ticks in zip(self._groups, picked, strict=True):
+            at = before[ticks] + within[ticks]
+            within[ticks] += group.rows.size
+            if len(ticks):
+                # Rows that follow each other without anything between them are one part.
+                breaks = np.flatnonzero(np.diff(at) != group.rows.size) + 1
+                for first, end in pairwise([0, *breaks.tolist(), len(ticks)]):
+                    parts.append((int(at[first]), group.rows.bytes[first:end].data))
+                starts = zip(group.rows.channels, group.rows.starts, strict=True)
+                indexes |= {i: _index(times[ticks], at + start) for i, start in starts}
         channels = np.array([single.channel for single in singles], dtype=np.int64)
         for i in sorted(set(channels.tolist())):
             indexes[i] = _index(ns[channels == i], single_at[channels == i])
+        parts += zip(single_at.tolist(), (single.record for single in singles), strict=True)
+        parts.sort(key=itemgetter(0))
+        stamps = np.concatenate([times[ticks] for ticks in picked] + [ns])
+        data = b"".join([part for _, part in parts])
+        return ChunkContent(data, int(stamps.min()), int(stamps.max()), indexes)
 
-        cuts = sorted({0, T, *(plotted + 1).tolist(), *behind.tolist()})
-        waiting = iter(singles)
-        parts: list[bytes | memoryview] = []
-        plot_row = dict(zip((plotted + 1).tolist(), range(len(plotted)), strict=True))
-        number = np.bincount(behind, minlength=T + 1)
-        start = 0
-        for cut in cuts:
-            parts.append(self._fast.bytes[start:cut].data)
-            if cut in plot_row:
-                parts.append(self._slow.bytes[plot_row[cut]].data)
-            parts += [next(waiting).record for _ in range(number[cut])]
-            start = cut
-        stamps = np.concatenate((times, ns))
-        return ChunkContent(b"".join(parts), int(stamps.min()), int(stamps.max()), indexes)
+
+def _wrench(room: Array, at: Ticks) -> list[Array]:
+    return [room[at, 0]]
 
 
 def _index(times: Times, offsets: Places) -> Index:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 RECORD = "recording"
 """Name of the metadata record."""
@@ -17,22 +17,39 @@ FORMAT = 1
 """Version of the layout of a recording."""
 
 
+MAX_STRIDE = 1 << 20
+"""Ticks."""
+
+
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """`period` [s] of a tick; names in the order of the arrays: moving joints, movable bodies, controllers' joints."""
+    """What is in a recording.
+
+    Attributes:
+        period: [s] of a tick.
+        joints, bodies, controllers: names in the order of the arrays: moving joints, movable bodies, controllers'
+            joints.
+        strides: ticks between two messages of a topic, where that is not each one.
+        absent: topics that the run was told not to record.
+    """
 
     period: float
     joints: tuple[str, ...]
     bodies: tuple[str, ...]
     controllers: dict[str, tuple[str, ...]]
+    strides: dict[str, int] = field(default_factory=dict)
+    absent: tuple[str, ...] = ()
 
     def metadata(self) -> dict[str, str]:
+        strides = {topic: stride for topic, stride in self.strides.items() if stride != 1}
         return {
             "format": str(FORMAT),
             "period": repr(self.period),
             "joints": json.dumps(self.joints),
             "bodies": json.dumps(self.bodies),
             "controllers": json.dumps(self.controllers),
+            **({"strides": json.dumps(strides)} if strides else {}),
+            **({"absent": json.dumps(self.absent)} if self.absent else {}),
         }
 
 
@@ -50,16 +67,20 @@ def contents(values: Mapping[str, str]) -> Contents:
     try:
         period = float(values["period"])
         joints, bodies, controllers = (json.loads(values[key]) for key in ("joints", "bodies", "controllers"))
+        strides, absent = json.loads(values.get("strides", "{}")), json.loads(values.get("absent", "[]"))
     except (KeyError, ValueError, RecursionError) as error:
         raise ValueError(f"has a damaged metadata record '{RECORD}'") from error
-    groups = [joints, bodies, *(controllers.values() if isinstance(controllers, dict) else [None])]
-    if not (math.isfinite(period) and period > 0) or not all(map(_is_names, groups)):
+    whole = isinstance(strides, dict) and all(type(one) is int and 0 < one <= MAX_STRIDE for one in strides.values())
+    groups = [joints, bodies, absent, *(controllers.values() if isinstance(controllers, dict) else [None])]
+    if not (math.isfinite(period) and period > 0 and whole) or not all(map(_is_names, groups)):
         raise ValueError(f"has a damaged metadata record '{RECORD}'")
     return Contents(
         period=period,
         joints=tuple(joints),
         bodies=tuple(bodies),
         controllers={name: tuple(claimed) for name, claimed in controllers.items()},
+        strides=strides,
+        absent=tuple(absent),
     )
 
 

@@ -158,6 +158,8 @@ class _Reader:
         }
         for name in self._contents.controllers:
             self._types[ControllerChannel(name, ()).state_topic] = schemas.CONTROLLER_STATE
+        for topic in self._contents.absent:
+            self._types.pop(topic, None)
 
     def chunk(self, record: Record, indexes: Mapping[int, bytes], end: int) -> None:
         """A chunk; its indexes, which end at `end`, say whether anything in it is needed yet."""
@@ -231,6 +233,7 @@ class _Reader:
             attachments=self._attachments,
             lost=lost,
             period=known.period,
+            absent=known.absent,
         )
 
 

@@ -31,6 +31,7 @@ from manipcli.record.goals import GoalLog
 from manipcli.record.recording import TaskEvent
 from manipcli.record.rows import message_record
 from manipcli.record.schemas import schema_text
+from manipcli.record.selection import EVERYTHING, JUDGED, Selection, word
 
 BLOCK_SECONDS = 0.5
 
@@ -46,6 +47,7 @@ class Recorder:
         period: [s] of a tick.
         attachments: (file name, media type, bytes), written first.
         metadata: name -> key -> value, what is known before the run.
+        selection: what of it is recorded, and how often.
         overwrite: replace a recording, or what a killed run left, at this path.
 
     Raises:
@@ -63,13 +65,16 @@ class Recorder:
         period: float,
         attachments: Sequence[tuple[str, str, bytes]],
         metadata: Mapping[str, Mapping[str, str]],
+        selection: Selection = EVERYTHING,
         overwrite: bool = False,
     ) -> None:
         _check_names(path, robot, scene, [name for name, _, _ in attachments])
-        table = channel_table(controllers)
+        everything = channel_table(controllers)
+        table = [channel for channel in everything if selection.holds(channel)]
         self._period = period
         self._ids = {channel.topic: channel.id for channel in table}
-        self._block = Block(robot, scene, controllers, table, period, max(1, round(BLOCK_SECONDS / period)))
+        capacity = max(1, round(BLOCK_SECONDS / period))
+        self._block = Block(robot, scene, controllers, table, selection, period, capacity)
         self._singles: list[Single] = []
         self._sequences: Counter[int] = Counter()
         self._contact_filter = ContactFilter()
@@ -82,8 +87,11 @@ class Recorder:
             joints=robot.joint_names,
             bodies=tuple(body.name for body in scene.movable),
             controllers={c.name: c.joints for c in controllers if isinstance(c, ControllerChannel)},
+            strides={c.topic: selection.stride(c.topic, period) for c in table if word(c.topic) in JUDGED},
+            absent=tuple(channel.topic for channel in everything if channel not in table),
         )
         self._goals = {c.name: GoalLog(c) for c in controllers if isinstance(c, ControllerChannel) and c.action}
+        self._touches = topics.CONTACTS in self._ids
         try:
             self._begin(table, attachments, {RECORD: holds.metadata(), **metadata}, robot, scene)
         except BaseException:
@@ -123,6 +131,8 @@ class Recorder:
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
         """Everything that touches at `tick`; recorded when it differs enough from what was recorded last."""
+        if not self._touches:
+            return
         changed = self._contact_filter.changed(tick * self._period, contacts)
         if changed is not None:
             ns = self._ns(tick)
@@ -209,7 +219,9 @@ class Recorder:
         return round(tick * self._period * 1e9)
 
     def _single(self, topic: str, ns: int, data: bytes) -> None:
-        channel = self._ids[topic]
+        channel = self._ids.get(topic)
+        if channel is None:  # left out
+            return
         self._sequences[channel] += 1
         self._singles.append(Single(ns, channel, message_record(channel, self._sequences[channel], ns, data)))
 

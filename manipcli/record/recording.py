@@ -59,8 +59,11 @@ class ContactSnapshot:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Successive control ticks: `states` with a leading time axis T, each controller's trace on the same ticks, and
-    the changes of contacts among them."""
+    """Successive control ticks at which everything is recorded that states and traces are made of.
+
+    `states` have a leading time axis T, each controller's trace is on the same ticks; and the changes of contacts among
+    them.
+    """
 
     states: WorldState
     controllers: tuple[ControllerTrace, ...]
@@ -94,6 +97,8 @@ class Recording:
         attachments: name -> bytes.
         lost: why the end is missing, or None.
         period: [s] of a tick.
+        absent: topics that the task told not to record. States whose topic is absent are NaN, and a controller whose
+            state is absent has no trace.
 
     `states`, `controllers` and `contacts` are those of all spans together: ask them of a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -107,6 +112,7 @@ class Recording:
     attachments: dict[str, bytes]
     lost: str | None
     period: float = 0.0
+    absent: tuple[str, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The mesh files that the log carries, by the URI that its URDF and its scene call them by; empty unless the

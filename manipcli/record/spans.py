@@ -30,6 +30,7 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.messages import WORLD
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
 from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, records_at
+from manipcli.record.selection import common_stride
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +101,21 @@ class _SpanReader:
     def __init__(self, contents: Contents, channels: Mapping[int, str]) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
-        self._controllers = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
+        everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
+        self._controllers = [one for one in everyone if one.state_topic not in contents.absent]
+        self._bodies = m
         self._columns = {
-            topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_layout, contents.joints, (n,) * 3),
-            topics.TF: Columns(topics.TF, body_layout(frozenset(contents.bodies), WORLD), contents.bodies, (7,) * m),
+            topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_layout, contents.joints, (n,) * 3)
         }
+        if topics.TF not in contents.absent:
+            poses = body_layout(frozenset(contents.bodies), WORLD)
+            self._columns[topics.TF] = Columns(topics.TF, poses, contents.bodies, (7,) * m)
         for controller in self._controllers:
             topic, widths = controller.state_topic, (len(controller.joints),) * 4
             self._columns[topic] = Columns(topic, controller_state_layout, controller.joints, widths)
+        strides = {topic: contents.strides.get(topic, 1) for topic in self._columns}
+        self._grid_ns = common_stride(strides) * contents.period * 1e9
+        self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
 
     @property
@@ -126,14 +134,25 @@ class _SpanReader:
                 raise CdrError(f"it has a message of channel {channel}, which is not declared")
             topic = self._channels[channel]
             if topic in self._columns:
-                self._columns[topic].add(data, found)
+                common = self._common(found) if self._strided else found
+                if len(common.times):
+                    self._columns[topic].add(data, common)
             elif topic == topics.CONTACTS:
                 self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
+
+    def _common(self, places: Places) -> Places:
+        """The messages of the ticks at which every topic has one."""
+        ticks = np.rint(places.times / self._grid_ns) * self._grid_ns
+        on = np.abs(places.times - ticks) < 1.0  # [ns] what rounding leaves
+        return Places(places.times[on], places.starts[on], places.lengths[on])
 
     def span(self, ticks: int) -> Span:
         """The next `ticks`, with velocities of bodies left at zero; with 0 ticks, all contacts."""
         ns, (position, velocity, effort) = self._columns[topics.JOINT_STATES].take(ticks)
-        body_ns, poses = self._columns[topics.TF].take(ticks)
+        if topics.TF in self._columns:
+            body_ns, poses = self._columns[topics.TF].take(ticks)
+        else:
+            body_ns, poses = ns, [np.full((ticks, 7), np.nan)] * self._bodies
         taken = [self._columns[controller.state_topic].take(ticks) for controller in self._controllers]
         for times in (body_ns, *(times for times, _ in taken)):
             if not np.array_equal(ns, times):

@@ -6,18 +6,20 @@ imports no member. A step is a mapping with exactly one verb key beside the comm
 
 from __future__ import annotations
 
+import math
 import re
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import Acceleration, Angle, Length, Mass, Time
+from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 
 __all__ = [
     "BodySpec", "BoxSpec", "ConditionSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "KeyedSpec", "MeshSpec",
-    "Positive", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
+    "Positive", "RatesSpec", "RecordSpec", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec",
+    "UrdfSpec", "Vector3",
 ]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -157,6 +159,66 @@ class ConditionSpec(KeyedSpec):
         return self.word
 
 
+Rate = Annotated[Frequency, Field(gt=0)]
+SLOWEST: Final = 20.0
+"""[Hz] below which the end of a run could not be judged."""
+
+
+class RatesSpec(Model):
+    """How often topics are recorded [Hz]: the control rate, or a whole part of it."""
+
+    joint_states: Rate | None = Field(None, description="Measured joints [Hz], 20 or more. Default: the control rate.")
+    tf: Rate | None = Field(None, description="Links and bodies [Hz], 20 or more. Default: the control rate.")
+    controller_state: Rate | None = Field(
+        None, description="Of every controller [Hz], 20 or more. Default: the control rate."
+    )
+    reference: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
+    error: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
+    actuator_states: Rate | None = Field(None, description="Behind the transmissions [Hz]. Default 100 Hz.")
+    wrench: Rate | None = Field(None, description="Of every force sensor [Hz]. Default: the control rate.")
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Those that are not left to the default."""
+        rates = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: rate for name, rate in rates.items() if rate is not None}
+
+
+ChosenTopic = Literal[
+    "joint_states", "tf", "controller_state", "reference", "error", "actuator_states", "wrench", "contacts", "goals"
+]
+"""Topics that a task may leave out; `goals` are the action topics of the controllers."""
+JUDGED: Final = ("joint_states", "tf", "controller_state")
+
+
+class RecordSpec(Model):
+    """What the log holds, and how often. What is small, or happens once, is always there; so are the joints."""
+
+    rates: RatesSpec = Field(RatesSpec(), description="How often topics are recorded.")
+    topics: tuple[ChosenTopic, ...] | None = Field(
+        None, description="Of these topics no others are recorded; `joint_states` always is. Default: all."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> RecordSpec:
+        for name, rate in self.rates.given.items():
+            if name in self.left_out:
+                raise problem("conflict", f"'{name}' has a rate, but is not among `topics`", at=("rates", name))
+            if name in JUDGED and rate < SLOWEST:
+                message = f"'{name}' at {rate:g} Hz is too rare to judge the run by"
+                raise problem("conflict", message, at=("rates", name), hint=f"record it at {SLOWEST:g} Hz at least")
+        return self
+
+    def strides(self, period: float) -> dict[str, int]:
+        """Control ticks of `period` [s] between two messages of each topic with a rate."""
+        return {name: max(1, round(1.0 / (rate * period))) for name, rate in self.rates.given.items()}
+
+    @property
+    def left_out(self) -> frozenset[str]:
+        """What is not recorded."""
+        return frozenset() if self.topics is None else frozenset(get_args(ChosenTopic)) - {*self.topics, "joint_states"}
+
+
 _ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 
@@ -186,6 +248,7 @@ class TaskSpec(Model):
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
+    record: RecordSpec = Field(RecordSpec(), description="What the log holds, and how often.")
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
     frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
@@ -196,6 +259,27 @@ class TaskSpec(Model):
     )
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ConditionSpec, ...] = Field((), description="What must hold at the end, or over the run.")
+
+    @model_validator(mode="after")
+    def _recordable(self) -> TaskSpec:
+        """Every rate is that of the control tick, or a whole part of it."""
+        period = self.simulation.control_period
+        strides = self.record.strides(period)
+        for name, rate in self.record.rates.given.items():
+            ticks = 1.0 / (rate * period)
+            if abs(ticks - strides[name]) > 1e-6 * ticks:
+                most = 1.0 / period
+                message = f"{rate:g} Hz is no whole part of the control rate ({most:g} Hz)"
+                near = most / max(1, round(ticks))
+                hint = f"write '{near:.10g} Hz'" + (", the control rate" if near == most else "")
+                raise problem("conflict", message, at=("record", "rates", name), hint=hint)
+        common = math.lcm(*(strides.get(name, 1) for name in JUDGED if name not in self.record.left_out))
+        if common * period > 1.0 / SLOWEST + 1e-9:
+            message = f"these rates meet only every {common * period:g} s, too rarely to judge the run by"
+            raise problem(
+                "conflict", message, at=("record", "rates"), hint="choose rates of which one divides the other"
+            )
+        return self
 
     @field_validator("task", mode="after")
     @classmethod

@@ -11,6 +11,7 @@ from manipcli.judge.expectation import Evidence, Expectation, Measured, NotEvalu
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.record.channels import CONTACTS
 from manipcli.record.recording import Span
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
@@ -36,6 +37,9 @@ def evaluate(spec: NoCollisionSpec, evidence: Evidence, span: Span) -> Measured 
     """
     if not evidence.physics:
         return NotEvaluated("the engine has no physics, so nothing can touch", "N")
+    reason = evidence.lacks(CONTACTS)
+    if reason is not None:
+        return NotEvaluated(reason, "N")
     force, at, text = 0.0, None, "never touched"
     for snapshot in span.contacts:
         for contact in snapshot.contacts:

@@ -35,7 +35,9 @@ def evaluate(spec: TrackingSpec, evidence: Evidence, span: Span) -> Measured | N
         unit = "m" if robot.joint(name).type == "prismatic" else "rad"
         traces = [trace for trace in span.controllers if name in trace.joints]
         if not traces:
-            return NotEvaluated(f"the recording holds no reference of joint '{name}'", unit)
+            reason = f"the recording holds no reference of joint '{name}'"
+            left_out = [topic for topic in evidence.absent if topic.endswith("/controller_state")]
+            return NotEvaluated(evidence.lacks(left_out[0]) or reason if left_out else reason, unit)
         for trace in traces:
             k = trace.joints.index(name)
             active = ~np.isnan(trace.reference_position[:, k])

@@ -1,0 +1,46 @@
+"""What a task leaves out of its log, the judge does not guess."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from manipcli.pipeline import judge_log, run_task
+
+ROOT = Path(__file__).parents[2]
+TASK = (
+    f"task: choice\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: {ROOT}/controllers/arm7_hand3.yaml\n"
+    "scene:\n  cube: {box: {size: [0.05, 0.05, 0.05]}, mass: 0.1, pose: {xyz: [0.8, 0.5, 0.025]}}\n"
+    "simulation: {settle: 0.1 s}\n"
+    "steps: [{wait: 0.1 s}]\n"
+    "expect:\n  - near: {object: cube, to: start, within: 1 cm}\n  - no_collision: {pairs: [[robot, cube]]}\n"
+    "  - tracking: {group: arm, within: 0.2 rad}\n  - at_pose: {pose: home, within: 0.2 rad}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("record", "unknown"),
+    [
+        ("{rates: {tf: 100 Hz, controller_state: 200 Hz}}", {}),
+        ("{topics: [controller_state, contacts]}", {"near": "/tf"}),
+        ("{topics: [tf, controller_state]}", {"no_collision": "/contacts"}),
+        ("{topics: [tf, contacts]}", {"tracking": "/arm_controller/controller_state"}),
+    ],
+)
+def test_an_expectation_that_lacks_its_topic_says_so_and_fails(
+    record: str, unknown: dict[str, str], tmp_path: Path
+) -> None:
+    path = tmp_path / "task.yaml"
+    path.write_text(f"{TASK}record: {record}\n")
+    log = tmp_path / "log.mcap"
+    verdict = run_task(path, log=log).verdict
+    found = {e.name: e.text for e in verdict.expectations if e.outcome == "not_evaluated"}
+    assert {e.name for e in verdict.expectations if e.outcome == "passed"} | found.keys() == {
+        "near", "no_collision", "tracking", "at_pose"
+    }  # fmt: skip
+    assert found == {
+        name: f"the log holds no {topic}: `record:` of the task leaves it out" for name, topic in unknown.items()
+    }
+    assert verdict.verdict == ("failed" if unknown else "passed")
+    assert judge_log(log) == verdict
