@@ -127,10 +127,12 @@ class Session:
         self._touch(state)
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
+        if manager.faults:
+            self._refuse_runaway(state)  # a controller that is told nonsense is not to blame
         try:
             self._limiter.apply(command, state.position, state.velocity, self.period)
         except NotFinite as bad:
-            self._refuse_runaway(state)  # a controller that is told nonsense is not to blame
+            self._refuse_runaway(state)
             if not np.isfinite(state.position).all():
                 raise SimulationFailed(str(bad), time=time) from bad
             manager.stop_non_finite(time)

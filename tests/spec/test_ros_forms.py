@@ -230,6 +230,16 @@ def test_the_form_of_ros_1_with_a_namespace_feed_forward_and_antiwindup(tmp_path
     assert controllers["arm"]["stop_trajectory_duration"] == 0.5
 
 
+def test_our_words_may_stand_beside_those_of_ros() -> None:
+    word = "effort_controllers/JointTrajectoryController"
+    text = f"x: {{type: {word}, joints: [a], command_interface: velocity, active: false}}"
+    controllers, findings = loaded(text)
+    assert findings == ()
+    assert controllers["x"] == {
+        "type": "joint_trajectory", "joints": ("a",), "command_interface": "velocity", "active": False,
+    }  # fmt: skip
+
+
 def test_an_integral_that_ros_1_would_not_let_act_is_told() -> None:
     _, findings = loaded(ROS_1.replace(", i_clamp: 1", ""))
     assert told(findings) == [

@@ -260,7 +260,7 @@ def _may_be(node: Found, controller: Found) -> bool:
 def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
     """With what the type of ROS says beyond ours."""
     for key, words in table.types[str(word.value)].items():
-        if key in node.entries:
+        if key in node.entries or key.removesuffix("s") in node.entries:
             continue
         plural = key.endswith("interfaces")
         items = tuple(ScalarNode(value(one), word.place) for one in words.split())
