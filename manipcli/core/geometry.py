@@ -107,13 +107,16 @@ def matrix_from_rpy(rpy: npt.ArrayLike) -> Array:
     """URDF's fixed-axis roll, pitch, yaw [rad]: R = Rz(yaw) Ry(pitch) Rx(roll)."""
     r, p, y = (float(v) for v in np.asarray(rpy, dtype=np.float64))
     cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    return (
+        np.array(
+            [
+                [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                [-sp, cp * sr, cp * cr],
+            ]
+        )
+        + 0.0
+    )  # angles of zero make the identity, without a -0.0 in it
 
 
 def rpy_from_matrix(R: npt.ArrayLike) -> Array:
@@ -144,14 +147,24 @@ class Transform:
         quat_xyzw: npt.ArrayLike | None = None,
         R: npt.ArrayLike | None = None,
     ) -> Transform:
-        """From a translation [m] and at most one of `rpy` [rad], `quat_xyzw`, `R`."""
+        """From a translation [m] and at most one of `rpy` [rad], `quat_xyzw`, `R`.
+
+        Angles are kept as they are given: written down and read again they make the same matrix, bit for bit. No number
+        of them or of the translation is -0.0.
+        """
+        p = frozen(np.asarray(xyz, dtype=np.float64) + 0.0)
+        if R is None and quat_xyzw is None and rpy is not None:
+            angles = frozen(np.asarray(rpy, dtype=np.float64) + 0.0)
+            made = Transform(R=frozen(matrix_from_rpy(angles)), p=p)
+            made.__dict__["rpy"] = angles
+            return made
         if R is None:
             if quat_xyzw is not None:
                 q = np.asarray(quat_xyzw, dtype=np.float64)
                 R = matrix_from_quat(q / np.linalg.norm(q))
             else:
-                R = matrix_from_rpy(rpy) if rpy is not None else np.eye(3)
-        return Transform(R=frozen(R), p=frozen(xyz))
+                R = np.eye(3)
+        return Transform(R=frozen(R), p=p)
 
     def __matmul__(self, other: Transform) -> Transform:
         return Transform(R=frozen(self.R @ other.R), p=frozen(self.R @ other.p + self.p))
@@ -169,7 +182,13 @@ class Transform:
 
     @cached_property
     def rpy(self) -> Array:
+        """Roll, pitch, yaw [rad], as given or of the matrix."""
         return frozen(rpy_from_matrix(self.R))
+
+    @property
+    def by_angles(self) -> Transform:
+        """The same, to rounding, with the rotation that its `rpy` make: for what is to be written down as angles."""
+        return Transform.of(xyz=self.p, rpy=self.rpy)
 
     @cached_property
     def matrix(self) -> Array:

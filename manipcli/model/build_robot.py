@@ -232,7 +232,7 @@ class _Body:
                 type="fixed",
                 parent=spec.parent,
                 child=prefix + parts.root,
-                X_PJ=transform(spec.pose),
+                X_PJ=transform(spec.pose).by_angles,
                 axis=frozen([1.0, 0.0, 0.0]),
                 limits=JointLimits(),
             )

@@ -78,7 +78,7 @@ class Reader:
         if len(words) != count:
             self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
             return None
-        return tuple(float(word) for word in words)
+        return tuple(float(word) + 0.0 for word in words)  # no -0.0: it would not be written again
 
     def number(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """One number; `default` where it is missing or (with a finding) wrong."""
@@ -114,6 +114,6 @@ class Reader:
         xyz = self.numbers(element, "xyz", 3) or (0.0, 0.0, 0.0)
         quat = self.numbers(element, "quat_xyzw", 4)
         if quat is not None and math.hypot(*quat) > 1e-6:
-            return Transform.of(xyz=xyz, quat_xyzw=quat)
+            return Transform.of(xyz=xyz, quat_xyzw=quat).by_angles
         rpy = self.numbers(element, "rpy", 3)
         return Transform.of(xyz=xyz, rpy=rpy) if rpy is not None and any(rpy) else Transform.of(xyz=xyz)
