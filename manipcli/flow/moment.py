@@ -14,6 +14,7 @@ from manipcli.flow.log import URDF
 from manipcli.flow.log_info import COMMON
 from manipcli.model.located_xml import element_of, parse_document
 from manipcli.model.state import Contact
+from manipcli.record.channels import CONTACTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.inventory import Inventory, inventory
 from manipcli.record.messages import WORLD
@@ -43,6 +44,7 @@ def moment(path: Path, time: float) -> Moment:
 def _ours(path: Path, time: float) -> Moment:
     recording = open_recording(path)
     missing = [] if recording.lost is None else [recording.lost]
+    missing += [f"the run did not record {topic}" for topic in recording.absent if topic in (TF, CONTACTS)]
     span, k, touched, end = _at(recording.spans, time)
     if span is None:
         raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
@@ -73,6 +75,7 @@ def _ours(path: Path, time: float) -> Moment:
             float(np.linalg.norm(states.body_linear[k, j])),
         )
         for j, name in enumerate(recording.body_names)
+        if TF not in recording.absent
     )
     step, phase = active(recording.events, time)
     return Moment(
@@ -85,7 +88,7 @@ def _ours(path: Path, time: float) -> Moment:
         phase=phase,
         joints=joints,
         poses=poses,
-        contacts=touched,
+        contacts=None if CONTACTS in recording.absent else touched,
         missing=tuple(missing),
     )
 
@@ -148,6 +151,7 @@ def _others(path: Path, found: Inventory, time: float) -> Moment:
         ),
         contacts=None,
         missing=(*found.faults, *missing),
+        ours=False,
     )
 
 

@@ -7,11 +7,15 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import frozen
 from manipcli.flow.log import judge_recording, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.other_log import is_own, open_other
 from manipcli.judge.verdict import StepOutcome, Verdict
+from manipcli.record.channels import TF
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
@@ -48,6 +52,13 @@ def open_playback(
         allow_outside=allow_outside,
     )
     robot, scene = meshes.robot(robot), meshes.scene(scene)
+    notes = meshes.notes
+    body_position, body_quat_xyzw = samples.body_position, samples.body_quat_xyzw
+    if TF in recording.absent:
+        start = [scene.body(name).X_WO for name in recording.body_names]
+        body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
+        body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
+        notes = (*notes, f"the run did not record {TF}: every body is drawn where it was at the start")
     return Playback(
         name=verdict.task or path.name,
         robot=robot,
@@ -58,13 +69,13 @@ def open_playback(
         velocity=samples.velocity,
         effort=samples.effort,
         reference=samples.reference,
-        body_position=samples.body_position,
-        body_quat_xyzw=samples.body_quat_xyzw,
+        body_position=body_position,
+        body_quat_xyzw=body_quat_xyzw,
         contacts=samples.contacts,
         steps=playback_steps(verdict, recording.events, end=float(samples.times[-1])),
         verdict=verdict,
         lost=recording.lost,
-        notes=meshes.notes,
+        notes=notes,
         tables_of=partial(plot_tables, recording, robot),
         keep=meshes.folder,
     )

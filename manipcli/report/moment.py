@@ -59,6 +59,7 @@ class Moment:
         step, verb, phase: what was on; empty where nothing was.
         contacts: None where the log does not tell of contacts.
         missing: what cannot be told, a sentence each.
+        ours: whether manipcli wrote the log.
     """
 
     log: str
@@ -72,6 +73,7 @@ class Moment:
     poses: tuple[PoseMoment, ...]
     contacts: tuple[Contact, ...] | None
     missing: tuple[str, ...]
+    ours: bool = True
 
 
 def render_text(moment: Moment) -> str:
@@ -80,7 +82,7 @@ def render_text(moment: Moment) -> str:
     if lines:
         lines.append("")
     when = f"t = {moment.time:.3f} s of {moment.end:.3f} s"
-    idle = ": no step is on" if moment.contacts is not None else ""
+    idle = ": no step is on" if moment.ours else ""
     on = f": step '{moment.step}' ({moment.verb})" if moment.step else idle
     phase = f", phase '{moment.phase}'" if moment.phase else ""
     lines.append(when + on + phase)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from manipcli.cli.app import main
+from manipcli.flow.replay import open_playback
 from manipcli.pipeline import judge_log, run_task
 
 ROOT = Path(__file__).parents[2]
@@ -44,3 +48,20 @@ def test_an_expectation_that_lacks_its_topic_says_so_and_fails(
     }
     assert verdict.verdict == ("failed" if unknown else "passed")
     assert judge_log(log) == verdict
+
+
+def test_a_log_without_bodies_is_shown_and_told_as_far_as_it_goes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "task.yaml"
+    path.write_text(f"{TASK}record: {{topics: [controller_state]}}\n".replace("settle", "engine: kinematic, settle"))
+    log = tmp_path / "log.mcap"
+    run_task(path, log=log)
+    playback = open_playback(log)
+    np.testing.assert_allclose(playback.body_position[-1], [[0.8, 0.5, 0.025]])
+    assert "did not record /tf" in playback.notes[-1]
+    assert main(["at", str(log), "0.05", "--format", "json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["poses"], found["contacts"]) == ([], None)
+    assert found["missing"] == ["the run did not record /tf", "the run did not record /contacts"]
+    assert found["step"] == "wait_1"
