@@ -55,6 +55,16 @@ class GoalResult:
     time: float
     fingers: tuple[FingerStop, ...] = ()
 
+    @property
+    def reached_goal(self) -> bool:
+        """Of a gripper goal: whether every finger came to its target."""
+        return bool(self.fingers) and all(stop == "reached" for stop in self.fingers)
+
+    @property
+    def stalled(self) -> bool:
+        """Of a gripper goal: whether something stopped a finger, which is how an object is grasped."""
+        return any(stop in ("stalled", "contact") for stop in self.fingers)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feedback:
@@ -133,13 +143,13 @@ class GripperGoal:
     """Where the hand shall go, and what may stop it.
 
     Attributes:
-        target: (n) rad or m, in the order of the controller's joints.
+        target: (n) rad or m, in the order of the controller's joints; one number: for all of them.
         force: [N] at which a finger stops; None: contact does not stop it (to open).
-        max_effort: (n) N m or N, for this goal and after it; None: the controller's.
+        max_effort: (n) N m or N, or one number for all, for this goal and after it; None: the controller's.
         fingers: joint indices of each finger, every joint in exactly one; empty: each joint is a finger.
     """
 
-    target: Array
+    target: Array | float
     force: float | None = None
-    max_effort: Array | None = None
+    max_effort: Array | float | None = None
     fingers: tuple[tuple[int, ...], ...] = ()

@@ -191,7 +191,7 @@ class GripperSpec(ControllerSpec):
 
     type: Literal["gripper"] = Field(description="`gripper`.")
     joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interface: Literal["effort"] = Field("effort", description="What it commands: effort.")
+    command_interface: Literal["position", "effort"] = Field("effort", description="What it commands. Default effort.")
     gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
     gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
     speed: Annotated[JointVelocity, Field(gt=0, description="Of the reference, above 0. Default 1 rad/s or m/s.")] = 1.0
@@ -202,6 +202,9 @@ class GripperSpec(ControllerSpec):
         None, description="Slower counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
     )
     stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
+    allow_stalling: bool = Field(
+        True, description="Whether a stalled finger has grasped; otherwise its goal is aborted. Default true."
+    )
     goal_tolerance: Annotated[JointValue, Field(gt=0)] | None = Field(
         None, description="Distance that counts as arrived, above 0. Default 0.05 rad or 2 mm."
     )

@@ -17,8 +17,8 @@ it, or what `set_pose` says, and with the Jacobian J of T:
 
 K [N/m, N m/rad] and D [N s/m, N m s/rad] are diagonal along the axes of the world or of R. By a damping ratio z,
 D_ii = 2 z sqrt(K_ii m_i) with the mass m_i = 1 / (J M^-1 J^T)_ii that the tool has along that axis. Joints that the
-tool leaves free are drawn to the posture q_r through N = 1 - J^T (J J^T + s^2)^-1 J, which takes from it what would push
-the tool. Nothing is inverted that can be singular: s bounds the one, and m_i only damps.
+tool leaves free are drawn to the posture q_r through N = 1 - J^T (J J^T + s^2)^-1 J, which takes from it what would
+push the tool. Nothing is inverted that can be singular: s bounds the one, and m_i only damps.
 
 Where the reference rests, a force F on the tool brings it off by K^-1 F. Hogan, Impedance control (1985); Ott,
 Cartesian Impedance Control of Redundant and Flexible-Joint Robots (2008), chapters 3 and 4.

@@ -188,3 +188,66 @@ def test_goals_that_make_no_sense_are_refused(goal):
 def test_gains_all_zero_are_refused():
     with pytest.raises(InvalidArgument, match="thumb_2"):
         make(gains={j: GainsSpec(p=1.0) for j in JOINTS if j != "thumb_2"})
+
+
+def test_one_position_is_meant_for_all_joints_and_one_effort_too():
+    controller, hand = make(), Hand(FREE)
+    handle = controller.send_goal(GripperGoal(target=0.4, max_effort=1.5))
+    output = hand.run(controller, 1.0)
+    assert (handle.result.reached_goal, handle.result.stalled) == (True, False)
+    assert output.position == pytest.approx([0.4] * 4, abs=1e-9)
+
+
+def test_what_stalls_has_grasped_unless_it_must_not():
+    """As in GripperCommand: stalled and not at the goal; a success only where stalling is allowed."""
+    ends = []
+    for allowed in (True, False):
+        controller, hand = make(allow_stalling=allowed), Hand([0.3, 9, 9, 9])
+        handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1])))
+        hand.run(controller, 1.5)
+        result = handle.result
+        assert (result.stalled, result.reached_goal, result.fingers) == (True, False, ("stalled", "reached"))
+        ends.append((result.status, int(result.code)))
+    assert ends == [("succeeded", 0), ("aborted", -5)]
+    assert "'thumb_1'" in result.text
+    assert "stalling is not allowed" in result.text
+
+
+def test_contact_is_allowed_where_stalling_is_not():
+    controller, hand = make(allow_stalling=False), Hand([0.3, 9, 0.6, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1]), force=3.0))
+    hand.run(controller, 1.5)
+    assert (handle.status, handle.result.stalled) == ("succeeded", True)
+
+
+def test_on_the_position_interface_it_commands_its_reference():
+    controller = make(interface="position", gains={}, max_effort=None)
+    assert controller.interfaces == ("position",)
+    at, speed = np.array([0.2, 0.0, 0.0, 0.0]), np.zeros(4)
+    for k in range(2000):
+        output = controller.update(k * PERIOD, PERIOD, JointState(at, speed, np.zeros(4)))
+        assert np.array_equal(output.command, output.position)
+        if k == 0:
+            assert output.command.tolist() == [0.2, 0.0, 0.0, 0.0]
+            handle = controller.send_goal(GripperGoal(target=np.array([1.0, 0.5, 1.0, 0.5])))
+        at, speed = output.command.copy(), (output.command - at) / PERIOD
+    assert handle.result.reached_goal
+    assert at == pytest.approx([1.0, 0.5, 1.0, 0.5])
+
+
+@pytest.mark.parametrize("effort", [2.0, np.array([1.0, 1.0, 1.0, np.inf])])
+def test_positions_know_no_maximum_effort(effort):
+    with pytest.raises(InvalidArgument, match="positions"):
+        make(interface="position", gains={}, max_effort=effort)
+    with pytest.raises(InvalidArgument, match="positions"):
+        make(interface="position", gains={}, max_effort=None).send_goal(GripperGoal(target=0.1, max_effort=effort))
+
+
+@pytest.mark.parametrize("what", ["position", "velocity"])
+def test_a_measurement_that_is_no_number_is_refused_by_name(what):
+    state = {"position": np.zeros(4), "velocity": np.zeros(4), "effort": np.zeros(4)}
+    controller = make()
+    controller.update(0.0, PERIOD, JointState(**state))
+    state[what][2] = np.nan
+    with pytest.raises(InvalidArgument, match=f"{what} of joint 'finger_1' is nan"):
+        controller.update(PERIOD, PERIOD, JointState(**state))
