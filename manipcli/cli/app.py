@@ -13,7 +13,22 @@ import typer
 from typer.exceptions import TyperException
 
 from manipcli import __version__
-from manipcli.cli import at, check, check_urdf, console, info, judge, plan, plot, repair, replay, run, schema, view
+from manipcli.cli import (
+    at,
+    check,
+    check_urdf,
+    console,
+    info,
+    judge,
+    plan,
+    plot,
+    repair,
+    replay,
+    run,
+    schema,
+    tune,
+    view,
+)
 from manipcli.cli import list as list_
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 
@@ -36,6 +51,7 @@ app.command("run")(run.run)
 app.command("check")(check.check)
 app.command("check-urdf")(check_urdf.check_urdf)
 app.command("plan")(plan.plan)
+app.command("tune")(tune.tune)
 app.command("judge")(judge.judge)
 app.command("info")(info.info)
 app.command("at")(at.at)

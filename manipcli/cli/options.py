@@ -52,6 +52,24 @@ def seconds(word: str) -> float:
     return value
 
 
+def hertz(word: str) -> float:
+    """A frequency as it is written on a command line: a number of hertz, or a number and a unit of frequency.
+
+    Raises:
+        InvalidInput: it is none, or not above 0.
+    """
+    from manipcli.core.units import FREQUENCY, UnitError, to_si
+
+    try:
+        value = float(word) if word.strip()[-1:].isdecimal() else to_si(word, FREQUENCY)
+    except (ValueError, UnitError) as error:
+        message = error.cause if isinstance(error, UnitError) else f"'{word}' is no frequency"
+        raise InvalidInput([Finding("USE072", message, hint="write 5, '5 Hz' or 0.5kHz")]) from error
+    if not 0.0 < value < 1e9:
+        raise InvalidInput([Finding("USE072", f"'{word}' is no frequency above 0")])
+    return value
+
+
 def xacro_arguments(words: list[str]) -> dict[str, str]:
     """`NAME:=VALUE` words by name.
 

@@ -84,21 +84,20 @@ class Loop:
 
 
 def transition(loop: Loop) -> Array:
-    """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z only where there is an integral gain."""
+    """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z of joints with an integral gain."""
     n = len(loop.p)
     F, G = _held(loop)
-    has_i = bool(loop.i.any())
+    summed = np.flatnonzero(loop.i)
     delay = np.zeros(n, dtype=np.int64) if loop.delay is None else loop.delay
     most = int(delay.max(initial=0))
-    rows = (2 + has_i + most) * n
+    first = 2 * n + len(summed)  # of the efforts on their way, the latest command first
+    rows = first + most * n
     A = np.zeros((rows, rows))
-    q, v, z = slice(0, n), slice(n, 2 * n), slice(2 * n, 3 * n)
-    first = (2 + has_i) * n  # of the efforts on their way, the latest command first
     law = np.zeros((n, rows))
-    law[:, q], law[:, v] = -np.diag(loop.p), -np.diag(loop.d)
-    if has_i:
-        law[:, z] = -np.diag(loop.i)
-        A[z, z], A[z, q] = np.eye(n), loop.period * np.eye(n)
+    law[:, :n], law[:, n : 2 * n] = -np.diag(loop.p), -np.diag(loop.d)
+    for z, k in enumerate(summed, 2 * n):
+        law[k, z] = -loop.i[k]
+        A[z, z], A[z, k] = 1.0, loop.period
     applied = law.copy()
     for k in range(n):
         if delay[k]:
@@ -150,6 +149,15 @@ def is_stable(loop: Loop) -> bool:
     if resting:
         found = found[np.argsort(np.abs(found - 1.0))][resting:]
     return bool(np.all(np.abs(found) < 1.0 - MARGINAL))
+
+
+def unstable_share(loop: Loop) -> tuple[complex, Array]:
+    """The largest pole, and the share (n) that each joint has in its mode: the power d |v|^2 of its damping, sum 1."""
+    values, vectors = np.linalg.eig(transition(loop))
+    worst = int(np.argmax(np.abs(values)))
+    n = len(loop.p)
+    power = (loop.d + loop.p * loop.period) * np.abs(vectors[n : 2 * n, worst]) ** 2
+    return complex(values[worst]), np.asarray(power / power.sum())
 
 
 def gain_margin(loop: Loop) -> float:

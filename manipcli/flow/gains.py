@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.reflected import Load, Postures, load_of
-from manipcli.control.stability import Loop, is_stable, largest_damping, largest_stiffness, poles, transition
+from manipcli.control.stability import Loop, is_stable, largest_damping, largest_stiffness, poles, unstable_share
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
@@ -240,14 +240,12 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
         whole = Loop(load.mass[posture], p, d, i, load.damping, period, substeps, latency)
         if is_stable(whole):
             continue
-        values, vectors = np.linalg.eig(transition(whole))
-        n = len(loops)
-        share = np.abs(vectors[n : 2 * n, int(np.argmax(np.abs(values)))])
-        worst = [k for k in np.argsort(-share) if share[k] > 0.2 * share.max()][:3]
+        pole, share = unstable_share(whole)
+        worst = [k for k in np.argsort(-share) if share[k] > 0.1][:3]
         names = ", ".join(f"{loops[k].joint} (kd {d[k]:.3g})" for k in worst)
         message = (
-            f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at "
-            f"{abs(values[np.argmax(np.abs(values))]):.3g}, mostly of {names}"
+            f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
+            f"mostly of {names}"
         )
         yield Finding("CTRL154", message, _place(task, loops[worst[0]]), "lower their kd", "warning")
         return

@@ -25,16 +25,28 @@ def resolved(spec: BaseModel) -> str:
     return "".join(f"{line}\n" for line in _lines(data))
 
 
-def _data(value: object, *, escape: bool) -> Plain:
-    """Plain data; a key that is not set and has no default but nothing is left out."""
+def as_written(spec: BaseModel) -> str:
+    """The same with only what was stated, in a file or by `model_copy`: defaults stay unsaid."""
+    data = _data(spec, escape=isinstance(spec, TaskSpec), stated=True)
+    assert isinstance(data, dict)
+    return "".join(f"{line}\n" for line in _lines(data))
+
+
+def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
+    """Plain data; a key that is not set and has no default but nothing is left out, `stated`: every one not set."""
     if isinstance(value, BaseModel):
         fields = type(value).model_fields
-        pairs = ((field.alias or name, field, getattr(value, name)) for name, field in fields.items())
-        return {key: _data(v, escape=escape) for key, field, v in pairs if not (v is None and field.default is None)}
+        said = value.model_fields_set if stated else fields.keys()
+        pairs = ((field.alias or name, field, getattr(value, name)) for name, field in fields.items() if name in said)
+        return {
+            key: _data(v, escape=escape, stated=stated)
+            for key, field, v in pairs
+            if not (v is None and field.default is None)
+        }
     if isinstance(value, dict):
-        return {str(key): _data(v, escape=escape) for key, v in value.items()}
+        return {str(key): _data(v, escape=escape, stated=stated) for key, v in value.items()}
     if isinstance(value, list | tuple):
-        return [_data(v, escape=escape) for v in value]
+        return [_data(v, escape=escape, stated=stated) for v in value]
     if isinstance(value, str):
         return escaped(value) if escape else str(value)
     if value is None or isinstance(value, bool | int | float):

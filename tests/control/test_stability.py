@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manipcli.control.stability import Loop, gain_margin, is_stable, largest_damping, largest_stiffness, poles
+from manipcli.control.stability import (
+    Loop,
+    gain_margin,
+    is_stable,
+    largest_damping,
+    largest_stiffness,
+    poles,
+    unstable_share,
+)
 
 H = 1e-3
 
@@ -107,6 +115,24 @@ def test_two_loops_that_are_stable_alone_may_not_be_together() -> None:
 
 def largest_eigenvalue(mass: np.ndarray, d: np.ndarray) -> float:
     return float(np.max(np.linalg.eigvals(np.linalg.solve(mass, np.diag(d))).real))
+
+
+def test_an_integral_of_one_joint_leaves_the_others_alone() -> None:
+    gains = {"p": np.array([50.0, 40.0]), "d": np.array([1.0, 1.0]), "damping": np.zeros(2), "period": H}
+    both = Loop(mass=np.diag([0.01, 0.02]), i=np.array([0.0, 30.0]), **gains)
+    assert is_stable(both)
+    alone = [Loop.of_joint(0.01, p=50.0, d=1.0, period=H), Loop.of_joint(0.02, p=40.0, d=1.0, i=30.0, period=H)]
+    expected = np.sort_complex(np.concatenate([poles(each) for each in alone]))
+    np.testing.assert_allclose(np.sort_complex(poles(both)), expected, atol=1e-9)
+
+
+def test_a_mode_that_diverges_is_that_of_the_joint_with_too_much_damping() -> None:
+    mass = np.array([[0.02, 0.001], [0.001, 0.01]])
+    loop = Loop(mass, np.array([1.0, 1.0]), np.array([1.0, 30.0]), np.zeros(2), np.zeros(2), H)
+    pole, share = unstable_share(loop)
+    assert abs(pole) > 1.0
+    assert share[1] > 0.9
+    assert share.sum() == pytest.approx(1.0)
 
 
 def test_a_loop_without_stiffness_is_stable_where_its_velocity_is() -> None:

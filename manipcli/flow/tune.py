@@ -1,0 +1,341 @@
+"""Gains proposed for the controllers of a robot, and tried on the whole robot in the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState
+from manipcli.control.feed_forward import ModelFeedForward
+from manipcli.control.manager import ControllerManager
+from manipcli.control.pid import Pid
+from manipcli.control.reflected import Postures, load_of
+from manipcli.control.tuning import StepAnswer, Tuned, Wish, tune_efforts, tune_velocity
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Array
+from manipcli.core.text import did_you_mean
+from manipcli.flow.gains import named_postures
+from manipcli.model.build_robot import build_robot
+from manipcli.model.kinematics import STANDARD_GRAVITY, Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.plan.hand import with_mimics
+from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.quiet import stdout_to_stderr
+from manipcli.simulate.session import Session
+from manipcli.spec import load
+from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface, JointTrajectorySpec, Role
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located
+from manipcli.spec.resolved import as_written
+
+if TYPE_CHECKING:
+    from manipcli.replay.curves import Chart
+
+RANDOM_POSTURES: Final = 60
+"""Postures within the limits, beside the named ones; always the same."""
+WIDE: Final = 2.0
+"""[rad or m] how far from the start a joint without limits is put."""
+RETURN: Final = 0.5
+"""[s] at least that a joint has to come back before the next one steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Proposed gains, the file with them in place of its own, and what else there is to say."""
+
+    robot: str
+    wish: Wish
+    joints: tuple[Tuned, ...]
+    controllers: ControllersSpec
+    notes: tuple[str, ...]
+
+
+def tune(
+    robot_path: Path,
+    controllers_path: Path,
+    wish: Wish,
+    *,
+    joints: Sequence[str] = (),
+    step: float = 0.02,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+    simulated: bool = False,
+) -> Tuning:
+    """Gains for the loops of a controllers file.
+
+    Args:
+        robot_path, controllers_path: the two files.
+        wish: what is wanted.
+        joints: only these; () is all that have gains.
+        step: that must not saturate [rad]; a tenth of it [m] for joints that slide.
+        package_path, allow_outside: as everywhere.
+        simulated: also let every joint of the whole robot step in the engine, under gravity.
+
+    Raises:
+        InvalidInput: a file cannot be used, a joint has no loop, or nothing has gains.
+    """
+    robot_file = load.load_robot(robot_path)
+    robot, _ = build_robot(
+        robot_file.spec,
+        file=robot_path,
+        package_path=package_path,
+        allow_outside=allow_outside,
+        place=lambda loc: robot_file.place(*loc),
+    )
+    file = load.load_controllers(controllers_path)
+    tuner = _Tuner(robot, file, wish, step)
+    everything = tuner.proposals()
+    there = [one.joint for one in everything]
+    for joint in joints:
+        if joint not in there:
+            hint = did_you_mean(joint, there, kind="joints with gains")
+            raise InvalidInput([Finding("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
+    found = tuple(one for one in everything if not joints or one.joint in joints)
+    if simulated:
+        found = tuner.tried(everything, [one.joint for one in found])
+    return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
+
+
+def written(tuning: Tuning, controllers_path: Path) -> str:
+    """The controllers file with the proposed gains."""
+    wish = tuning.wish
+    head = (
+        f"# {controllers_path.name} with the gains of `manipcli tune --bandwidth '{wish.bandwidth:g} Hz' --damping "
+        f"{wish.damping:g}`, for a control period of {1e3 * wish.period:g} ms.\n"
+    )
+    return head + as_written(tuning.controllers)
+
+
+def chart_of(tuning: Tuning) -> Chart:
+    """The answers to a step, a panel a controller; what was simulated over what was predicted."""
+    from manipcli.replay.curves import Chart, Curve, Panel
+
+    panels, end = [], 0.1
+    for name in dict.fromkeys(one.controller for one in tuning.joints):
+        curves = []
+        for one in tuning.joints:
+            for log, answer in (("predicted", one.predicted), ("simulated", one.simulated)):
+                if one.controller == name and answer is not None:
+                    log = log if any(each.simulated for each in tuning.joints) else ""
+                    curves.append(Curve(one.joint, one.joint, log, answer.times, 100.0 * answer.share))
+                    end = max(end, min(1.6 * answer.settling_time, float(answer.times[-1])))
+        panels.append(Panel(name, "done of the step", "%", tuple(curves)))
+    return Chart(title=f"{tuning.robot}: answers to a step", panels=tuple(panels), steps=(), start=0.0, end=end)
+
+
+class _Tuner:
+    def __init__(self, robot: RobotModel, file: Located[ControllersSpec], wish: Wish, step: float) -> None:
+        self._robot, self._file, self._wish = robot, file, wish
+        self._kinematics = Kinematics(robot)
+        self._step = step
+        self.notes: tuple[str, ...] = ()
+        known = {joint.name for joint in robot.moving_joints}
+        missing = [
+            Finding("TUNE002", f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
+                    file.place("controllers", name, "joints", k), did_you_mean(joint, known, kind="joints"))
+            for name, spec in file.spec.controllers.items() for k, joint in enumerate(spec.joints)
+            if joint not in known
+        ]  # fmt: skip
+        if missing:
+            raise InvalidInput(missing)
+
+    def proposals(self) -> tuple[Tuned, ...]:
+        """Of every loop in the file."""
+        efforts: list[tuple[str, str, bool]] = []
+        velocities: list[tuple[str, str]] = []
+        for name, spec in self._file.spec.controllers.items():
+            if isinstance(spec, JointTrajectorySpec | GripperSpec):
+                carried = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
+                if spec.interfaces == ("effort",):
+                    efforts += [(name, joint, carried) for joint in spec.joints]
+                elif spec.interfaces == ("velocity",):
+                    velocities += [(name, joint) for joint in spec.joints]
+                else:
+                    self.notes += (f"{name}: its interface is {', '.join(spec.interfaces)}, which needs no gains",)
+            elif spec.interfaces:
+                self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
+        if not efforts and not velocities:
+            message = "no controller has a loop to propose gains for"
+            raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"))])
+        return self._of_efforts(efforts) + self._of_velocities(velocities)
+
+    def _of_efforts(self, loops: list[tuple[str, str, bool]]) -> tuple[Tuned, ...]:
+        if not loops:
+            return ()
+        joints = [joint for _, joint, _ in loops]
+        carried = np.array([each for _, _, each in loops])
+        found = load_of(self._robot, self._kinematics, joints, self._postures())
+        steps = np.array([self._step_of(joint) for joint in joints])
+        return tune_efforts([name for name, _, _ in loops], found, self._wish, steps=steps, carried=carried)
+
+    def _of_velocities(self, loops: list[tuple[str, str]]) -> tuple[Tuned, ...]:
+        if not loops:
+            return ()
+        found = load_of(self._robot, self._kinematics, [joint for _, joint in loops], self._postures())
+        tuned = []
+        for k, (name, joint) in enumerate(loops):
+            limits = self._robot.joint(joint).limits
+            inertia = float(found.held_inertia[:, k].max())
+            left = float(found.effort[k] - np.abs(found.gravity[:, k]).max())
+            fastest = np.inf if limits.acceleration is None else limits.acceleration
+            tuned.append(
+                tune_velocity(
+                    name,
+                    joint,
+                    self._wish,
+                    step=self._step_of(joint),
+                    inertia=inertia,
+                    velocity=np.inf if limits.velocity is None else limits.velocity,
+                    acceleration=min(fastest, max(left, 0.1 * float(found.effort[k])) / inertia),
+                )
+            )
+        return tuple(tuned)
+
+    def _step_of(self, joint: str) -> float:
+        return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)
+
+    def _postures(self) -> Postures:
+        """The named ones, and some from the whole range of the joints."""
+        start = self._start()
+        rng = np.random.default_rng(0)
+        low, high = start - WIDE, start + WIDE
+        for k, joint in enumerate(self._robot.moving_joints):
+            low[k] = low[k] if joint.limits.lower is None else joint.limits.lower
+            high[k] = high[k] if joint.limits.upper is None else joint.limits.upper
+        spread = [with_mimics(self._robot, q) for q in rng.uniform(low, high, (RANDOM_POSTURES, len(start)))]
+        return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+
+    def _start(self) -> Array:
+        """`home`, if there is such a pose; other joints at zero, or as near to it as their limits let them."""
+        robot = self._robot
+        q = np.zeros(len(robot.joint_names))
+        for k, joint in enumerate(robot.moving_joints):
+            low, high = joint.limits.lower, joint.limits.upper
+            q[k] = min(max(0.0, -np.inf if low is None else low), np.inf if high is None else high)
+        for pose in robot.poses:
+            if pose.name == "home":
+                q[robot.indices(pose.joints)] = pose.positions
+        return with_mimics(robot, q)
+
+    def tried(self, proposals: tuple[Tuned, ...], joints: Sequence[str]) -> tuple[Tuned, ...]:
+        """These joints step and come back, one after the other, while all others hold."""
+        robot, wish = self._robot, self._wish
+        start = self._start()
+        holders = [
+            _Holder(name, [one for one in proposals if one.controller == name], self._file.spec, robot, start)
+            for name in dict.fromkeys(one.controller for one in proposals)
+        ]
+        member = ENGINES["pybullet"]
+        refused = member.refuses(robot)
+        if refused:
+            raise InvalidInput(refused)
+        settings = EngineSettings(wish.period / wish.substeps, wish.substeps, start)
+        gravity = np.array(STANDARD_GRAVITY)
+        with stdout_to_stderr():
+            engine = member.open(robot, Scene(bodies=(), frames=(), gravity=gravity), settings)
+            try:
+                manager = ControllerManager(
+                    holders,
+                    joints=robot.joint_names,
+                    period=wish.period,
+                    following=[joint.name for joint in robot.moving_joints if joint.mimic is not None],
+                    feed_forward=ModelFeedForward(robot, self._kinematics),
+                )
+                session = Session(
+                    robot=robot,
+                    scene=Scene(bodies=(), frames=(), gravity=gravity),
+                    engine=engine,
+                    manager=manager,
+                    period=wish.period,
+                )
+                for _ in range(round(RETURN / wish.period)):
+                    session.tick()
+                answers = {
+                    one.joint: _stepped(session, holder, one)
+                    for holder in holders
+                    for one in holder.tuned
+                    if one.joint in joints
+                }
+            finally:
+                engine.close()
+        return tuple(replace(one, simulated=answers[one.joint]) for one in proposals if one.joint in joints)
+
+
+class _Holder:
+    """Holds joints with proposed gains at a reference that can be stepped: what their controller does with it."""
+
+    role: Role = "other"
+    senses_contact = False
+
+    def __init__(self, name: str, tuned: list[Tuned], spec: ControllersSpec, robot: RobotModel, start: Array) -> None:
+        own = spec.controllers[name]
+        self.name, self.tuned = name, tuned
+        self.joints = tuple(one.joint for one in tuned)
+        self.interfaces: tuple[Interface, ...] = (tuned[0].interface,)
+        weightless = getattr(own, "gravity_compensation", False) or getattr(own, "inverse_dynamics", False)
+        self.feed_forward: FeedForward = "gravity" if weightless else "none"
+        clamp = np.array([np.inf if one.i_clamp is None else one.i_clamp for one in tuned])
+        self._pid = Pid(
+            p=[one.p for one in tuned],
+            i=[one.i for one in tuned],
+            d=[one.d for one in tuned],
+            i_min=-clamp,
+            i_max=clamp,
+        )
+        self.output = ControllerOutput.of(len(tuned), 1)
+        self.reference = self.output.position
+        self.reference[:] = start[robot.indices(self.joints)]
+        self.measured = self.reference.copy()
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        self.measured[:] = measured.position
+        error = self.reference - measured.position
+        self.output.command[:] = self._pid.update(error, period, -measured.velocity)
+        return self.output
+
+    def deactivate(self, time: float, reason: str = "") -> None:
+        self._pid.reset()
+
+
+def _stepped(session: Session, holder: _Holder, one: Tuned) -> StepAnswer:
+    """The joint steps, away from its nearer limit, and comes back."""
+    k = holder.joints.index(one.joint)
+    limits = session.robot.joint(one.joint).limits
+    before = float(holder.reference[k])
+    beyond = limits.upper is not None and before + 2.0 * one.predicted.size > limits.upper
+    size = -one.predicted.size if beyond else one.predicted.size
+    rest = float(session.state.position[session.robot.joint_names.index(one.joint)])
+    count = len(one.predicted.times)
+    share = np.zeros(count)
+    holder.reference[k] += size
+    for tick in range(count):
+        session.tick()
+        share[tick] = (float(holder.measured[k]) - rest) / size
+    holder.reference[k] = before
+    for _ in range(max(count, round(RETURN / session.period))):
+        session.tick()
+    return StepAnswer(abs(size), one.predicted.times, share)
+
+
+def _with_gains(spec: ControllersSpec, tuned: Sequence[Tuned]) -> ControllersSpec:
+    changed = dict(spec.controllers)
+    for one in tuned:
+        own = changed[one.controller]
+        assert isinstance(own, JointTrajectorySpec | GripperSpec)
+        old = own.gains.get(one.joint, GainsSpec())
+        update: dict[str, float | None] = {"p": one.p, "d": one.d}
+        if one.i or old.i:
+            update |= {"i": one.i, "i_clamp": one.i_clamp}
+        if one.interface == "velocity":
+            update["ff_velocity_scale"] = 1.0
+        gains = {**own.gains, one.joint: old.model_copy(update=update)}
+        changed[one.controller] = own.model_copy(update={"gains": gains})
+    return spec.model_copy(update={"controllers": changed})
