@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import inside, processes
+from benchmarks import inside, processes, recording
 from benchmarks.table import markdown
 
 
@@ -17,6 +17,7 @@ def main() -> None:
     options = parser.parse_args()
     rounds = 1 if options.quick else options.rounds
     rows = [*inside.simulate_rows(rounds), inside.plan_row(rounds), *inside.optimality_rows()]
+    rows += recording.recording_rows(rounds)
     if not options.quick:
         rows += processes.command_rows(rounds)
         rows.append(processes.help_row(rounds))
