@@ -13,7 +13,7 @@ from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
-from manipcli.core.errors import SimulationFailed
+from manipcli.core.errors import Finding, SimulationFailed
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.judge.verdict import StepOutcome
@@ -39,6 +39,8 @@ AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
+MOST_CUT: Final = 3
+"""Joints that are named as cut at their limits."""
 FEEDBACK_PERIOD: Final = 0.05
 """[s] between two records of how far a goal is, as ROS's action servers tell it."""
 PROGRESS_TICKS: Final = 50
@@ -47,6 +49,10 @@ PROGRESS_TICKS: Final = 50
 
 class Progress(Protocol):
     """Whoever shows how far a run is."""
+
+    def warned(self, findings: Sequence[Finding]) -> None:
+        """What may go wrong, known before the first step."""
+        ...
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
         """Step `index` (from 0) of `total` begins."""
@@ -144,9 +150,22 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
             _settle(task, session)
             watch = Watch(recorder, progress, simulation.control_period)
             session.restart_clock(watch)
-            _Run(task, plan, session, recorder, progress, watch).steps()
+            try:
+                _Run(task, plan, session, recorder, progress, watch).steps()
+            finally:
+                for kind, ticks in _saturated_ticks(session).items():
+                    counts = {name: str(count) for name, count in ticks.items() if count}
+                    if counts:
+                        recorder.metadata(kind, counts)
     finally:
         engine.close()
+
+
+def _saturated_ticks(session: Session) -> dict[str, dict[str, int]]:
+    """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
+    joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
+    actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
+    return {"saturated joints": joints, "saturated actuators": actuators}
 
 
 def _settle(task: Task, session: Session) -> None:
@@ -168,6 +187,18 @@ def _settle(task: Task, session: Session) -> None:
             )
         if not speed < SETTLED_SPEED:
             raise SimulationFailed(f"'{body.name}' does not come to rest ({speed:.3g} m/s before the start)", time=0.0)
+
+
+def _cut_since(before: dict[str, dict[str, int]], session: Session, tick: int) -> str:
+    """What had nothing left to give since `tick`, the worst first; nothing where everything had."""
+    counts = {
+        f"{kind.removeprefix('saturated ').removesuffix('s')} '{name}'": count - before[kind][name]
+        for kind, ticks in _saturated_ticks(session).items()
+        for name, count in ticks.items()
+    }
+    worst = sorted((name for name, count in counts.items() if count), key=lambda name: -counts[name])[:MOST_CUT]
+    cut = ", ".join(f"{name} in {counts[name]}" for name in worst)
+    return f"; cut at its limits: {cut} of {session.ticks - tick} ticks" if cut else ""
 
 
 class _Run:
@@ -201,13 +232,17 @@ class _Run:
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep) -> StepOutcome:
         place = self._task.log_place("steps", index)
-        started = self._session.time
+        started, ticks = self._session.time, self._session.ticks
+        saturated = _saturated_ticks(self._session)
         self._event("step_started", planned, "", "", place)
         try:
             end = self._motions(step, planned, started, place)
         except SimulationFailed as failure:
-            self._event("step_ended", planned, "failed", str(failure), place)
+            text = str(failure) + _cut_since(saturated, self._session, ticks)
+            self._event("step_ended", planned, "failed", text, place)
             raise
+        if end.outcome != "done":
+            end = MotionEnd(end.outcome, end.text + _cut_since(saturated, self._session, ticks))
         self._event("step_ended", planned, end.outcome, end.text, place)
         return StepOutcome(
             id=planned.id,
