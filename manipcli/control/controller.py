@@ -7,13 +7,14 @@ adds, for all controllers at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 
 from manipcli.control.pid import Compat
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
@@ -35,6 +36,18 @@ class JointState:
     position: Array
     velocity: Array
     effort: Array
+
+
+def refuse_not_finite(name: str, joints: Sequence[str], measured: JointState, time: float) -> None:
+    """
+    Raises:
+        InvalidArgument: a measured position or velocity is no finite number; names the joint and the time [s].
+    """
+    for what, values in (("position", measured.position), ("velocity", measured.velocity)):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            message = f"the measured {what} of joint '{joints[bad[0]]}' is {values[bad[0]]} at t = {time:.3f} s"
+            raise InvalidArgument("CTRL106", f"controller '{name}': {message}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

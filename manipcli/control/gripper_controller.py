@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
 from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
@@ -221,7 +221,7 @@ class GripperController:
         np.subtract(self._reference, measured.position, self._error)
         np.subtract(self._velocity, measured.velocity, self._error_rate)
         if not self._all_errors.dot(self._all_errors) < np.inf:
-            self._refuse(measured)
+            refuse_not_finite(self.name, self.joints, measured, time)
         command = self._command
         self._pid.apply(self._errors, period, command)
         np.maximum(command, self._minus_effort, out=command)
@@ -235,14 +235,6 @@ class GripperController:
         self._reference[:] = measured.position
         self._velocity[:] = 0.0
         self._set_effort(self._effort if self._goal is not None else self._default_effort)
-
-    def _refuse(self, measured: JointState) -> None:
-        """Raises where what was measured is no number."""
-        for what, values in (("position", measured.position), ("velocity", measured.velocity)):
-            bad = np.flatnonzero(~np.isfinite(values))
-            if len(bad):
-                message = f"the measured {what} of joint '{self.joints[bad[0]]}' is {values[bad[0]]}"
-                raise InvalidArgument("CTRL106", f"controller '{self.name}': {message} at t = {self._time:.3f} s")
 
     def _ramp(self, period: float) -> None:
         """Moves the references of the fingers that have not stopped towards their targets."""

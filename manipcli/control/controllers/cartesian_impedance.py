@@ -53,6 +53,8 @@ SINGULAR: Final = 1e-3
 """s: directions of the tool that the joints move by less than this [m or rad per rad] are left to the posture."""
 LIGHTEST: Final = 1e-9
 """[1/kg] or [1/(kg m2)]: mobilities below this count as this."""
+WEIGHED: Final = 10
+"""Updates between two looks at the masses, which only scale the damping and change slowly."""
 
 
 class CartesianImpedanceController:
@@ -127,6 +129,9 @@ class CartesianImpedanceController:
         self._singular = SINGULAR**2 * np.eye(6)
         self._output = ControllerOutput.of(len(self.joints), 1)
         self._error = np.zeros(6)
+        self._task_damping = np.zeros(6) if self._damping is None else self._damping
+        self._posture_damping = np.zeros(len(self.joints))
+        self._updates = 0
         self._pose: Transform | None = None
         self._held: Array | None = None
         self._time = 0.0
@@ -177,6 +182,7 @@ class CartesianImpedanceController:
         """Ends its goal as aborted and forgets its state; the next update activates it again."""
         self._follower.deactivate(time, reason)
         self._pose = self._held = None
+        self._updates = 0
 
     def update(
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
@@ -193,7 +199,6 @@ class CartesianImpedanceController:
         q[self._columns] = measured.position
         R_WT, p_WT, jacobian = kinematics.pose_and_jacobian(q, self._link, self._offset)
         J = jacobian[:, self._columns]
-        mass = kinematics.mass_matrix(q)[self._block]
         error, slip = self._error, output.velocity - measured.velocity
         error[:3] = p_WR - p_WT
         error[3:] = rotation_vector(R_WR @ R_WT.T)
@@ -201,9 +206,11 @@ class CartesianImpedanceController:
         if self._turns:
             along = (error.reshape(2, 3) @ R_WR).reshape(6)
             J = (R_WR.T @ J.reshape(2, 3, -1)).reshape(6, -1)
-        wrench = self._stiffness * along + self._damped(J, mass) * (J @ slip)
-        free = self._posture * (output.position - measured.position)
-        free += self._posture_scale * np.sqrt(mass.diagonal()) * slip
+        if self._updates % WEIGHED == 0:
+            self._weigh(J, kinematics.mass_matrix(q)[self._block])
+        self._updates += 1
+        wrench = self._stiffness * along + self._task_damping * (J @ slip)
+        free = self._posture * (output.position - measured.position) + self._posture_damping * slip
         wrench -= np.linalg.solve(J @ J.T + self._singular, J @ free)
         np.add(free, wrench @ J, out=output.command)
         return output
@@ -220,12 +227,12 @@ class CartesianImpedanceController:
         output.velocity[:] = 0.0
         output.acceleration[:] = 0.0
 
-    def _damped(self, J: Array, mass: Array) -> Array:
-        """(6) the damping along the axes of `J`."""
-        if self._damping is not None:
-            return self._damping
-        mobility = np.einsum("ij,ji->i", J, np.linalg.solve(mass, J.T))
-        return np.asarray(self._scale / np.sqrt(np.maximum(mobility, LIGHTEST)))
+    def _weigh(self, J: Array, mass: Array) -> None:
+        """The damping along the axes of `J`, and of the joints."""
+        self._posture_damping = self._posture_scale * np.sqrt(mass.diagonal())
+        if self._damping is None:
+            mobility = np.einsum("ij,ji->i", J, np.linalg.solve(mass, J.T))
+            self._task_damping = self._scale / np.sqrt(np.maximum(mobility, LIGHTEST))
 
 
 def build(name: str, spec: CartesianImpedanceSpec, fit: Fit) -> CartesianImpedanceController:

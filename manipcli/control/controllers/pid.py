@@ -23,7 +23,14 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import (
+    ControllerMember,
+    ControllerOutput,
+    FeedForward,
+    Fit,
+    JointState,
+    refuse_not_finite,
+)
 from manipcli.control.controllers.forward_command import finite_values
 from manipcli.control.gains import build_pid, strangers
 from manipcli.control.pid import Compat
@@ -94,12 +101,19 @@ class PidController:
             [led[0] == "position" and (e if g.angle_wraparound is None else g.angle_wraparound)
              for g, e in zip(own, endless, strict=True)], dtype=np.float64,
         )  # fmt: skip
+        self._has_wraps = bool(self._wraps.any())
         self._led_velocity = led[0] == "velocity"
         self._given_rates = len(led) == 2
         self._hold_first = hold_first
 
         self._output = ControllerOutput.of(n, 1)
-        self._error, self._error_rate, self._fed = np.zeros((3, n))
+        self._errors = np.zeros((2, n))
+        self._error, self._error_rate = self._errors
+        self._all_errors = self._errors.reshape(-1)
+        self._fed, self._before = np.zeros((2, n))
+        # ROS 1 knows no derivative before there is a second error.
+        self._first_rate = compat != "ros1"
+        self._has_before = False
         self._reference, self._rate = np.zeros((2, n))
         self._told = self._activated = False
 
@@ -139,6 +153,8 @@ class PidController:
         if not self._activated:
             self._activated = True
             self._pid.reset(keep_integral=bool(self._saves.all()))
+            self._before[:] = 0.0
+            self._has_before = self._first_rate
             if not self._told and self._hold_first:
                 self._told = True
                 self._reference, self._rate = np.array(state), np.zeros(len(self.joints))
@@ -147,12 +163,20 @@ class PidController:
             output.position[:] = measured.position
             return output
         error = np.subtract(self._reference, state, out=self._error)
-        if self._wraps.any():
+        if self._has_wraps:
             turns = np.maximum(np.ceil(np.abs(error) / math.tau - 0.5), 0.0)
             error -= self._wraps * math.tau * np.copysign(turns, error)
-        rate = np.subtract(self._rate, measured.velocity, out=self._error_rate) if self._given_rates else None
+        rate = self._error_rate
+        if self._given_rates:
+            np.subtract(self._rate, measured.velocity, rate)
+        else:
+            rate[:] = (error - self._before) / period if self._has_before else 0.0
+        if not self._all_errors.dot(self._all_errors) < np.inf:
+            refuse_not_finite(self.name, self.joints, measured, time)
+        self._before[:] = error
+        self._has_before = True
         command = output.command
-        command[:] = self._pid.update(error, period, rate)
+        self._pid.apply(self._errors, period, command)
         np.multiply(self._forward, self._rate if self._given_rates else self._reference, out=self._fed)
         command += self._fed
         if self._led_velocity:

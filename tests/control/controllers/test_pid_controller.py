@@ -120,3 +120,12 @@ def test_what_would_not_work_is_refused(gains, more, named):
 def test_rates_are_for_two_interfaces():
     with pytest.raises(InvalidArgument, match="second interface"):
         make([PidGainsSpec(p=1)]).set_reference([1.0], [0.0])
+
+
+def test_a_measurement_that_is_no_number_is_refused_by_name_and_costs_no_integral():
+    controller = make([PidGainsSpec(i=50)])
+    controller.set_reference([1.0])
+    command(controller, at(0.0))
+    with pytest.raises(InvalidArgument, match="position of joint 'a' is nan"):
+        command(controller, at(np.nan), 1)
+    assert command(controller, at(1.0), 2) == pytest.approx(0.5)
