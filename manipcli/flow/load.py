@@ -42,7 +42,8 @@ T = TypeVar("T")
 class Task:
     """A task that can be planned: the three files as written, and the robot and scene that they mean.
 
-    `findings` are warnings and notes; errors do not get here.
+    `findings` are warnings and notes; errors do not get here. `places`: where the steps were written, of a task that was
+    read from a log.
     """
 
     file: Located[TaskSpec]
@@ -51,6 +52,7 @@ class Task:
     robot: RobotModel
     scene: Scene
     findings: tuple[Finding, ...]
+    places: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -69,6 +71,9 @@ class Task:
 
     def log_place(self, *path: str | int) -> str:
         """`pour.yaml:21:5`: no folder of this machine gets into a log."""
+        match path:
+            case ("steps", int(index)) if self.places:
+                return self.places[index]
         place = self.file.place(*path)
         return f"{Path(place.file).name}:{place.line}:{place.column}"
 
@@ -125,13 +130,9 @@ def load_task(
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
     told: tuple[Finding, ...] = ()
     if built:
-        claimed = _misclaimed(controllers_file, built[0], read.spec) if controllers_file else ()
-        misclaimed = [finding for finding in claimed if finding.severity == "error"]
-        told = tuple(finding for finding in claimed if finding.severity != "error")
-        claims = None if misclaimed or not controllers_file else Claims.of(controllers_file.spec)
-        gathered.findings += _unusable(read, built[0], scene or named_scene(read.spec), claims)
-        gathered.findings += _refused(read, built[0])
-        gathered.findings += misclaimed
+        found = unusable(read, controllers_file, built[0], scene or named_scene(read.spec))
+        gathered.findings += [finding for finding in found if finding.severity == "error"]
+        told = tuple(finding for finding in found if finding.severity != "error")
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
         raise gathered.refusal()
     robot, notes = built
@@ -143,6 +144,17 @@ def load_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes, *told),
     )
+
+
+def unusable(
+    task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
+) -> tuple[Finding, ...]:
+    """What each of these is sound without and what they do not have together: names that are not there, what the
+    engine refuses, what no controller commands. Warnings and notes are among it."""
+    claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
+    misclaimed = any(finding.severity == "error" for finding in claimed)
+    claims = None if misclaimed or not controllers else Claims.of(controllers.spec)
+    return (*_unusable(task, robot, scene, claims), *_refused(task, robot), *claimed)
 
 
 class Gathered:

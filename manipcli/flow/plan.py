@@ -24,11 +24,12 @@ from manipcli.spec.task import StepSpec
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """A step as written, and what was planned for it."""
+    """A step as written (`place`: file:line:column), and what was planned for it."""
 
     id: str
     verb: str
     plan: StepPlan
+    place: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +61,12 @@ class Plan:
         )
 
     def to_json(self) -> bytes:
-        """What the log carries: ids, verbs, durations, and each trajectory's ends."""
+        """What the log carries: ids, verbs, where the steps were written, durations, and each trajectory's ends."""
         steps = [
             {
                 "id": step.id,
                 "verb": step.verb,
+                "place": step.place,
                 "planned_duration": step.plan.duration,
                 "motions": [_described(motion) for motion in step.plan.motions],
             }
@@ -138,9 +140,9 @@ def start_position(task: Task) -> Array:
 
 
 def _steps(task: Task, planner: Planner, situation: Situation) -> Iterator[PlannedStep]:
-    for step in task.spec.steps:
+    for k, step in enumerate(task.spec.steps):
         planned = plan_step(planner, step, situation)
-        yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned)
+        yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned, place=task.log_place("steps", k))
         situation = planned.end
 
 
