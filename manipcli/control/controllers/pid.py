@@ -214,7 +214,7 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
             loc = ("gains",) if own is None else ("gains", joint)
             yield Problem(loc, f"joint '{joint}' {what}; it would not move", f"give gains.{joint}.p", "CTRL103")
         elif own.ff_velocity_scale:
-            message, hint = "a `pid` controller feeds its reference forward", "say feedforward_gain"
+            message, hint = "ff_velocity_scale counts for nothing in a `pid` controller", "say feedforward_gain"
             yield Problem(("gains", joint, "ff_velocity_scale"), message, hint, "CTRL182")
     if len({gains.save_i_term for gains in spec.gains.values()}) > 1:
         yield Problem(("gains",), "save_i_term differs between its joints", "use a controller for each", "CTRL182")

@@ -1,0 +1,61 @@
+"""What cannot work with a robot is told before anything is built, at its place, with what would."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from manipcli.control.factory import build_controllers, controller_findings
+from manipcli.core.errors import InvalidInput
+from manipcli.model.build_robot import build_robot
+from manipcli.spec.load import load_controllers_text, load_robot
+
+ROBOTS = Path(__file__).parents[3] / "robots"
+CASES = [
+    ("arm7_hand3", "type: forward_command, joints: [joint_1], command_interface: velocity, gravity_compensation: true",
+     "CTRL147", "gravity_compensation adds an effort, but its interface is velocity"),
+    ("arm7_hand3", "type: pid, joints: [joint_1], gains: {joint_1: {p: 1}, joint_2: {p: 1}}",
+     "CTRL102", "'joint_2' has gains, but is not one of its joints"),
+    ("arm7_hand3", "type: pid, joints: [joint_1], gains: {joint_1: {}}", "CTRL103", "has gains that are all zero"),
+    ("arm7_hand3", "type: pid, joints: [joint_1, joint_2], gains: {joint_1: {p: 1}}",
+     "CTRL103", "'joint_2' has no gains"),
+    ("arm7_hand3", "type: pid, joints: [joint_1], gains: {joint_1: {p: 1, ff_velocity_scale: 1}}",
+     "CTRL182", "counts for nothing in a `pid`"),
+    ("arm7_hand3", "type: pid, joints: [joint_1], gains: {joint_1: {p: 1}}, "
+     "reference_and_state_interfaces: [velocity, position]", "CTRL182", "cannot be led together"),
+    ("arm7_hand3", "type: pid, joints: [joint_1, joint_2], gains: "
+     "{joint_1: {p: 1}, joint_2: {p: 1, save_i_term: false}}", "CTRL182", "save_i_term differs"),
+    ("arm7_hand3", "type: pid, joints: [joint_1], command_interface: velocity, gravity_compensation: true, "
+     "gains: {joint_1: {p: 1}}", "CTRL147", "gravity_compensation adds an effort, but its interface is velocity"),
+    ("arm7_hand3", "type: computed_torque, joints: [joint_1], gains: {joint_1: {}}", "CTRL103", "are all zero"),
+    ("arm7_hand3", "type: computed_torque, joints: [joint_1], constraints: {joints: {joint_2: {goal: 0.1}}}",
+     "CTRL104", "'joint_2' has tolerances, but is not one of its joints"),
+    ("arm7_hand3", "type: force_torque_broadcaster, link: plam", "CTRL184", "'plam' is not in robot"),
+    ("panda", "type: force_torque_broadcaster, link: panda_link0", "CTRL184", "nothing carries it"),
+    ("arm7_hand3", "type: force_torque_broadcaster, link: palm, joints: [joint_1]", "CTRL184", "it reads no joints"),
+    ("panda", "type: force_torque_broadcaster, link: panda_rightfinger", "CTRL184", "mimics another"),
+    ("arm7_hand3", "type: joint_state_broadcaster, joints: [joint_9]", "CTRL144", "'joint_9' is not in robot"),
+    ("arm7_hand3", "type: gripper, joints: [finger_1_distal], command_interface: position, max_effort: 1",
+     "CTRL147", "positions know no maximum effort"),
+    ("arm7_hand3", "type: cartesian_impedance, joints: [joint_1], stiffness: {translation: 1, rotation: 1}",
+     "CTRL186", "joint_2, joint_3, joint_4, joint_5, joint_6, joint_7 move link 'tool', too"),
+]  # fmt: skip
+
+
+@cache
+def robot(name):
+    path = ROBOTS / name / "robot.yaml"
+    file = load_robot(path)
+    return build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))[0]
+
+
+@pytest.mark.parametrize(("name", "text", "code", "told"), CASES, ids=[case[3] for case in CASES])
+def test_what_cannot_work_is_told_at_its_place_and_not_built(name, text, code, told):
+    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml")
+    findings = controller_findings(file.spec, robot(name), 1e-3, place=lambda loc: file.place(*loc))
+    errors = [finding for finding in findings if finding.severity == "error"]
+    assert [(f.code, told in f.message, f.place.line, bool(f.hint) or code == "CTRL184") for f in errors] == [
+        (code, True, 2, True)
+    ]
+    with pytest.raises(InvalidInput):
+        build_controllers(file.spec, robot(name), 1e-3)
