@@ -99,10 +99,9 @@ def transition(loop: Loop) -> Array:
         law[k, z] = -loop.i[k]
         A[z, z], A[z, k] = 1.0, loop.period
     applied = law.copy()
-    for k in range(n):
-        if delay[k]:
-            applied[k] = 0.0
-            applied[k, first + (delay[k] - 1) * n + k] = 1.0
+    for late in np.flatnonzero(delay):
+        applied[late] = 0.0
+        applied[late, first + (delay[late] - 1) * n + late] = 1.0
     A[: 2 * n] = G @ applied
     A[: 2 * n, : 2 * n] += F
     if most:
