@@ -288,30 +288,34 @@ def _declaration(record: Record) -> Declared:
         CdrError: it cannot be read.
     """
     from mcap import records
-    from mcap.data_stream import ReadDataStream
+    from mcap.data_stream import ReadDataStream, RecordBuilder
     from mcap.exceptions import McapError
 
-    stream = ReadDataStream(BytesIO(record.body))
+    kinds: dict[int, type[Header | Schema | Channel | Attachment | Metadata]] = {
+        HEADER: records.Header,
+        SCHEMA: records.Schema,
+        CHANNEL: records.Channel,
+        ATTACHMENT: records.Attachment,
+        METADATA: records.Metadata,
+    }
+    builder = RecordBuilder()
     try:
         # The library's readers carry no types.
-        if record.opcode == HEADER:
-            header: Header = records.Header.read(stream)
-            return header
-        if record.opcode == SCHEMA:
-            schema: Schema = records.Schema.read(stream)
-            return schema
-        if record.opcode == CHANNEL:
-            channel: Channel = records.Channel.read(stream)
-            return channel
-        if record.opcode == METADATA:
-            metadata: Metadata = records.Metadata.read(stream)
-            return metadata
-        attachment: Attachment = records.Attachment.read(stream)
-    except (McapError, struct.error, UnicodeDecodeError) as error:
+        read: Declared = kinds[record.opcode].read(ReadDataStream(BytesIO(record.body)))
+        read.write(builder)
+        # The library's builder carries none either.
+        again: bytes = builder.end()  # type: ignore[no-untyped-call]
+    except (McapError, struct.error, UnicodeError) as error:
         raise CdrError(f"a {_WORDS[record.opcode]}") from error
-    if int.from_bytes(record.body[-4:], "little") not in (0, zlib.crc32(record.body[:-4])):
-        raise CdrError(f"attachment '{attachment.name}'")
-    return attachment
+    name = f"attachment '{read.name}'" if isinstance(read, records.Attachment) else f"a {_WORDS[record.opcode]}"
+    if isinstance(read, records.Attachment):
+        if int.from_bytes(record.body[-4:], "little") not in (0, zlib.crc32(record.body[:-4])):
+            raise CdrError(name)
+        again = again[:-4]
+    # The library takes what is there where less is there than a length says. Later versions of the format may append.
+    if not record.body.startswith(again[_HEAD.size :]):
+        raise CdrError(name)
+    return read
 
 
 def _index(file: BinaryIO, size: int) -> Index:

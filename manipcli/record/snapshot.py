@@ -9,7 +9,6 @@ from pathlib import Path
 from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.columns import singly
 from manipcli.record.inventory import Inventory
 from manipcli.record.salvage import OpenChunk, Salvage
 
@@ -76,11 +75,11 @@ def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
                 topic = names.get(channel, "")
                 if topic not in _TYPES:
                     continue
-                for ns, reader in singly(piece.data, places):
+                for ns, start, length in zip(places.times, places.starts, places.lengths, strict=True):
                     if ns > limit:
                         continue
                     try:
-                        _take(taken, topic, ns, reader)
+                        _take(taken, topic, int(ns), CdrReader(piece.data[start : start + length]))
                     except CdrError as error:
                         taken.unread[f"a message of {topic} {error}"] = None
     return taken

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import struct
 import tracemalloc
@@ -20,6 +21,7 @@ from manipcli.record.faults import BadRecording, RecordingFailed, RecordingRefus
 from manipcli.record.inventory import inventory
 from manipcli.record.reading import open_recording, read_recording
 from manipcli.record.repair import default_output, repair
+from manipcli.record.snapshot import snapshot
 
 MakeRun = Callable[[int], Any]
 MAGIC = b"\x89MCAP0\r\n"
@@ -314,3 +316,36 @@ def test_a_full_disk_leaves_no_half_file(small: Path, tmp_path: Path, monkeypatc
             else:
                 break
     assert fail_at > 10
+
+
+@pytest.mark.slow
+def test_whatever_was_done_to_a_log_it_is_refused_or_repaired(small: Path, tmp_path: Path) -> None:
+    """Bytes changed, left out, doubled, lengths spoilt: no other error, and what comes out is clean."""
+    data = small.read_bytes()
+    rng = np.random.default_rng(11)
+    done = 0
+    for _ in range(250):
+        spoilt = bytearray(data)
+        for _ in range(int(rng.choice([1, 2, 5, 20]))):
+            at, size = int(rng.integers(len(spoilt))), int(rng.choice([1, 9, 100, 3000]))
+            match int(rng.integers(5)):
+                case 0:
+                    spoilt[at] = int(rng.integers(256))
+                case 1:
+                    spoilt[at : at + 8] = struct.pack("<Q", int(rng.choice([0, 1, 2**31, 2**62])))
+                case 2:
+                    del spoilt[at : at + size]
+                case 3:
+                    spoilt[at:at] = data[at : at + size]
+                case 4:
+                    spoilt[at:at] = rng.bytes(size)
+        (tmp_path / "bad.mcap").write_bytes(spoilt)
+        try:
+            inventory(tmp_path / "bad.mcap")
+            repaired(bytes(spoilt), tmp_path)
+            done += 1
+        except BadRecording:
+            pass
+        with contextlib.suppress(BadRecording):
+            snapshot(tmp_path / "bad.mcap", inventory(tmp_path / "bad.mcap"), 1.0)
+    assert done > 80
