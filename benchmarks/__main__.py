@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import inside, processes, recording
+from benchmarks import control, inside, processes, recording
 from benchmarks.table import markdown
 
 
@@ -16,7 +16,12 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="memory over ten simulated minutes, too (minutes)")
     options = parser.parse_args()
     rounds = 1 if options.quick else options.rounds
-    rows = [*inside.simulate_rows(rounds), inside.plan_row(rounds), *inside.optimality_rows()]
+    rows = [
+        *inside.simulate_rows(rounds),
+        *control.control_rows(rounds),
+        inside.plan_row(rounds),
+        *inside.optimality_rows(),
+    ]
     rows += recording.recording_rows(rounds)
     if not options.quick:
         rows += processes.command_rows(rounds)
