@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
@@ -19,8 +20,13 @@ from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries, load_task
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
+from manipcli.flow.recorded_task import recorded_task
+from manipcli.flow.verify import compared, refused_as_unlike
+from manipcli.judge.verdict import INTERRUPTED, Verdict
+from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
 from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.verification import Verification
 
 __all__ = [
     "Finding",
@@ -34,6 +40,7 @@ __all__ = [
     "plan_task",
     "run_task",
     "schema",
+    "verify_log",
     "words",
 ]
 
@@ -84,18 +91,11 @@ def run_task(
     if progress is not None and doubts:
         progress.warned(doubts)
 
-    manager = controllers(task, plan.planner.kinematics)
     where = log if log is not None else default_log(task)
-    recorder = open_log(task, plan, manager, where, overwrite=force or log is None, embed_meshes=embed_meshes)
-    try:
-        status, cause = _carried_out(task, plan, manager, recorder, progress)
-        recorder.metadata("run", {"status": status, "cause": cause})
-        simulated = time.perf_counter()
-        verdict = judge_log(recorder.partial_path, being_written=True)
-        recorder.finish(verdict_metadata(verdict))
-        judged = time.perf_counter()
-    finally:
-        recorder.close_partial()
+    verdict, simulated = _recorded(
+        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
+    )
+    judged = time.perf_counter()
     return RunReport(
         verdict=verdict,
         wall_time=judged - began,
@@ -105,6 +105,59 @@ def run_task(
             load=loaded - began, plan=planned - loaded, simulate=simulated - planned, judge=judged - simulated
         ),
     )
+
+
+def verify_log(
+    log: Path,
+    *,
+    allow_different: bool = False,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+    progress: Progress | None = None,
+) -> Verification:
+    """Plan, simulate and record again what a log holds, and compare the two logs.
+
+    Args:
+        log: the log of a run, or what a killed run left.
+        allow_different: also with another version of manipcli or of the engine, or other meshes.
+        package_path, allow_outside: where meshes are looked for that it does not carry.
+        progress: told of steps and ticks.
+
+    Raises:
+        InvalidInput: the log lacks something, or versions or meshes are others.
+        NotPlannable: a step cannot be planned any more.
+    """
+    began = time.perf_counter()
+    recording = open_recording(log)
+    recorded = recorded_task(recording, log, package_path=package_path, allow_outside=allow_outside)
+    if recorded.unlike and not allow_different:
+        raise refused_as_unlike(recorded.unlike)
+    plan = plan_task(recorded.task)
+    with TemporaryDirectory(prefix="manipcli-") as folder:
+        again = Path(folder) / "again.mcap"
+        verdict, _ = _recorded(
+            recorded.task, plan, again, overwrite=False, embed_meshes=recorded.embedded, progress=progress
+        )
+        if any(finding.code == INTERRUPTED for finding in verdict.errors):
+            raise KeyboardInterrupt
+        return compared(recording, log, again, unlike=recorded.unlike, began=began)
+
+
+def _recorded(
+    task: Task, plan: Plan, where: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress | None
+) -> tuple[Verdict, float]:
+    """Simulate into a log that is judged before it gets its name; the verdict, and when the simulation was over."""
+    manager = controllers(task, plan.planner.kinematics)
+    recorder = open_log(task, plan, manager, where, overwrite=overwrite, embed_meshes=embed_meshes)
+    try:
+        status, cause = _carried_out(task, plan, manager, recorder, progress)
+        recorder.metadata("run", {"status": status, "cause": cause})
+        simulated = time.perf_counter()
+        verdict = judge_log(recorder.partial_path, being_written=True)
+        recorder.finish(verdict_metadata(verdict))
+    finally:
+        recorder.close_partial()
+    return verdict, simulated
 
 
 def _carried_out(

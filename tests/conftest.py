@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
+from mcap.records import Message
+from mcap.writer import Writer
 
 ROOT = Path(__file__).parents[1]
 
@@ -58,3 +61,51 @@ def pour_run(run_cli: RunCli, tmp_path_factory: pytest.TempPathFactory) -> PourR
     folder = tmp_path_factory.mktemp("pour")
     ran = run_cli("run", ROOT / "tasks" / "pour.yaml", "--format", "json", cwd=folder)
     return PourRun(ran, folder / "runs" / "pour.mcap")
+
+
+Rewrite = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def rewrite_log() -> Rewrite:
+    """Writes a log once more with the mcap library, all its checksums valid.
+
+    `message(topic, message)` gives the bytes that take the place of a message's, or None to leave it out;
+    `attachment(name, data)` and `metadata(name, values)` what takes the place of those.
+    """
+
+    def rewrite(
+        source: Path,
+        target: Path,
+        *,
+        message: Callable[[str, Message], bytes | None] = lambda _, one: one.data,
+        attachment: Callable[[str, bytes], bytes | None] = lambda _, data: data,
+        metadata: Callable[[str, dict[str, str]], dict[str, str]] = lambda _, values: values,
+        chunk_size: int = 1 << 20,
+    ) -> Path:
+        with source.open("rb") as file, target.open("wb") as out:
+            reader, writer = make_reader(file), Writer(out, chunk_size=chunk_size)
+            header, summary = reader.get_header(), reader.get_summary()
+            assert summary is not None
+            writer.start(profile=header.profile, library=header.library)
+            schemas = {
+                k: writer.register_schema(one.name, one.encoding, one.data) for k, one in summary.schemas.items()
+            }
+            channels = {
+                k: writer.register_channel(one.topic, one.message_encoding, schemas[one.schema_id], one.metadata)
+                for k, one in summary.channels.items()
+            }
+            for held in reader.iter_attachments():
+                data = attachment(held.name, held.data)
+                if data is not None:
+                    writer.add_attachment(held.create_time, held.log_time, held.name, held.media_type, data)
+            for record in reader.iter_metadata():
+                writer.add_metadata(record.name, metadata(record.name, record.metadata))
+            for _, channel, one in reader.iter_messages(log_time_order=False):
+                data = message(channel.topic, one)
+                if data is not None:
+                    writer.add_message(channels[channel.id], one.log_time, data, one.publish_time, one.sequence)
+            writer.finish()
+        return target
+
+    return rewrite

@@ -9,8 +9,8 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.cli.options import AllowOutside, PackagePath
-from manipcli.core.errors import ExitCode
+from manipcli.cli.options import AllowOutside, Format, PackagePath
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 
 def replay(
@@ -51,14 +51,40 @@ def replay(
         int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
     ] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+    verify: Annotated[
+        bool,
+        typer.Option("--verify", help="Show nothing: simulate the run again from the log, and compare every message."),
+    ] = False,
+    allow_different: Annotated[
+        bool, typer.Option("--allow-different", help="With --verify: also with other versions or meshes.")
+    ] = False,
+    format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
     """Show a recorded run: robot and scene over time, steps by name, curves.
 
-    Needs nothing but the log and the packages of its meshes. Ctrl-C ends it.
+    Needs nothing but the log and the packages of its meshes. Ctrl-C ends it. With --verify: 0 identical, 1 not.
     """
-    with Interrupts():
+    if not verify and (allow_different or format_ == "json"):
+        word = "--allow-different" if allow_different else "--format json"
+        raise InvalidInput([Finding("USE080", f"{word} is for --verify alone")])
+    with Interrupts() as interrupts:
+        if verify:
+            from manipcli.cli.verify import verify as verified
+
+            shown = [one for one, given in (("--html", html), ("--picture", picture), ("--sheet", sheet)) if given]
+            shown += ["--video"] if video else []
+            if shown:
+                raise InvalidInput([Finding("USE080", f"--verify shows nothing: leave out {', '.join(shown)}")])
+            return verified(
+                log,
+                allow_different=allow_different,
+                package_path=tuple(package_path or ()),
+                allow_outside=allow_outside,
+                format_=format_,
+                interrupts=interrupts,
+            )
         from manipcli.cli.pictures import Pictures
         from manipcli.flow.replay import open_playback
 

@@ -16,11 +16,12 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.switches import foreseen
 from manipcli.flow.vocabulary import task_spec
-from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.judge.expectation import expectation_problems
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.formula import problems
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
@@ -42,8 +43,8 @@ T = TypeVar("T")
 class Task:
     """A task that can be planned: the three files as written, and the robot and scene that they mean.
 
-    `findings` are warnings and notes; errors do not get here. `places`: where the steps were written, of a task that was
-    read from a log.
+    `findings` are warnings and notes; errors do not get here. `places`: where the steps were written, of a task
+    that was read from a log.
     """
 
     file: Located[TaskSpec]
@@ -130,7 +131,8 @@ def load_task(
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
     told: tuple[Finding, ...] = ()
     if built:
-        found = unusable(read, controllers_file, built[0], scene or named_scene(read.spec))
+        commanding = controllers_file if controllers_file else None
+        found = unusable(read, commanding, built[0], scene or named_scene(read.spec))
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
@@ -228,6 +230,9 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     uncommanded: list[tuple[Loc, Problem]] = []
     refused: list[tuple[Loc, Problem]] = []
     spec = task.spec
+    # Where faulty steps were left out, it is not known which ids there are.
+    ids = None if task.source.kept else tuple(step.id for step in spec.steps if step.id is not None)
+    setting = Setting(robot, scene, ids)
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, scene)
@@ -237,21 +242,16 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
             uncommanded += [(at, p) for p in without]
             switch = member.request(step.body)
             if switch is not None and not without:
-                problems, claims = foreseen(switch, claims, robot)
-                refused += [(at, p) for p in problems]
+                misfits, claims = foreseen(switch, claims, robot)
+                refused += [(at, p) for p in misfits]
         if step.until is not None:
-            condition = CONDITIONS[step.until.name]
-            found += [
-                (("steps", k, "until", step.until.name), p) for p in condition.check(step.until.body, robot, scene)
-            ]
-    ids = tuple(step.id for step in spec.steps if step.id is not None)
+            found += [(("steps", k, "until"), p) for p in problems(step.until, setting, CONDITIONS)]
     for k, expected in enumerate(spec.expect):
-        problems = EXPECTATIONS[expected.name].check(expected.body, robot, scene, ids)
-        found += [(("expect", k, expected.name), p) for p in problems]
+        found += [(("expect", k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
     findings = [
         task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
-        for number, problems in ((230, found), (232, uncommanded), (233, refused))
-        for loc, p in problems
+        for number, told in ((230, found), (232, uncommanded), (233, refused))
+        for loc, p in told
     ]
     known = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in known:

@@ -149,7 +149,7 @@ def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
 
 def judge_recording(recording: Recording, path: Path) -> Verdict:
     """The verdict on a log that is open already; see `judge_log`."""
-    task = load_task_text(_attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
+    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
     expect = [(expected.name, expected.body) for expected in task.expect]
     scene = recorded_scene(recording, path)
     return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
@@ -157,21 +157,22 @@ def judge_recording(recording: Recording, path: Path) -> Verdict:
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:
     """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
-    spec = load_robot_text(_attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
-    return rebuild_robot(spec, _attached(recording, path, URDF))
+    spec = load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
+    return rebuild_robot(spec, attached(recording, path, URDF))
 
 
 def recorded_scene(recording: Recording, path: Path) -> Scene:
     """The scene of a log at its start; no mesh is looked for."""
     try:
-        return scene_from_json(_attached(recording, path, SCENE))
+        return scene_from_json(attached(recording, path, SCENE))
     except ValueError as error:
         message = f"{path.name}/{SCENE}: this is not the scene of a log"
         raise InvalidInput([Finding("LOG103", message)]) from error
 
 
-def _attached(recording: Recording, path: Path, name: str) -> bytes:
-    """
+def attached(recording: Recording, path: Path, name: str) -> bytes:
+    """An attachment.
+
     Raises:
         InvalidInput: the log has no such attachment.
     """

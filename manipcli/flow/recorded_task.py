@@ -1,0 +1,122 @@
+"""A log to the task that it is the run of, ready to be run again: from its attachments and the files of its meshes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli import __version__
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.flow.load import Task, unusable
+from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, attached, mesh_files, recorded_robot, recorded_scene
+from manipcli.flow.mesh_search import MeshSearch
+from manipcli.flow.vocabulary import task_spec
+from manipcli.model.build_scene import build_scene
+from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.task import TaskSpec
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTask:
+    """The task of a log.
+
+    Attributes:
+        task: as it was.
+        embedded: whether the log carries its meshes.
+        unlike: what is not as it was in the run (versions, meshes), a sentence each.
+        keep: holds the folder of the files that were in the log.
+    """
+
+    task: Task
+    embedded: bool
+    unlike: tuple[Finding, ...]
+    keep: MeshSearch
+
+
+def recorded_task(
+    recording: Recording, path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> RecordedTask:
+    """The task of a log.
+
+    Args:
+        recording: the log.
+        path: where it is.
+        package_path, allow_outside: where meshes are looked for that it does not carry, see `MeshSearch`.
+
+    Raises:
+        InvalidInput: it lacks a file, one of them cannot be used, or a mesh is not found.
+    """
+    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
+    robot_file = load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
+    controllers = load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
+    meshes = MeshSearch(
+        path,
+        hashes=recording.metadata.get("meshes", {}),
+        embedded=recording.embedded_meshes(),
+        package_path=package_path,
+        allow_outside=allow_outside,
+    )
+    robot = meshes.robot(recorded_robot(recording, path))
+    # What the scene was built from may be files that no log carries; otherwise the task itself says it.
+    from_files = any(body.mesh is not None or body.urdf is not None for body in task.spec.scene.values())
+    scene = meshes.scene(recorded_scene(recording, path)) if from_files else build_scene(task.spec)
+    found = unusable(task, controllers, robot, scene)
+    if any(finding.severity == "error" for finding in found):
+        raise InvalidInput(found)
+    made = Task(
+        file=task,
+        robot_file=robot_file,
+        controllers_file=controllers,
+        robot=robot,
+        scene=scene,
+        findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
+        places=_places(recording, path, task.spec),
+    )
+    files = mesh_files(made)
+    _check_there(files, path, meshes)
+    unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))
+    return RecordedTask(made, EMBEDDED in recording.metadata, unlike, meshes)
+
+
+def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]:
+    """Where the steps were written, as the plan in the log says; () where it does not."""
+    try:
+        plan = json.loads(attached(recording, path, PLAN))
+        steps = plan["steps"] if isinstance(plan, dict) else []
+        places = tuple(step["place"] for step in steps)
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return ()
+    whole = len(places) == len(spec.steps) and all(isinstance(place, str) for place in places)
+    return places if whole else ()
+
+
+def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:
+    absent = [uri for uri, file in files.items() if not file.is_file()]
+    if absent:
+        more = f", and {len(absent) - 1} more" if len(absent) > 1 else ""
+        message = f"mesh '{absent[0]}'{more} is not found: nothing can be simulated again without it"
+        hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
+        raise InvalidInput([Finding("LOG400", message, Place(str(path), 0, 0), hint=hint)])
+
+
+def _versions(recording: Recording, path: Path, task: Task) -> Iterator[Finding]:
+    engine = ENGINES[task.spec.simulation.engine]
+    now = {"manipcli": __version__, engine.name: engine.version()}
+    then = recording.metadata.get("versions", {})
+    for name in dict.fromkeys((*then, *now)):
+        if then.get(name) != now.get(name):
+            message = f"the run was made with {name} {then.get(name, '(unknown)')}; this is {now.get(name, 'without')}"
+            yield Finding("LOG401", message, Place(str(path), 0, 0), severity="warning")
+
+
+def _meshes(recording: Recording, path: Path, files: Mapping[str, Path]) -> Iterator[Finding]:
+    then = recording.metadata.get("meshes", {})
+    for uri, file in files.items():
+        if hashlib.sha256(file.read_bytes()).hexdigest() != then.get(uri):
+            message = f"mesh '{uri}' is not the file that it was in the run"
+            yield Finding("LOG402", message, Place(str(path), 0, 0), severity="warning")

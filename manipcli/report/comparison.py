@@ -1,0 +1,127 @@
+"""Two logs beside each other, message by message: what is the same, and the first that is not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from manipcli.core.text import shorten
+from manipcli.record.compare import Comparison, Difference, TopicComparison
+from manipcli.record.compare_entries import EntryDifference
+from manipcli.report.json import Json, number
+from manipcli.report.table import table
+
+Names = tuple[str, str]
+"""What the two logs are called."""
+MOST_ENTRIES = 12
+
+
+def first_text(first: Difference, names: Names) -> str:
+    """`t = 2.999 s, /joint_states.effort[finger]: 0.098 in the log, 0.097 again (by -0.001); message 3000 of ...`."""
+    where = f"t = {first.time:.9g} s, {first.topic}"
+    where += f" {first.field}" if first.field.startswith("(") else f".{first.field}"
+    if first.a is None or first.b is None:
+        there = names[0] if first.b is None else names[1]
+        return f"{where}: there is one {there} alone; message {first.index + 1} of the topic"
+    by = "" if first.by is None else f" (by {first.by:+.6g})"
+    values = f"{_value(first.a)} {names[0]}, {_value(first.b)} {names[1]}{by}" if first.a != first.b else "differ"
+    return f"{where}: {values}; message {first.index + 1} of the topic"
+
+
+def topics_table(topics: Sequence[TopicComparison], names: Names) -> str:
+    """A row for each topic that is not the same; "" where there is none."""
+    rows = [
+        [
+            one.name,
+            str(one.messages[0]),
+            str(one.messages[1]),
+            "not compared" if one.why else str(one.different),
+            str(one.only[0]),
+            str(one.only[1]),
+            one.why or ("" if one.first is None else f"{one.first.time:.9g} s"),
+        ]
+        for one in topics
+        if not one.same
+    ]
+    if not rows:
+        return ""
+    a, b = names
+    headers = ["topic", f"messages {a}", b, "different", f"only {a}", f"only {b}", "first"]
+    return table(headers, rows, right=headers[1:6])
+
+
+def counted(found: Comparison) -> str:
+    """`3 messages of 1 topic`; or that it is not the messages."""
+    topics = [topic for topic in found.topics if not topic.same]
+    if not topics:
+        return "the messages are the same, what is beside them is not"
+    messages = sum(topic.different + sum(topic.only) for topic in topics)
+    return f"{count(messages, 'message')} of {count(len(topics), 'topic')}"
+
+
+def count(number: int, noun: str) -> str:
+    """`1 message`, `2 messages`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def entries_lines(entries: Sequence[EntryDifference], names: Names) -> list[str]:
+    """A line for each record of metadata and each attachment that differs."""
+    lines = []
+    for one in entries[:MOST_ENTRIES]:
+        where = f"{one.kind} '{one.name}'" + (f", {one.where}" if one.where else "")
+        values = f"{_entry(one.a)} {names[0]}, {_entry(one.b)} {names[1]}"
+        more = f" (and {one.count - 1} more)" if one.count > 1 else ""
+        lines.append(f"{where}: {values}{more}")
+    if len(entries) > MOST_ENTRIES:
+        lines.append(f"and {len(entries) - MOST_ENTRIES} more")
+    return lines
+
+
+def topic_object(one: TopicComparison) -> Json:
+    return {
+        "name": one.name,
+        "type": one.type,
+        "messages": list(one.messages),
+        "different": one.different,
+        "only": list(one.only),
+        "first": None if one.first is None else difference_object(one.first),
+        "not_compared": one.why or None,
+    }
+
+
+def difference_object(one: Difference) -> Json:
+    """Values as they are: not rounded, for a difference may be small."""
+    return {
+        "time": number(one.time),
+        "topic": one.topic,
+        "field": one.field,
+        "message": one.index,
+        "a": _plain(one.a),
+        "b": _plain(one.b),
+        "by": _plain(one.by),
+    }
+
+
+def messages_object(found: Comparison) -> dict[str, Json]:
+    return {
+        "messages": found.messages,
+        "first": None if found.first is None else difference_object(found.first),
+        "topics": [topic_object(one) for one in found.topics],
+    }
+
+
+def entry_object(one: EntryDifference) -> Json:
+    return {"kind": one.kind, "name": one.name, "where": one.where, "a": one.a, "b": one.b, "count": one.count}
+
+
+def _plain(value: float | int | str | None) -> Json:
+    """JSON knows no nan and inf."""
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _value(value: float | int | str) -> str:
+    return f"'{shorten(value)}'" if isinstance(value, str) else repr(value)
+
+
+def _entry(value: str | None) -> str:
+    return "nothing" if value is None else f"'{shorten(value)}'"
