@@ -76,13 +76,14 @@ FREQUENCY = TIME**-1
 SPEED, ACCELERATION, JERK = LENGTH / TIME, LENGTH / TIME**2, LENGTH / TIME**3
 ANGULAR_VELOCITY, ANGULAR_ACCELERATION, ANGULAR_JERK = ANGLE / TIME, ANGLE / TIME**2, ANGLE / TIME**3
 FORCE = MASS * ACCELERATION
-TORQUE = FORCE * LENGTH
+TORQUE = ENERGY = FORCE * LENGTH
+"""One dimension: an angle that a torque turns through is a plain number here."""
 
 _NAMES = {
     NUMBER: "a plain number", LENGTH: "a length", ANGLE: "an angle", MASS: "a mass", TIME: "a time",
     FREQUENCY: "a frequency", SPEED: "a speed", ACCELERATION: "an acceleration", JERK: "a jerk",
     ANGULAR_VELOCITY: "an angular velocity", ANGULAR_ACCELERATION: "an angular acceleration",
-    ANGULAR_JERK: "an angular jerk", FORCE: "a force", TORQUE: "a torque",
+    ANGULAR_JERK: "an angular jerk", FORCE: "a force", TORQUE: "a torque or an energy",
 }  # fmt: skip
 _SYMBOLS = {
     NUMBER: "", LENGTH: "m", ANGLE: "rad", MASS: "kg", TIME: "s", FREQUENCY: "Hz", SPEED: "m/s",
@@ -94,7 +95,7 @@ _EXAMPLES = {
     MASS: ("kg", "g", "mg", "t"), TIME: ("s", "ms", "us", "min", "h"), FREQUENCY: ("Hz", "kHz"),
     SPEED: ("m/s", "mm/s", "cm/s"), ACCELERATION: ("m/s^2", "mm/s^2"), JERK: ("m/s^3",),
     ANGULAR_VELOCITY: ("rad/s", "deg/s", "rpm"), ANGULAR_ACCELERATION: ("rad/s^2", "deg/s^2"),
-    ANGULAR_JERK: ("rad/s^3", "deg/s^3"), FORCE: ("N", "mN", "kN"), TORQUE: ("N m", "mN m", "N mm"),
+    ANGULAR_JERK: ("rad/s^3", "deg/s^3"), FORCE: ("N", "mN", "kN"), TORQUE: ("N m", "mN m", "N mm", "J"),
 }  # fmt: skip
 
 
@@ -135,6 +136,7 @@ _UNITS: dict[str, Unit] = {
     "Hz": _unit(FREQUENCY), "kHz": _unit(FREQUENCY, 1e3), "MHz": _unit(FREQUENCY, 1e6),
     "rpm": _unit(ANGULAR_VELOCITY, math.tau, 60),
     "N": _unit(FORCE), "mN": _unit(FORCE, 1, 1e3), "kN": _unit(FORCE, 1e3),
+    "J": _unit(TORQUE), "mJ": _unit(TORQUE, 1, 1e3), "kJ": _unit(TORQUE, 1e3),
     "Nm": _unit(TORQUE), "mNm": _unit(TORQUE, 1, 1e3), "kNm": _unit(TORQUE, 1e3), "Nmm": _unit(TORQUE, 1, 1e3),
     "%": _unit(NUMBER, 1, 100),
 }  # fmt: skip
@@ -269,6 +271,8 @@ _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
     "rad/s": ((0.0, "deg/s", 180.0 / math.pi),),
     "kg": ((1.0, "kg", 1.0), (0.0, "g", 1e3)),
     "s": ((1.0, "s", 1.0), (0.0, "ms", 1e3)),
+    "m/s": ((1.0, "m/s", 1.0), (0.0, "mm/s", 1e3)),
+    "J": ((1.0, "J", 1.0), (0.0, "mJ", 1e3)),
 }
 
 

@@ -12,7 +12,6 @@ from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.flow.postures import posture_findings
 from manipcli.flow.vocabulary import task_spec
-from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import SHAPES
 from manipcli.model.checks import CHECKS
@@ -20,6 +19,7 @@ from manipcli.model.conditions import CONDITIONS
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
+from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.tree import Plain
 
@@ -58,8 +58,8 @@ def words(kind: str) -> tuple[str, ...]:
     """The words that files may use (`steps`, `expectations`, `conditions`, `shapes`, `engines`); codes (`checks`)."""
     known = {
         "steps": STEPS.names,
-        "expectations": EXPECTATIONS.names,
-        "conditions": CONDITIONS.names,
+        "expectations": (*CONDITIONS.names, *COMBINATIONS, *QUANTIFIERS),
+        "conditions": (*CONDITIONS.names, *COMBINATIONS),
         "shapes": SHAPES,
         "engines": ENGINES.names,
         "checks": tuple(check.code for check in CHECKS),

@@ -14,11 +14,11 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, SimulationFailed
+from manipcli.flow.live import Live
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.judge.verdict import StepOutcome
-from manipcli.model.condition import World, needs_physics
-from manipcli.model.conditions import CONDITIONS
+from manipcli.model.condition import World
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recorder import Recorder
@@ -77,10 +77,11 @@ class _Goal:
 
 
 class Watch:
-    """Hands every tick to the recorder, and now and then the time to whoever shows the progress."""
+    """Hands every tick to the recorder and to live conditions, and now and then the time to who shows the progress."""
 
-    def __init__(self, recorder: Recorder, progress: Progress | None, period: float) -> None:
+    def __init__(self, recorder: Recorder, progress: Progress | None, period: float, live: Live) -> None:
         self._recorder = recorder
+        self._live = live
         self._progress = progress
         self._period = period
         self._began = wall_clock.perf_counter()
@@ -90,6 +91,7 @@ class Watch:
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         self._recorder.tick(tick, state, outputs)
+        self._live.tick(tick, state, outputs)
         self._next_tick = tick + 1
         if self._goals:
             self._follow(tick)
@@ -98,6 +100,7 @@ class Watch:
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
         self._recorder.contacts(tick, contacts)
+        self._live.contacts(tick, contacts)
 
     def goal(self, controller: str, handle: GoalHandle) -> None:
         """A controller has a new goal; one that it had before may have ended by that."""
@@ -148,10 +151,11 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
                 period=simulation.control_period,
             )
             _settle(task, session)
-            watch = Watch(recorder, progress, simulation.control_period)
+            live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
+            watch = Watch(recorder, progress, simulation.control_period, live)
             session.restart_clock(watch)
             try:
-                _Run(task, plan, session, recorder, progress, watch).steps()
+                _Run(task, plan, session, recorder, progress, watch, live).steps()
             finally:
                 for kind, ticks in _saturated_ticks(session).items():
                     counts = {name: str(count) for name, count in ticks.items() if count}
@@ -166,6 +170,18 @@ def _saturated_ticks(session: Session) -> dict[str, dict[str, int]]:
     joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
     return {"saturated joints": joints, "saturated actuators": actuators}
+
+
+def _world(task: Task, plan: Plan, session: Session) -> World:
+    """What live conditions are asked in; the present state is that at time 0."""
+    return World(
+        task.robot,
+        task.scene,
+        start=session.engine.read().map(np.copy),
+        physics=ENGINES[task.spec.simulation.engine].physics == "full",
+        referenced=frozenset(name for one in session.manager.controllers if one.interfaces for name in one.joints),
+        steps=tuple(step.id for step in plan.steps),
+    )
 
 
 def _settle(task: Task, session: Session) -> None:
@@ -205,17 +221,23 @@ class _Run:
     """One pass over the steps."""
 
     def __init__(
-        self, task: Task, plan: Plan, session: Session, recorder: Recorder, progress: Progress | None, watch: Watch
+        self,
+        task: Task,
+        plan: Plan,
+        session: Session,
+        recorder: Recorder,
+        progress: Progress | None,
+        watch: Watch,
+        live: Live,
     ) -> None:
         self._task = task
+        self._live = live
         self._plan = plan
         self._session = session
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
         self._executor = Executor(session, touch=self._physics, told=watch.goal)
-        start = session.engine.read().map(np.copy)  # the state at time 0, for words such as `to: start`
-        self._world = World(task.robot, task.scene, start)
 
     def steps(self) -> None:
         """Every step in order, until one is not done."""
@@ -235,6 +257,7 @@ class _Run:
         started, ticks = self._session.time, self._session.ticks
         saturated = _saturated_ticks(self._session)
         self._event("step_started", planned, "", "", place)
+        self._live.step_started(planned.id)
         try:
             end = self._motions(step, planned, started, place)
         except SimulationFailed as failure:
@@ -244,6 +267,7 @@ class _Run:
         if end.outcome != "done":
             end = MotionEnd(end.outcome, end.text + _cut_since(saturated, self._session, ticks))
         self._event("step_ended", planned, end.outcome, end.text, place)
+        self._live.step_ended(planned.id, end.outcome)
         return StepOutcome(
             id=planned.id,
             verb=planned.verb,
@@ -291,14 +315,11 @@ class _Run:
         return MotionEnd("failed", f"{where}: it slipped, or was never held")
 
     def _until(self, step: StepSpec) -> Until | None:
-        """The step's condition as a question about the live state; None where only physics could answer it."""
-        if step.until is None:
+        """The step's condition, asked until it ends; None where there is none, or only physics could answer it."""
+        if step.until is None or self._live.absent(step.until) is not None:
             return None
-        condition = CONDITIONS[step.until.name]
-        body, world = step.until.body, self._world
-        if not self._physics and needs_physics(condition, body, self._task.scene):
-            return None
-        return lambda state: bool(condition.margin(body, world, state) >= 0.0)
+        probe = self._live.open(step.until, step=step.id)
+        return lambda _: probe.holds
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str, place: str) -> None:
         self._recorder.event(

@@ -11,6 +11,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
+from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.plan.claims import Claims
 from manipcli.plan.hand import with_mimics
@@ -108,8 +109,8 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
             for step in task.spec.steps
         ),
         expectations=tuple(
-            ExpectationOutcome(expected.name, "not_evaluated", margin=None, unit="", at=None, text=reason)
-            for expected in task.spec.expect
+            ExpectationOutcome(name, "not_evaluated", margin=None, unit="", at=None, text=reason)
+            for name in labels(task.spec.expect)
         ),
         errors=refusal.findings,
         text=f"{reason}: {refusal}",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from manipcli.judge.expectations import EXPECTATIONS
 from manipcli.model.conditions import CONDITIONS
 from manipcli.plan.steps import STEPS
 from manipcli.spec.task import TaskSpec
@@ -10,5 +9,5 @@ from manipcli.spec.unions import task_model
 
 
 def task_spec() -> type[TaskSpec]:
-    """`TaskSpec` with all verbs, conditions and expectations; the same class each time."""
-    return task_model(STEPS, CONDITIONS, EXPECTATIONS)
+    """`TaskSpec` with all verbs and conditions; the same class each time."""
+    return task_model(STEPS, CONDITIONS)

@@ -1,153 +1,183 @@
-"""The contract of expectations: what a task may expect of its recording, each answered with a signed margin.
+"""When an expectation is looked at, and what comes of it.
 
-An expectation is asked about spans of the recording and the worst answer counts; its scope says about which spans, so
-that a recording of any length is judged in bounded memory. Every condition is an expectation too: it must hold at the
-end (`at_end`).
+A condition with a time: the margins of its gauge on the ticks that count, the least of them, or with `eventually` the
+greatest. What counts is told before the first tick is read, but for the end of the run, which is known at the end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from manipcli.core.geometry import Array
+from manipcli.core.registry import Seam
+from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
-from manipcli.model.condition import Condition, Problem, World, needs_physics
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.record.channels import TF
-from manipcli.record.recording import Span
-from manipcli.spec.base import Model
-from manipcli.spec.quantity import Unit
+from manipcli.model.condition import Condition, Problem, Setting, World
+from manipcli.model.formula import absent, opened, problems, scopes
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, opposite
+from manipcli.spec.condition import END, ExpectationSpec
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
 
-Scope = Literal["always", "end"]
-"""What an expectation is asked about: every span of the recording, or one span of its last `END_WINDOW` seconds (all
-of it when it is shorter)."""
+ROUNDING = 0.5e-9
+"""[s] Recorded times are whole nanoseconds."""
 
-S = TypeVar("S", bound=Model)
-
-
-@dataclass(frozen=True, slots=True)
-class Evidence:
-    """What expectations are judged by, besides the span they are asked about.
-
-    Attributes:
-        world: robot, scene, and the first recorded state as the start.
-        physics: False when the engine moved no bodies and knew no contacts.
-        steps: how the steps went.
-        absent: topics that the task told not to record.
-    """
-
-    world: World
-    physics: bool
-    steps: tuple[StepOutcome, ...]
-    absent: tuple[str, ...] = ()
-
-    def lacks(self, topic: str) -> str | None:
-        """Why nothing can be said that needs this topic; None where it is there."""
-        if topic not in self.absent:
-            return None
-        return f"the log holds no {topic}: `record:` of the task leaves it out"
+# Any: a seam holds members of different specs; each is only ever called with its own.
+Seams = Seam[Condition[Any]]
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
-    """What an expectation found: the worst `margin` (>= 0 passes) in `unit`, when [s], and about what."""
+class When:
+    """Which ticks count: those of `intervals` [s], each with its start and without its end; the first tick shown to a
+    gauge is the first of the first. With `last`, of each only its last tick; None: the end of the run, from time 0."""
 
-    margin: float
-    unit: str
-    at: float | None
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class NotEvaluated:
-    """Why an expectation could not be judged; that is never a pass."""
-
-    reason: str
-    unit: str = ""
+    intervals: tuple[tuple[float, float], ...] | None
+    last: bool = False
+    words: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Expectation(Generic[S]):
-    """A member of the seam.
-
-    Attributes:
-        name: the word in YAML.
-        spec: what the user writes under that word.
-        scope: which spans it is asked about.
-        evaluate: (spec, evidence, span) -> the worst margin in the span, or why there is none. The span has at least
-            one tick; its states follow robot and scene of the evidence.
-        check: (spec, robot, scene, ids of the task's steps) -> what in the spec these do not know.
-    """
-
-    name: str
-    spec: type[S]
-    scope: Scope
-    evaluate: Callable[[S, Evidence, Span], Measured | NotEvaluated]
-    check: Callable[[S, RobotModel, Scene, tuple[str, ...]], tuple[Problem, ...]]
+def when(spec: ExpectationSpec, steps: Sequence[StepOutcome], seam: Seams) -> When | NotEvaluated:
+    """Which ticks count, or why there are none."""
+    if spec.steps or spec.at not in (None, END):
+        return _of_steps(spec, steps)
+    if spec.quantifier == "eventually" and spec.within is not None:
+        return When(((-np.inf, spec.within + ROUNDING),), words=f"within {readable(spec.within, 's')}")
+    if spec.quantifier is not None or (spec.at is None and "always" in scopes(spec.condition, seam)):
+        return When(((-np.inf, np.inf),))
+    return When(None)
 
 
-def at_end(condition: Condition[Any]) -> Expectation[Any]:
-    """The expectation that a condition holds at the end: its smallest margin there, which bounds the last state's."""
-
-    def evaluate(spec: Model, evidence: Evidence, span: Span) -> Measured | NotEvaluated:
-        scene = evidence.world.scene
-        if not evidence.physics and needs_physics(condition, spec, scene):
-            movable = {body.name for body in scene.movable}
-            names = ", ".join(f"'{name}'" for name in condition.bodies(spec, scene) if name in movable)
-            return NotEvaluated(f"the engine has no physics, so {names} never moved", condition.unit)
-        reason = evidence.lacks(TF)
-        if reason is not None and needs_physics(condition, spec, scene):
-            return NotEvaluated(reason, condition.unit)
-        margins = condition.margin(spec, evidence.world, span.states)
-        return worst(margins, span.states.time, condition.unit, describe(spec))
-
-    def check(spec: Model, robot: RobotModel, scene: Scene, steps: tuple[str, ...]) -> tuple[Problem, ...]:
-        return condition.check(spec, robot, scene)
-
-    return Expectation(name=condition.name, spec=condition.spec, scope="end", evaluate=evaluate, check=check)
-
-
-def worst(margins: Array, times: Array, unit: str, text: str) -> Measured | NotEvaluated:
-    """The smallest of `margins` (T,) and the first moment it was met."""
-    if not np.all(np.isfinite(margins)):
-        at = float(times[int(np.argmin(np.isfinite(margins)))])
-        return NotEvaluated(f"the recorded state is not finite at t = {at:.3f} s", unit)
-    k = int(np.argmin(margins))
-    return Measured(margin=float(margins[k]), unit=unit, at=float(times[k]), text=text)
+def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | NotEvaluated:
+    known = {step.id: step for step in steps}
+    intervals = []
+    for name in spec.steps or (spec.at or "",):
+        step = known.get(name)
+        if step is None or step.started is None:
+            return NotEvaluated(f"step '{name}' never ran")
+        if spec.at is not None and step.ended is None:
+            return NotEvaluated(f"step '{name}' never ended")
+        end = np.inf if step.ended is None else step.ended - ROUNDING
+        intervals.append((step.started - ROUNDING, end))
+    intervals.sort()
+    names = " and ".join(f"'{name}'" for name in spec.steps or (spec.at,))
+    words = f"at the end of {names}" if spec.at is not None else f"during {names}"
+    if spec.within is not None:
+        start = intervals[0][0]
+        intervals = [(a, min(b, start + spec.within + 2 * ROUNDING)) for a, b in intervals]
+        words = f"{words}, within {readable(spec.within, 's')}"
+    return When(tuple(intervals), last=spec.at is not None, words=words)
 
 
-def worse(one: Measured | NotEvaluated, other: Measured | NotEvaluated) -> Measured | NotEvaluated:
-    """The answer that counts of two, the first of equal ones: what could not be evaluated once, never passes."""
-    if isinstance(one, NotEvaluated):
-        return one
-    return other if isinstance(other, NotEvaluated) or other.margin < one.margin else one
+class Expected:
+    """One expectation on its way through a recording."""
+
+    def __init__(self, spec: ExpectationSpec, world: World, steps: Sequence[StepOutcome], seam: Seams) -> None:
+        self._spec = spec
+        self._extreme = Extreme("greatest" if spec.quantifier == "eventually" else "least")
+        self._recent: deque[tuple[Moments, Reading]] = deque()
+        self._never: NotEvaluated | None = None
+        self._when = When(None)
+        reason = absent(spec.condition, world, seam)
+        found = when(spec, steps, seam) if reason is None else NotEvaluated(reason)
+        if isinstance(found, NotEvaluated):
+            self._never = found
+            return
+        self._when = found
+        self._gauge = opened(spec.condition, world, seam)
+
+    def look(self, moments: Moments) -> None:
+        """The next ticks."""
+        if self._never is not None:
+            return
+        intervals = self._when.intervals
+        if intervals is None:
+            self._keep(moments)
+            return
+        first = int(np.searchsorted(moments.times, intervals[0][0]))
+        last = int(np.searchsorted(moments.times, intervals[-1][1]))
+        if first >= last:
+            return
+        shown = moments.part(first, last)
+        answer = self._answer(shown)
+        if self._when.last:
+            self._recent.append((shown, answer))
+            if len(self._recent) > 1:
+                self._recent.popleft()
+            return
+        for start, end in intervals:
+            a, b = np.searchsorted(shown.times, (start, end))
+            self._extreme.add(answer, shown.times, int(a), int(b))
+
+    def _answer(self, moments: Moments) -> Reading:
+        answer = self._gauge(moments)
+        return opposite(answer) if self._spec.quantifier == "never" else answer
+
+    def _keep(self, moments: Moments) -> None:
+        """As many as it takes to hold the last `END_WINDOW` seconds."""
+        self._recent.append((moments, self._answer(moments)))
+        start = float(moments.times[-1]) - END_WINDOW - ROUNDING
+        while len(self._recent) > 1 and self._recent[1][0].times[0] <= start:
+            self._recent.popleft()
+
+    def found(self, end: float) -> Measured | NotEvaluated:
+        """What came of it, once there are no more ticks after `end` [s]."""
+        if self._never is not None:
+            return self._never
+        for moments, answer in self._recent:
+            start = float(moments.times[-1]) if self._when.last else end - END_WINDOW
+            self._extreme.add(answer, moments.times, int(np.searchsorted(moments.times, start - ROUNDING)))
+        self._recent.clear()
+        found = self._extreme.found
+        if found is None:
+            return NotEvaluated(f"there was no tick {self._when.words or 'to look at'}")
+        if isinstance(found, NotEvaluated):
+            return found
+        best = ("at best",) if self._spec.quantifier == "eventually" else ()
+        words = ", ".join(word for word in (self._when.words, *best) if word)
+        return replace(found, text=f"{words}: {found.text}" if words else found.text)
 
 
-def describe(spec: Model) -> str:
-    """What was written, in one line and in the units of people: `object: cup, within: 5 deg`."""
-    written = spec.model_dump(exclude_defaults=True)
-    return ", ".join(f"{key}: {_described(value, type(spec), key)}" for key, value in written.items())
+def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:
+    """The name of each in reports: its id, else its word (see `ExpectationSpec.label`), numbered from the second on."""
+    taken = {one.id for one in expect}
+    seen = Counter[str]()
+    for one in expect:
+        name = one.label
+        if one.id is None:
+            seen[name] += 1
+            while (name if seen[name] == 1 else f"{name}_{seen[name]}") in taken:
+                seen[name] += 1
+            name = name if seen[name] == 1 else f"{name}_{seen[name]}"
+        yield name
 
 
-def _described(value: object, spec: type[Model], key: str) -> str:
-    """A value of the field `key`; a number of one dimension gets its unit."""
-    if isinstance(value, float):
-        units = [unit for unit in spec.model_fields[key].metadata if isinstance(unit, Unit)]
-        if len(units) == 1 and len(units[0].dimensions) == 1:
-            return readable(value, units[0].dimensions[0].symbol)
-        return f"{value:.6g}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(f'{v:.6g}' if isinstance(v, float) else str(v) for v in value)}]"
-    return str(value)
+def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
+    """Everything in an expectation that robot, scene and steps do not know; `loc` is that inside the expectation."""
+    found = list(problems(spec.condition, setting, seam))
+    if spec.quantifier is not None:
+        found = [Problem((spec.word, *p.loc), p.message, p.hint, p.code) for p in found]
+    named: list[tuple[tuple[str | int, ...], str]] = []
+    if spec.at not in (None, END):
+        named.append((("at",), spec.at or ""))
+    for k, name in enumerate(spec.steps):
+        named.append((("during",) if isinstance(spec.during, str) else ("during", k), name))
+    for loc, name in named:
+        if setting.steps is not None and name not in setting.steps:
+            known = (*setting.steps, END) if loc == ("at",) else setting.steps
+            found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
+    if not found and spec.at is None and spec.during is None and spec.quantifier is None:
+        wanted = scopes(spec.condition, seam)
+        if len(wanted) > 1:
+            message = f"`{wanted['end']}` is expected at the end, `{wanted['always']}` all the time, and this has both"
+            found.append(Problem((spec.word,), message, "say `at: end`, `during: STEP`, or write `always: {...}`"))
+    return tuple(found)
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from manipcli.core.errors import Finding
-from manipcli.core.registry import Seam
 from manipcli.judge.examine import examine
-from manipcli.judge.expectation import Expectation
-from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.judge.expectation import Seams
 from manipcli.judge.steps import step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
+from manipcli.model.conditions import CONDITIONS
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording
-from manipcli.spec.base import Model
+from manipcli.spec.condition import ExpectationSpec
 
 RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
@@ -27,10 +25,10 @@ _JUDGED = ("complete", "failed")
 def judge(
     recording: Recording,
     *,
-    expect: Sequence[tuple[str, Model]],
+    expect: Sequence[ExpectationSpec],
     robot: RobotModel,
     scene: Scene,
-    seam: Seam[Expectation[Any]] = EXPECTATIONS,
+    seam: Seams = CONDITIONS,
 ) -> Verdict:
     """Judge a recording by what its task expected.
 
@@ -40,9 +38,9 @@ def judge(
 
     Args:
         recording: the log.
-        expect: word and validated block of each expectation, in the order of the task in the log.
+        expect: the expectations, in the order of the task in the log.
         robot, scene: built from the log's own attachments.
-        seam: the expectations that the words name.
+        seam: the conditions that their words name.
     """
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")

@@ -1,26 +1,41 @@
-"""The contract of conditions: pure functions of world and state with a signed margin in a stated unit.
+"""The contract of conditions: pure functions of what happened, with a signed margin in a stated unit.
 
-One family, used live (`until`) and judged (`expect`): both call the same `margin`, so a condition that ended a step
-and the same condition in a verdict cannot disagree.
+One family, used live (`until`, `watch`) and judged (`expect`): both open the same member and hand it the same moments,
+so that a condition that ended a step and the same condition in a verdict cannot disagree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
-from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.spec.base import Model
 
+if TYPE_CHECKING:
+    from manipcli.model.kinematics import Kinematics
+
 S = TypeVar("S", bound=Model)
 
+Scope = Literal["end", "always"]
+"""Where a condition is expected to hold when nobody says where: up to the end of the run, or all the time."""
 
-@dataclass(frozen=True, slots=True)
+Seen = Literal["bodies", "contacts", "references"]
+"""What a log may have been told to leave out."""
+
+Gauge = Callable[[Moments], Reading]
+"""Answers for successive moments, each call going on where the last one ended. The first tick that it is shown is where
+it starts to count: from there something moved, slipped, took time or energy."""
+
+
+@dataclass(frozen=True)
 class World:
     """What a condition is asked in: everything that does not change during a run.
 
@@ -28,11 +43,35 @@ class World:
         robot: whose joints the state's joint vectors follow.
         scene: whose bodies the state's body arrays follow.
         start: the state at time 0 (no leading axes), for words such as `to: start`.
+        physics: False where no body moves and nothing touches.
+        unrecorded: why nothing is known of the motion of bodies, of contacts or of references.
+        referenced: joints of which it is known what they should follow.
+        steps: ids of the steps.
     """
 
     robot: RobotModel
     scene: Scene
     start: WorldState
+    physics: bool = True
+    unrecorded: Mapping[Seen, str] = field(default_factory=dict)
+    referenced: frozenset[str] = frozenset()
+    steps: tuple[str, ...] = ()
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Of the robot; made when it is first asked for."""
+        from manipcli.model.kinematics import Kinematics
+
+        return Kinematics(self.robot)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What a spec may speak of, before anything runs. `steps`: the ids of the task's steps; None: not known."""
+
+    robot: RobotModel
+    scene: Scene
+    steps: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,27 +94,40 @@ class Condition(Generic[S]):
     Attributes:
         name: the word in YAML.
         spec: what the user writes under that word.
-        unit: of the margin, SI: "m", "rad", ...
-        margin: (spec, world, state) -> (...) signed, positive where the condition holds; the result has the leading
-            axes of `state`.
-        bodies: (spec, scene) -> the names of the bodies whose motion the margin depends on. Without physics movable
-            bodies stay where they are, so there a condition on them is not evaluated (`needs_physics`).
-        check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know. `margin` may
-            only be asked when there is none.
+        units: that its margin can have, SI: "m", "rad", ...
+        open: (spec, world) -> its gauge, from the next moments on. Only to be asked where `check` finds nothing and
+            `absent` is None.
+        check: (spec, setting) -> everything in the spec that the setting does not know.
+        absent: (spec, world) -> why it can never be evaluated in this world, or None.
+        scope: where it is expected to hold when the task does not say.
+        example: how it is written, in YAML.
     """
 
     name: str
     spec: type[S]
-    unit: str
-    margin: Callable[[S, World, WorldState], Array]
-    bodies: Callable[[S, Scene], tuple[str, ...]]
-    check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
+    units: tuple[str, ...]
+    open: Callable[[S, World], Gauge]
+    check: Callable[[S, Setting], tuple[Problem, ...]]
+    absent: Callable[[S, World], str | None]
+    example: str
+    scope: Scope = "end"
 
 
-def needs_physics(condition: Condition[S], spec: S, scene: Scene) -> bool:
-    """Whether the condition depends on a body that only physics moves."""
-    movable = {body.name for body in scene.movable}
-    return any(name in movable for name in condition.bodies(spec, scene))
+def unmoving(world: World, bodies: Sequence[str]) -> str | None:
+    """Why nothing can be said of the motion of bodies: nothing moves those that could move, or it is not recorded."""
+    movable = [f"'{body.name}'" for body in world.scene.movable if body.name in bodies]
+    if not movable:
+        return None
+    if not world.physics:
+        return f"the engine has no physics, so {', '.join(movable)} never moved"
+    return world.unrecorded.get("bodies")
+
+
+def untouchable(world: World) -> str | None:
+    """Why nothing can be said of contacts."""
+    if not world.physics:
+        return "the engine has no physics, so nothing can touch"
+    return world.unrecorded.get("contacts")
 
 
 def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable: bool = False) -> tuple[Problem, ...]:
@@ -85,3 +137,11 @@ def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable
         return ()
     word = "a movable body of the scene" if movable else "in the scene"
     return (Problem(loc, f"'{name}' is not {word}", did_you_mean(name, known)),)
+
+
+def unknown_group(robot: RobotModel, name: str | None, loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+    """Empty if the robot has a group of this name, or none is named."""
+    groups = [group.name for group in robot.groups]
+    if name is None or name in groups:
+        return ()
+    return (Problem(loc, f"'{name}' is not a group of robot '{robot.name}'", did_you_mean(name, groups)),)

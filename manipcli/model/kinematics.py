@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.geometry import Array, Transform, cross, frozen
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
@@ -104,6 +104,15 @@ class Kinematics:
             J[2] += J[3] * arm[1] - J[4] * arm[0]
             R, p = R @ offset.R, p + arm
         return R, p, J
+
+    def point_velocity(self, q: Array, v: Array, link: str, offset: Transform | None = None) -> Array:
+        """v_WT (3,) [m/s] of the origin of frame T in the world; T is L itself, or stands at `offset` X_LT in it."""
+        pin, model, data, frame = self._pin, self._model, self._data, self._frames[link]
+        pin.forwardKinematics(model, data, q, v)
+        X = pin.updateFramePlacement(model, data, frame)
+        V = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        linear: Array = V.linear
+        return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
 
     def gravity(self, q: Array) -> Array:
         """g(q) (n,) [N m or N]: what the joints must hold at rest. A view, overwritten by the next call."""

@@ -66,6 +66,8 @@ Frequency = Annotated[float, Unit((units.FREQUENCY,))]
 Force = Annotated[float, Unit((units.FORCE,))]
 Speed = Annotated[float, Unit((units.SPEED,))]
 Acceleration = Annotated[float, Unit((units.ACCELERATION,))]
+Energy = Annotated[float, Unit((units.ENERGY,))]
+"""In J, which is N m: a torque is not told apart."""
 JointValue = Annotated[float, Unit((units.ANGLE, units.LENGTH))]
 """Position of a joint, revolute or prismatic."""
 JointVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY, units.SPEED))]

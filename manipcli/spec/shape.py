@@ -8,12 +8,15 @@ from typing import Annotated, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
+from typing_extensions import TypeAliasType
 
 from manipcli.spec.tree import Path
 
 
 def alternatives(annotation: object) -> list[tuple[object, str | None]]:
     """The members of a union, flattened, each with its tag; a type that is no union stands alone."""
+    if isinstance(annotation, TypeAliasType):
+        return alternatives(annotation.__value__)
     origin = get_origin(annotation)
     if origin is Annotated:
         inner, *metadata = get_args(annotation)

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, ClassVar, Final, Literal, get_args
+from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.spec.base import Model, problem
+from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec
 from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 
 __all__ = [
-    "BodySpec", "BoxSpec", "ConditionSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "KeyedSpec", "MeshSpec",
-    "Positive", "RatesSpec", "RecordSpec", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec",
-    "UrdfSpec", "Vector3",
+    "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "Positive", "RatesSpec",
+    "RecordSpec", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
 ]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -137,28 +137,6 @@ class FrameSpec(Model):
     pose: PoseSpec = Field(PoseSpec(), description="Of the frame in its parent. Default: the parent's own.")
 
 
-class KeyedSpec(Model):
-    """A block that is known by its one key `word`."""
-
-    word: ClassVar[str] = ""
-
-    @property
-    def body(self) -> Model:
-        """The validated block under the key."""
-        body = getattr(self, self.word)
-        assert isinstance(body, Model)
-        return body
-
-
-class ConditionSpec(KeyedSpec):
-    """A condition: its name, and under it what it asks."""
-
-    @property
-    def name(self) -> str:
-        """Which condition this is."""
-        return self.word
-
-
 Rate = Annotated[Frequency, Field(gt=0)]
 SLOWEST: Final = 20.0
 """[Hz] below which the end of a run could not be judged."""
@@ -219,7 +197,6 @@ class RecordSpec(Model):
         return frozenset() if self.topics is None else frozenset(get_args(ChosenTopic)) - {*self.topics, "joint_states"}
 
 
-_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 
 
@@ -258,7 +235,7 @@ class TaskSpec(Model):
         "at the limit nearest to 0.",
     )
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
-    expect: tuple[ConditionSpec, ...] = Field((), description="What must hold at the end, or over the run.")
+    expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")
 
     @model_validator(mode="after")
     def _recordable(self) -> TaskSpec:
@@ -290,6 +267,19 @@ class TaskSpec(Model):
             raise problem("conflict", f"{name[:100]!r} cannot be the name of a task: it names its log", hint=hint)
         return name
 
+    @field_validator("expect", mode="after")
+    @classmethod
+    def _labelled(cls, expect: tuple[ExpectationSpec, ...]) -> tuple[ExpectationSpec, ...]:
+        """No id twice."""
+        first: dict[str, int] = {}
+        for index, one in enumerate(expect):
+            if one.id in first:
+                message = f"the id '{one.id}' is taken by expect[{first[one.id]}]"
+                raise problem("duplicate", message, at=(index, "id"), hint="ids name expectations: give another")
+            if one.id is not None:
+                first[one.id] = index
+        return expect
+
     @field_validator("steps", mode="after")
     @classmethod
     def _named(cls, steps: tuple[StepSpec, ...]) -> tuple[StepSpec, ...]:
@@ -298,9 +288,8 @@ class TaskSpec(Model):
         for index, step in enumerate(steps):
             if step.id is None:
                 continue
-            if not _ID.fullmatch(step.id):
-                hint = "an id is letters, digits, '_' and '-', and begins with a letter"
-                raise problem("conflict", f"'{step.id}' cannot be an id", at=(index, "id"), hint=hint)
+            if not ID.fullmatch(step.id):
+                raise problem("conflict", f"'{step.id}' cannot be an id", at=(index, "id"), hint=ID_HINT)
             if step.id in first:
                 message = f"the id '{step.id}' is taken by steps[{first[step.id]}]"
                 raise problem("duplicate", message, at=(index, "id"), hint="ids name steps in the log: give another")

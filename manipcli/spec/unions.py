@@ -1,7 +1,8 @@
 """The unions of a task: one model a verb and one a condition, made from the members of the seams.
 
 A step is a mapping with exactly one verb key beside the common keys `id`, `until` and `timeout`; a condition is a
-mapping with its name as the only key.
+mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with one under
+it, beside the common keys `id`, `at`, `during` and `within`.
 """
 
 from __future__ import annotations
@@ -9,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Optional, Protocol, TypeVar, cast
+from typing import Annotated, ForwardRef, Optional, Protocol, TypeVar, cast
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
+from typing_extensions import TypeAliasType
 
 from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean, escape, listed
 from manipcli.spec.base import Model, problem
-from manipcli.spec.task import ConditionSpec, KeyedSpec, StepSpec, TaskSpec
+from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS, ConditionSpec, ExpectationSpec, KeyedSpec
+from manipcli.spec.task import StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):
@@ -31,14 +34,14 @@ class SpecMember(Protocol):
 
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
-E = TypeVar("E", bound=SpecMember)
 
-_COMMON = tuple(name for name in StepSpec.model_fields if name != "verb")
+_STEP = tuple(name for name in StepSpec.model_fields if name != "verb")
+_EXPECTATION = tuple(ExpectationSpec.model_fields)
 
 
-def task_model(steps: Seam[S], conditions: Seam[C], expectations: Seam[E]) -> type[TaskSpec]:
+def task_model(steps: Seam[S], conditions: Seam[C]) -> type[TaskSpec]:
     """`TaskSpec` whose steps, `until` and `expect` are those of the seams; the same class for the same members."""
-    return _task_model(_members(steps), _members(conditions), _members(expectations))
+    return _task_model(_members(steps), _members(conditions))
 
 
 Members = tuple[tuple[str, type[Model]], ...]
@@ -49,11 +52,12 @@ def _members(seam: Seam[S]) -> Members:
 
 
 @lru_cache(maxsize=8)
-def _task_model(steps: Members, conditions: Members, expectations: Members) -> type[TaskSpec]:
-    condition = _union("condition", ConditionSpec, conditions, common=())
-    expectation = _union("expectation", ConditionSpec, expectations, common=())
+def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
+    condition = _conditions(conditions)
+    expectation = _expectations(conditions, condition)
     until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`|` is no operator of `object`)
-    step = _union("verb", StepSpec, steps, common=_COMMON, until=until)
+    steps_of = [_wrapped(StepSpec, name, spec, {"until": until}) for name, spec in steps]
+    step = _union("verb", steps_of, common=_STEP)
     # These types are made at run time, which annotations cannot follow.
     model = create_model(
         "TaskSpec",
@@ -65,10 +69,39 @@ def _task_model(steps: Members, conditions: Members, expectations: Members) -> t
     return cast(type[TaskSpec], model)
 
 
-def _union(kind: str, base: type[Model], members: Members, *, common: Sequence[str], **fields: object) -> object:
-    """`Annotated[A | B | ..., which key, one key]` of one model a member."""
-    names = tuple(name for name, _ in members)
-    tagged = [Annotated[_wrapped(base, name, spec, fields), Tag(_tag(name))] for name, spec in members]
+def _conditions(members: Members) -> object:
+    """Any condition, and `all`, `any`, `not` of any, however deep."""
+    own = ForwardRef(_CONDITION)
+    leaves = [_wrapped(ConditionSpec, name, spec, {}) for name, spec in members]
+    combined = [_combined(ConditionSpec, name, own) for name in COMBINATIONS]
+    condition = _union("condition", [*leaves, *combined], common=())
+    alias = TypeAliasType(_CONDITION, condition)  # type: ignore[misc]  # a type of its own, that can speak of itself
+    for model in combined:
+        model.model_rebuild(_types_namespace={_CONDITION: alias})
+    return alias
+
+
+def _expectations(members: Members, condition: object) -> object:
+    """Any condition or combination with its time, and `always`, `never`, `eventually` of any."""
+    models = [_wrapped(ExpectationSpec, name, spec, {}) for name, spec in members]
+    models += [_combined(ExpectationSpec, name, condition) for name in COMBINATIONS]
+    models += [_keyed(ExpectationSpec, name, condition, about) for name, about in QUANTIFIERS.items()]
+    return _union("expectation", models, common=_EXPECTATION)
+
+
+_CONDITION = "Condition"
+
+
+def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
+    """`base` with the field `all`, `any` (a list of conditions) or `not` (one)."""
+    listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
+    return _keyed(base, name, condition if name == "not" else listed, COMBINATIONS[name])
+
+
+def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str]) -> object:
+    """`Annotated[A | B | ..., which key, one key]` of models that are each known by one key."""
+    names = tuple(model.word for model in models)
+    tagged = [Annotated[model, Tag(_tag(model.word))] for model in models]
     one_of = reduce(or_, tagged[1:], tagged[0]) if len(tagged) > 1 else tagged[0]
     if len(tagged) > 1:
         one_of = Annotated[one_of, Discriminator(_key_of(names))]
@@ -80,15 +113,20 @@ def _tag(name: str) -> str:
     return f"<{name}>"
 
 
-def _wrapped(base: type[Model], name: str, spec: type[Model], fields: dict[str, object]) -> type[Model]:
+def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object]) -> type[KeyedSpec]:
     """`base` with the one field `name`, which holds the member's spec."""
-    description = (spec.__doc__ or "").strip().partition("\n")[0]
+    about = " ".join((spec.__doc__ or "").strip().partition("\n\n")[0].split())
+    return _keyed(base, name, Annotated[spec, BeforeValidator(_nothing_is_default)], about, **fields)
+
+
+def _keyed(base: type[KeyedSpec], name: str, holds: object, about: str, **fields: object) -> type[KeyedSpec]:
+    """`base` with the one field `name` of any type."""
     made = create_model(  # type: ignore[call-overload]
         "".join(word.capitalize() for word in name.split("_")) + base.__name__.removesuffix("Spec"),
         __base__=base,
-        __doc__=description,
+        __doc__=about,
         **fields,
-        **{name: (Annotated[spec, BeforeValidator(_nothing_is_default)], Field(description=description))},
+        **{name: (holds, Field(description=about))},
     )
     keyed = cast(type[KeyedSpec], made)
     keyed.word = name

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.judge.expectation import describe
-from manipcli.judge.expectations import EXPECTATIONS
+from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.expectation import expectation_problems
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.model.build_scene import build_scene
+from manipcli.model.condition import Setting
+from manipcli.model.conditions import CONDITIONS
 from manipcli.model.robot import Group, Joint, JointLimits, Link, RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
-from manipcli.spec.base import Model
+from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.task import BodySpec, TaskSpec
 
 PERIOD = 0.01
@@ -120,10 +122,19 @@ def run(**metadata: str) -> dict[str, dict[str, str]]:
     return {"run": recording().metadata["run"] | metadata}
 
 
-def judged(made: Recording, *expect: tuple[str, dict[str, Any]]) -> Verdict:
-    specs: list[tuple[str, Model]] = [(name, EXPECTATIONS[name].spec.model_validate(body)) for name, body in expect]
-    for name, spec in specs:
-        assert EXPECTATIONS[name].check(spec, ROBOT, SCENE, ("go", "wait_1")) == ()
+SETTING = Setting(ROBOT, SCENE, ("go", "wait_1"))
+
+
+def expectations(*expect: dict[str, Any]) -> tuple[ExpectationSpec, ...]:
+    """As they are written under `expect:`."""
+    task = {"task": "t", "robot": "r", "controllers": "c", "steps": [{"wait": "1 s"}], "expect": list(expect)}
+    return task_spec().model_validate(task).expect
+
+
+def judged(made: Recording, *expect: tuple[str, Any] | dict[str, Any]) -> Verdict:
+    specs = expectations(*(written if isinstance(written, dict) else {written[0]: written[1]} for written in expect))
+    for spec in specs:
+        assert expectation_problems(spec, SETTING, CONDITIONS) == ()
     return judge(made, expect=specs, robot=ROBOT, scene=SCENE)
 
 
@@ -213,14 +224,19 @@ def test_the_word_of_a_second_expectation_is_numbered() -> None:
 def test_tracking_names_the_worst_joint_its_unit_and_its_moment(column: int) -> None:
     made = recording()
     trace = made.controllers[0]
-    position = trace.position.copy()
-    position[70, column] = -0.08
-    position[90, 1 - column] = 0.06
-    found = one(changed(made, controllers=(replace(trace, position=position),)), "tracking", group="all", within=0.05)
+    reference = trace.reference_position.copy()
+    reference[70, column] = -0.08
+    reference[90, 1 - column] = 0.06
+    found = one(
+        changed(made, controllers=(replace(trace, reference_position=reference),)), "tracking", group="all", within=0.05
+    )
     assert found.outcome == "failed"
     assert found.margin == pytest.approx(-0.03)
     assert found.at == pytest.approx(0.7)
-    assert (found.unit, found.text) == (("rad", "joint 'j1'"), ("m", "joint 'slide'"))[column]
+    assert (found.unit, found.text) == (
+        ("rad", "joint 'j1' is 4.58 deg from its reference; within 2.86 deg"),
+        ("m", "joint 'slide' is 80 mm from its reference; within 50 mm"),
+    )[column]
 
 
 def test_tracking_without_a_reference_is_not_evaluated() -> None:
@@ -346,10 +362,10 @@ def test_a_recording_is_judged_the_same_in_spans_of_any_length(length: int) -> N
     """Bodies move all the time, and every kind of expectation has its worst moment somewhere else."""
     made = moved(1, 160, (0.0, 0.015, 0.0), 170)
     trace = made.controllers[0]
-    position = trace.position.copy()
-    position[70, 1] = -0.04
+    reference = trace.reference_position.copy()
+    reference[70, 1] = -0.04
     touching = touches((0.2, "desk", "robot/one", 2.0), (0.9, "desk", "robot/finger", 5.0)).contacts
-    made = changed(made, controllers=(replace(trace, position=position),), contacts=touching)
+    made = changed(made, controllers=(replace(trace, reference_position=reference),), contacts=touching)
     cut = replace(made, spans=[_ticks(made, k, k + length) for k in range(0, T, length)])
     expect: tuple[tuple[str, dict[str, Any]], ...] = (
         ("near", {"object": "cube", "to": "start", "within": 0.02}),
@@ -419,13 +435,6 @@ def test_the_same_recording_gives_the_same_verdict() -> None:
 def test_unknown_names_are_told_before_anything_runs(
     name: str, written: dict[str, Any], loc: tuple[str | int, ...], hint: str
 ) -> None:
-    member = EXPECTATIONS[name]
-    (problem,) = member.check(member.spec.model_validate(written), ROBOT, SCENE, ("go", "wait_1"))
-    assert (problem.loc, problem.hint) == (loc, hint)
-
-
-def test_what_was_expected_is_told_in_the_units_of_people() -> None:
-    upright = EXPECTATIONS["upright"].spec(object="cup", within="5 deg")
-    assert describe(upright) == "object: cup, within: 5 deg"
-    near = EXPECTATIONS["near"].spec(object="cup", to=[0.5, 0.2, 0.225], within=0.02)
-    assert describe(near) == "object: cup, to: [0.5, 0.2, 0.225], within: 20 mm"
+    (spec,) = expectations({name: written})
+    (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
+    assert (problem.loc, problem.hint) == ((name, *loc), hint)

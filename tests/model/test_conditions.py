@@ -1,7 +1,9 @@
-"""Each condition: its margin by hand on good and spoilt states, and the same value live and over time."""
+"""Conditions on where things are: their margins by hand on good and spoilt states, and the same for any cut."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,8 +12,10 @@ import pytest
 
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Condition, World, needs_physics
+from manipcli.model.condition import Condition, Setting, World
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading
 from manipcli.model.robot import Group, Joint, JointLimits, JointType, Link, NamedPose, RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
@@ -62,35 +66,54 @@ ROBOT, SCENE = arm(), scene()
 
 
 def state(
-    position: npt.ArrayLike = (0.0, 0.0, 0.0),
-    poses: dict[str, Transform] | None = None,
-    linear: dict[str, tuple[float, float, float]] | None = None,
-    angular: dict[str, tuple[float, float, float]] | None = None,
+    position: npt.ArrayLike = (0.0, 0.0, 0.0), poses: dict[str, Transform] | None = None, *, time: float = 0.0
 ) -> WorldState:
-    """The start, with some bodies elsewhere or moving."""
+    """The start, with some bodies elsewhere."""
     where = [(poses or {}).get(body.name, body.X_WO) for body in SCENE.movable]
-    names = [body.name for body in SCENE.movable]
     return WorldState(
-        time=np.array(0.0),
+        time=np.array(time),
         position=np.array(position, dtype=float),
         velocity=np.zeros(3),
         effort=np.zeros(3),
         body_position=np.array([X.p for X in where]),
         body_quat_xyzw=np.array([X.quat_xyzw for X in where]),
-        body_linear=np.array([(linear or {}).get(name, (0, 0, 0)) for name in names], dtype=float),
-        body_angular=np.array([(angular or {}).get(name, (0, 0, 0)) for name in names], dtype=float),
+        body_linear=np.full((len(where), 3), np.nan),
+        body_angular=np.full((len(where), 3), np.nan),
     )
+
+
+def moments(*states: WorldState) -> Moments:
+    """Successive states, of which the first is that before the first tick where there are several."""
+    shown = states[1:] or states
+    joined = WorldState(
+        *(np.stack([getattr(one, name) for one in shown]) for name in WorldState.__slots__)  # type: ignore[attr-defined]
+    )
+    return Moments(joined, states[0] if len(states) > 1 else None, (), (), ())
 
 
 WORLD = World(robot=ROBOT, scene=SCENE, start=state())
 
 
-def margin(name: str, now: WorldState, **written: Any) -> float:
-    condition = CONDITIONS[name]
+def opened(name: str, **written: Any) -> Any:
+    condition: Condition[Any] = CONDITIONS[name]
     spec = condition.spec.model_validate(written)
-    assert condition.check(spec, ROBOT, SCENE) == ()
-    value = condition.margin(spec, WORLD, now)
-    assert value.shape == ()
+    assert condition.check(spec, Setting(ROBOT, SCENE)) == ()
+    assert condition.absent(spec, WORLD) is None
+    return condition.open(spec, WORLD)
+
+
+def read(name: str, *states: WorldState, **written: Any) -> Reading:
+    found: Reading = opened(name, **written)(moments(*states))
+    return found
+
+
+def margin(name: str, now: WorldState, **written: Any) -> float:
+    found = read(name, now, **written)
+    (value,) = found.margins
+    told = found.found(0)
+    assert (told.margin, told.at) == (value, now.time)
+    assert told.unit in CONDITIONS[name].units
+    assert np.sign(found.relative[0]) == np.sign(value)
     return float(value)
 
 
@@ -172,14 +195,81 @@ def test_near_a_frame_follows_the_body_that_it_hangs_on() -> None:
     assert margin("near", now, object="ball", to="rim", within=0.05) == pytest.approx(0.03, abs=1e-12)
 
 
+def test_outside_is_the_opposite_of_inside() -> None:
+    for p in ((0.5, 0.5, 0.024), (0.67, 0.63, 0.03)):
+        inside = margin("inside", ball_at(*p), object="ball", of="tray")
+        assert margin("outside", ball_at(*p), object="ball", of="tray") == -inside
+
+
+def after(dt: float, **poses: Transform) -> tuple[WorldState, WorldState]:
+    """The start, and `dt` later."""
+    return state(), state(poses=poses, time=dt)
+
+
+def moved_by(name: str, xyz: tuple[float, float, float], rpy: tuple[float, float, float] = (0, 0, 0)) -> Transform:
+    start = SCENE.body(name).X_WO
+    return Transform.of(xyz=start.p + np.array(xyz), R=Transform.of(rpy=rpy).R @ start.R)
+
+
 def test_at_rest_is_what_is_left_of_the_speed_of_the_middle() -> None:
     assert margin("at_rest", state(), object="ball") == 0.001
-    moving = state(linear={"ball": (0.003, 0.0, 0.004)})
-    assert margin("at_rest", moving, object="ball") == pytest.approx(-0.004)
-    # The stick spins about its middle, 0.1 m above its origin: the origin moves, the middle does not.
-    spinning = state(linear={"stick": (-0.1, 0.0, 0.0)}, angular={"stick": (0.0, 1.0, 0.0)})
-    assert margin("at_rest", spinning, object="stick", below=0.01) == pytest.approx(0.01)
-    assert margin("at_rest", spinning, object="tray", below=0.01) == 0.01
+    still = read("at_rest", *after(0.001), object="ball")
+    assert still.margins == pytest.approx([0.001])
+    moving = read("at_rest", *after(0.001, ball=moved_by("ball", (3e-6, 0, 4e-6))), object="ball")
+    assert moving.margins == pytest.approx([-0.004])
+    # The stick turns about its middle, 0.1 m above its origin: the origin moves, the middle does not.
+    angle = 1e-3
+    turned = moved_by("stick", (-0.1 * np.sin(angle), 0.0, 0.1 * (1 - np.cos(angle))), (0.0, angle, 0.0))
+    spinning = read("at_rest", *after(0.001, stick=turned), object="stick", below=0.01)
+    assert spinning.margins == pytest.approx([0.01], abs=1e-4)  # a chord is shorter than its arc by angle^2 / 24
+    assert read("at_rest", *after(0.001), object="tray", below=0.01).margins == [0.01]
+
+
+@pytest.mark.parametrize(
+    ("pose", "by", "expected", "text"),
+    [
+        # The tray's top is at 0.05, its edges at x 0.35..0.65, y 0.4..0.6; the cup is 0.11 high and 0.08 wide.
+        (Transform.of(xyz=(0.5, 0.5, 0.12)), 0.0, 0.07, "'cup' is 70 mm above the top of 'tray'"),
+        (Transform.of(xyz=(0.5, 0.5, 0.12)), 0.1, -0.03, "'cup' is 70 mm above the top of 'tray'; at least 100 mm"),
+        (Transform.of(xyz=(0.5, 0.5, 0.04)), 0.0, -0.01, "'cup' is 10 mm below the top of 'tray'"),
+        (Transform.of(xyz=(0.62, 0.5, 1.0)), 0.0, 0.03, "the centre of 'cup' is 30 mm inside the edge of 'tray'"),
+        (Transform.of(xyz=(0.5, 0.65, 1.0)), 0.0, -0.05, "the centre of 'cup' is 50 mm beyond the edge of 'tray'"),
+    ],
+)
+def test_above_is_the_gap_or_the_way_to_the_edge(pose: Transform, by: float, expected: float, text: str) -> None:
+    found = read("above", state(poses={"cup": pose}), object="cup", of="tray", by=by)
+    assert found.margins == pytest.approx([expected], abs=1e-12)
+    assert found.found(0).text == text
+
+
+def test_above_looks_at_what_is_lowest_of_what_lies() -> None:
+    # The stick is 0.02 thick and 0.2 long; from its bottom it leans by 30 degrees towards x.
+    leaning = Transform.of(xyz=(0.5, 0.5, 0.2), rpy=(0, np.pi / 6, 0))
+    found = read("above", state(poses={"stick": leaning}), object="stick", of="tray", by=0.1)
+    assert found.margins == pytest.approx([0.05 - 0.01 * np.sin(np.pi / 6)])
+
+
+def test_moved_and_unmoved_count_from_the_first_tick_that_is_shown() -> None:
+    poses = [moved_by("cup", (0.01 * k, 0, 0)) for k in range(5)]
+    states = [state(poses={"cup": X}, time=0.1 * k) for k, X in enumerate(poses)]
+    moved = opened("moved", object="cup", by=0.025)
+    both = [moved(moments(states[1], states[1], states[2])), moved(moments(*states[2:]))]
+    assert np.concatenate([one.margins for one in both]) == pytest.approx([-0.025, -0.015, -0.005, 0.005])
+    unmoved = read("unmoved", states[0], *states[2:], object="cup", within=0.015)
+    assert unmoved.margins == pytest.approx([0.015, 0.005, -0.005])
+    assert unmoved.found(2).text == "'cup' moved by 20 mm; at most 15 mm"
+
+
+def test_a_turn_is_a_motion_too_and_the_lesser_share_decides() -> None:
+    states = [state(time=0.1), state(time=0.2), state(poses={"cup": moved_by("cup", (0, 0, 0), (0, 0, 0.3))}, time=0.3)]
+    turned = read("unmoved", *states, object="cup", within=0.01, turn=0.2)
+    # Both turn about the cup's middle: 1 of 1 of the way is left, but of the turn less than nothing.
+    worst = turned.found(1)
+    assert (worst.margin, worst.unit, worst.at) == (pytest.approx(-0.1), "rad", 0.3)
+    assert worst.text == "'cup' turned by 17.2 deg; at most 11.5 deg"
+    assert read("moved", *states, object="cup", turn=0.2).margins[-1] == pytest.approx(0.1)
+    both = read("moved", *states, object="cup", turn=0.2, by=0.05).found(1)
+    assert (both.margin, both.unit) == (pytest.approx(-0.05), "m")
 
 
 def test_at_pose_is_what_is_left_of_the_worst_joint() -> None:
@@ -199,36 +289,42 @@ SPECS: list[tuple[str, dict[str, Any]]] = [
     ("near", {"object": "tray", "to": "drop", "within": 0.1}),
     ("near", {"object": "ball", "to": [0, 0, 0], "within": 0.1}),
     ("at_rest", {"object": "stick"}),
+    ("outside", {"object": "stick", "of": "cup"}),
+    ("above", {"object": "stick", "of": "cup", "by": 0.1}),
+    ("above", {"object": "cup", "of": "tray"}),
+    ("moved", {"object": "cup", "by": 0.1, "turn": 0.1}),
+    ("unmoved", {"object": "cup", "within": 0.1}),
     ("at_rest", {"object": "tray"}),
     ("at_pose", {"pose": "home"}),
 ]
 
 
 @pytest.mark.parametrize(("name", "written"), SPECS)
-@pytest.mark.parametrize("lead", [(7,), (2, 3), (0,)])
-def test_many_states_at_once_give_what_each_gives_alone(
-    name: str, written: dict[str, Any], lead: tuple[int, ...]
+@pytest.mark.parametrize("cuts", [(1,), (1, 2, 3), (5,)])
+def test_all_ticks_at_once_give_what_pieces_of_them_give(
+    name: str, written: dict[str, Any], cuts: tuple[int, ...]
 ) -> None:
     rng = np.random.default_rng(1)
-    m = len(SCENE.movable)
-    quats = rng.normal(size=(*lead, m, 4))
+    m, T = len(SCENE.movable), 7
+    quats = rng.normal(size=(T, m, 4))
+    nothing = np.full((T, m, 3), np.nan)
     many = WorldState(
-        time=rng.normal(size=lead),
-        position=rng.normal(size=(*lead, 3)),
-        velocity=rng.normal(size=(*lead, 3)),
-        effort=rng.normal(size=(*lead, 3)),
-        body_position=rng.normal(size=(*lead, m, 3)),
+        time=np.arange(T) * 0.1,
+        position=rng.normal(size=(T, 3)),
+        velocity=rng.normal(size=(T, 3)),
+        effort=rng.normal(size=(T, 3)),
+        body_position=rng.normal(size=(T, m, 3)),
         body_quat_xyzw=quats / np.linalg.norm(quats, axis=-1, keepdims=True),
-        body_linear=rng.normal(size=(*lead, m, 3)),
-        body_angular=rng.normal(size=(*lead, m, 3)),
+        body_linear=nothing,
+        body_angular=nothing,
     )
-    condition = CONDITIONS[name]
-    spec = condition.spec.model_validate(written)
-    together = condition.margin(spec, WORLD, many)
-    assert together.shape == lead
-    for index in np.ndindex(lead):
-        one = WorldState(**{field: getattr(many, field)[index] for field in WorldState.__slots__})
-        np.testing.assert_allclose(together[index], condition.margin(spec, WORLD, one), rtol=0, atol=1e-12)
+    whole = Moments(many, None, (), (), ())
+    together = opened(name, **written)(whole)
+    assert together.margins.shape == (T,)
+    gauge = opened(name, **written)
+    pieces = [gauge(whole.part(a, b)) for a, b in pairwise((0, *cuts, T))]
+    np.testing.assert_array_equal(np.concatenate([one.margins for one in pieces]), together.margins)
+    assert [pieces[0].found(0), pieces[-1].found(-1)] == [together.found(0), together.found(T - 1)]
 
 
 @pytest.mark.parametrize(
@@ -242,6 +338,11 @@ def test_many_states_at_once_give_what_each_gives_alone(
         ("near", {"object": "cup", "to": "stat", "within": 0.1}, ("to",), "did you mean 'start'?"),
         ("near", {"object": "cup", "to": "drp", "within": 0.1}, ("to",), "did you mean 'drop'?"),
         ("at_rest", {"object": "trai"}, ("object",), "did you mean 'tray'?"),
+        ("outside", {"object": "ball", "of": "stick"}, ("of",), None),
+        ("above", {"object": "cup", "of": "try"}, ("of",), "did you mean 'tray'?"),
+        ("above", {"object": "cup", "of": "cup"}, ("of",), None),
+        ("moved", {"object": "cop", "by": 0.1}, ("object",), "did you mean 'cup'?"),
+        ("unmoved", {"object": "tray", "within": 0.1}, ("object",), None),
         ("at_pose", {"pose": "hom"}, ("pose",), "did you mean 'home'?"),
         ("at_pose", {"pose": "home", "group": "ram"}, ("group",), None),
         ("at_pose", {"pose": "home", "group": "hand"}, ("group",), None),
@@ -252,7 +353,7 @@ def test_what_robot_and_scene_do_not_know_is_told(
     name: str, written: dict[str, Any], loc: tuple[str, ...], hint: str | None
 ) -> None:
     condition: Condition[Any] = CONDITIONS[name]
-    (problem,) = condition.check(condition.spec.model_validate(written), ROBOT, SCENE)
+    (problem,) = condition.check(condition.spec.model_validate(written), Setting(ROBOT, SCENE))
     assert problem.loc == loc
     assert hint is None or problem.hint == hint
 
@@ -269,4 +370,14 @@ def test_what_robot_and_scene_do_not_know_is_told(
 )
 def test_physics_is_needed_where_a_movable_body_matters(name: str, written: dict[str, Any], needed: bool) -> None:
     condition: Condition[Any] = CONDITIONS[name]
-    assert needs_physics(condition, condition.spec.model_validate(written), SCENE) is needed
+    still = replace(WORLD, physics=False)
+    reason = condition.absent(condition.spec.model_validate(written), still)
+    assert (reason is not None) is needed
+    assert reason is None or "has no physics" in reason
+
+
+def test_what_a_log_leaves_out_is_not_judged() -> None:
+    world = replace(WORLD, unrecorded={"bodies": "no poses"})
+    condition: Condition[Any] = CONDITIONS["upright"]
+    assert condition.absent(condition.spec(object="cup", within=1), world) == "no poses"
+    assert condition.absent(condition.spec(object="tray", within=1), world) is None

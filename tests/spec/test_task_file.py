@@ -78,7 +78,7 @@ class Member:
 
 STEPS = Seam("step", (Member("move", Move), Member("pour", Pour), Member("wait", Wait)))
 CONDITIONS = Seam("condition", (Member("inside", Inside), Member("near", Near)))
-MODEL = task_model(STEPS, CONDITIONS, CONDITIONS)
+MODEL = task_model(STEPS, CONDITIONS)
 
 TASK = """\
 task: pour

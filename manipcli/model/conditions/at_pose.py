@@ -7,12 +7,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.model.condition import Condition, Problem, World
+from manipcli.core.units import readable
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.model.state import WorldState
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle
 
@@ -25,11 +25,22 @@ class AtPoseSpec(Model):
     within: Annotated[Angle, Field(gt=0)] = Field(default=0.02, description="Largest difference of a joint [rad].")
 
 
-def margin(spec: AtPoseSpec, world: World, state: WorldState) -> Array:
-    """`within` minus the largest |q - q_pose| [rad] (...) over the joints."""
+def gauge(spec: AtPoseSpec, world: World) -> Gauge:
+    """`within` minus the largest |q - q_pose| [rad] over the joints."""
     joints, wanted = _targets(spec, world.robot)
-    difference = np.abs(state.position[..., world.robot.indices(joints)] - np.array(wanted))
-    return np.asarray(spec.within - np.max(difference, axis=-1))
+    columns, goal = world.robot.indices(joints), np.array(wanted)
+
+    def look(moments: Moments) -> Reading:
+        away = np.abs(moments.states.position[:, columns] - goal)
+
+        def say(k: int) -> str:
+            worst = int(np.argmax(away[k]))
+            off = readable(float(away[k, worst]), "rad")
+            return f"joint '{joints[worst]}' is {off} from pose '{spec.pose}'; within {readable(spec.within, 'rad')}"
+
+        return reading(spec.within - np.max(away, axis=-1), moments.times, unit="rad", scale=spec.within, say=say)
+
+    return look
 
 
 def _targets(spec: AtPoseSpec, robot: RobotModel) -> tuple[tuple[str, ...], tuple[float, ...]]:
@@ -40,16 +51,15 @@ def _targets(spec: AtPoseSpec, robot: RobotModel) -> tuple[tuple[str, ...], tupl
     return tuple(name for name, _ in pairs), tuple(value for _, value in pairs)
 
 
-def check(spec: AtPoseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: AtPoseSpec, setting: Setting) -> tuple[Problem, ...]:
     """Pose and group exist, have joints in common, and these rotate (an angle cannot bound what slides)."""
+    robot = setting.robot
     problems = []
-    poses, groups = [pose.name for pose in robot.poses], [group.name for group in robot.groups]
+    poses = [pose.name for pose in robot.poses]
     if spec.pose not in poses:
         message = f"'{spec.pose}' is not a pose of robot '{robot.name}'"
         problems.append(Problem(("pose",), message, did_you_mean(spec.pose, poses)))
-    if spec.group is not None and spec.group not in groups:
-        message = f"'{spec.group}' is not a group of robot '{robot.name}'"
-        problems.append(Problem(("group",), message, did_you_mean(spec.group, groups)))
+    problems += unknown_group(robot, spec.group, ("group",))
     if problems:
         return tuple(problems)
     joints, _ = _targets(spec, robot)
@@ -65,8 +75,9 @@ def check(spec: AtPoseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
 AT_POSE = Condition(
     name="at_pose",
     spec=AtPoseSpec,
-    unit="rad",
-    margin=margin,
-    bodies=lambda spec, scene: (),
+    units=("rad",),
+    open=gauge,
     check=check,
+    absent=lambda spec, world: None,
+    example="at_pose: {pose: home, within: 2 deg}",
 )

@@ -7,11 +7,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array, cross, rotate
-from manipcli.model.condition import Condition, Problem, World, unknown_body
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.model.state import WorldState, body_pose
+from manipcli.core.geometry import cross, rotate
+from manipcli.core.units import readable
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
+from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Speed
 
@@ -20,30 +21,39 @@ class AtRestSpec(Model):
     """The object's centre moves slower than `below`."""
 
     object: str = Field(description="A body of the scene.")
-    below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s] under which it is at rest.")
+    below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s]. Default 1 mm/s.")
 
 
-def margin(spec: AtRestSpec, world: World, state: WorldState) -> Array:
-    """`below` minus the speed [m/s] (...) of the object's centre: |v_O + w x R_WO c|, c the centre in O."""
+def gauge(spec: AtRestSpec, world: World) -> Gauge:
+    """`below` minus the speed [m/s] of the object's centre C over the last tick: |v_O + w x R_WO p_OC|."""
     body = world.scene.body(spec.object)
-    if body.fixed:
-        return np.full(np.shape(state.time), spec.below)
-    k = world.scene.movable.index(body)
-    arm = rotate(body_pose(world.scene, state, spec.object).quat_xyzw, body.centre)
-    velocity = state.body_linear[..., k, :] + cross(state.body_angular[..., k, :], arm)
-    return np.asarray(spec.below - np.linalg.norm(velocity, axis=-1))
+
+    def look(moments: Moments) -> Reading:
+        speed = np.zeros(len(moments.times))
+        if not body.fixed:
+            linear, angular = moments.body_velocity(world.scene.movable.index(body))
+            arm = rotate(body_pose(world.scene, moments.states, spec.object).quat_xyzw, body.centre)
+            speed = np.linalg.norm(linear + cross(angular, arm), axis=-1)
+
+        def say(k: int) -> str:
+            return f"'{spec.object}' moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
+
+        return reading(spec.below - speed, moments.times, unit="m/s", scale=spec.below, say=say)
+
+    return look
 
 
-def check(spec: AtRestSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: AtRestSpec, setting: Setting) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(scene, spec.object, ("object",))
+    return unknown_body(setting.scene, spec.object, ("object",))
 
 
 AT_REST = Condition(
     name="at_rest",
     spec=AtRestSpec,
-    unit="m/s",
-    margin=margin,
-    bodies=lambda spec, scene: (spec.object,),
+    units=("m/s",),
+    open=gauge,
     check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object,)),
+    example="at_rest: {object: cup}",
 )

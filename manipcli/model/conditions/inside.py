@@ -1,16 +1,22 @@
-"""`inside`: an object is in the hollow of a container."""
+"""`inside`, `outside`: an object is in the hollow of a container, or not."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array, rotate, rotate_inverse
+from manipcli.core.geometry import Array, rotate_inverse
 from manipcli.core.text import did_you_mean
-from manipcli.model.condition import Condition, Problem, World, unknown_body
-from manipcli.model.robot import Cylinder, RobotModel
+from manipcli.core.units import readable
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
+from manipcli.model.robot import Cylinder
 from manipcli.model.scene import Interior, Scene
 from manipcli.model.state import WorldState, body_pose
+from manipcli.model.where import centres, point_text
 from manipcli.spec.base import Model
 
 
@@ -21,22 +27,53 @@ class InsideSpec(Model):
     of: str = Field(description="A body with a hollow: a cup or a tray.")
 
 
-def margin(spec: InsideSpec, world: World, state: WorldState) -> Array:
-    """Depth [m] (...) of the object's centre in the hollow: the distance to its nearest face, negative outside.
+class OutsideSpec(Model):
+    """The object's centre is not inside the hollow of the container `of` (a cup, a tray)."""
+
+    object: str = Field(description="A body of the scene; its centre is what counts.")
+    of: str = Field(description="A body with a hollow: a cup or a tray.")
+
+
+Spec = InsideSpec | OutsideSpec
+
+
+def gauge(spec: Spec, world: World, *, sign: float) -> Gauge:
+    """Depth [m] of the object's centre in the hollow: the distance to its nearest face, negative outside.
 
     The faces are the hollow's walls, its floor and the plane of its rim. Outside it is minus the distance to the
     hollow. The centre of the object's bounding box is taken, for every shape: a ball that lies on the floor of a
-    deep tray has the margin of its radius, and touching a wall takes nothing away.
+    deep tray has the margin of its radius, and touching a wall takes nothing away. `outside` is the opposite. It is
+    compared, where units differ, to the greatest depth that the hollow has.
     """
-    content, container = world.scene.body(spec.object), world.scene.body(spec.of)
-    interior = container.interior
+    shape = _interior(world.scene, spec.of).shape
+    deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
+
+    def look(moments: Moments) -> Reading:
+        depth = _depth_in(world.scene, moments.states, spec)
+
+        def say(k: int) -> str:
+            word = "deep in" if depth[k] >= 0.0 else "outside"
+            at = point_text(centres(world.scene, moments.states, spec.object), k)
+            return f"'{spec.object}' is {readable(abs(float(depth[k])), 'm')} {word} '{spec.of}', its centre at {at}"
+
+        return reading(sign * depth, moments.times, unit="m", scale=deepest, say=say)
+
+    return look
+
+
+def _interior(scene: Scene, name: str) -> Interior:
+    interior = scene.body(name).interior
     if interior is None:
-        raise ValueError(f"'{spec.of}' has no inside")
-    X_WO, X_WC = body_pose(world.scene, state, spec.object), body_pose(world.scene, state, spec.of)
-    p_W = X_WO.position + rotate(X_WO.quat_xyzw, content.centre)
-    p_C = rotate_inverse(X_WC.quat_xyzw, p_W - X_WC.position)
+        raise ValueError(f"'{name}' has no inside")
+    return interior
+
+
+def _depth_in(scene: Scene, states: WorldState, spec: Spec) -> Array:
+    interior = _interior(scene, spec.of)
+    X_WC = body_pose(scene, states, spec.of)
+    p_C = rotate_inverse(X_WC.quat_xyzw, centres(scene, states, spec.object) - X_WC.position)
     p_S = (p_C - interior.X_OS.p) @ interior.X_OS.R
-    return np.broadcast_to(_depth(interior, p_S), np.shape(state.time)).copy()
+    return np.broadcast_to(_depth(interior, p_S), np.shape(states.time))
 
 
 def _depth(interior: Interior, p_S: Array) -> Array:
@@ -54,8 +91,9 @@ def _depth(interior: Interior, p_S: Array) -> Array:
     return np.asarray(-(outside + np.minimum(np.max(d, axis=-1), 0.0)))
 
 
-def check(spec: InsideSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: Spec, setting: Setting) -> tuple[Problem, ...]:
     """Both bodies exist, differ, and the container has a hollow."""
+    scene = setting.scene
     problems = [*unknown_body(scene, spec.object, ("object",)), *unknown_body(scene, spec.of, ("of",))]
     if problems:
         return tuple(problems)
@@ -72,8 +110,18 @@ def check(spec: InsideSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, .
 INSIDE = Condition(
     name="inside",
     spec=InsideSpec,
-    unit="m",
-    margin=margin,
-    bodies=lambda spec, scene: (spec.object, spec.of),
+    units=("m",),
+    open=partial(gauge, sign=1.0),
     check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    example="inside: {object: ball, of: tray}",
+)
+OUTSIDE = Condition(
+    name="outside",
+    spec=OutsideSpec,
+    units=("m",),
+    open=partial(gauge, sign=-1.0),
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    example="outside: {object: ball, of: cup}",
 )

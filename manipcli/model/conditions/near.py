@@ -9,10 +9,13 @@ from pydantic import Field
 
 from manipcli.core.geometry import Array, rotate
 from manipcli.core.text import did_you_mean
-from manipcli.model.condition import Condition, Problem, World, unknown_body
-from manipcli.model.robot import RobotModel
+from manipcli.core.units import readable
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState, body_pose
+from manipcli.model.where import point_text
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length
 from manipcli.spec.robot import Vector3
@@ -31,11 +34,23 @@ class NearSpec(Model):
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
 
 
-def margin(spec: NearSpec, world: World, state: WorldState) -> Array:
-    """`within` minus the distance [m] (...) between the origin of the object's frame and the target."""
-    p_WO = body_pose(world.scene, state, spec.object).position
-    distance = np.linalg.norm(p_WO - _target(spec, world, state), axis=-1)
-    return np.broadcast_to(spec.within - distance, np.shape(state.time)).copy()
+def gauge(spec: NearSpec, world: World) -> Gauge:
+    """`within` minus the distance [m] between the origin of the object's frame and the target."""
+    called = "its start" if spec.to == START else f"'{spec.to}'" if isinstance(spec.to, str) else "the point"
+
+    def look(moments: Moments) -> Reading:
+        p_WO = body_pose(world.scene, moments.states, spec.object).position
+        target = _target(spec, world, moments.states)
+        distance = np.broadcast_to(np.linalg.norm(p_WO - target, axis=-1), np.shape(moments.times))
+
+        def say(k: int) -> str:
+            away = readable(float(distance[k]), "m")
+            where = f"'{spec.object}' is at {point_text(p_WO, k)}, {away} from {called} at {point_text(target, k)}"
+            return f"{where}; within {readable(spec.within, 'm')}"
+
+        return reading(spec.within - distance, moments.times, unit="m", scale=spec.within, say=say)
+
+    return look
 
 
 def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
@@ -53,8 +68,9 @@ def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
     return body_pose(world.scene, state, spec.to).position
 
 
-def check(spec: NearSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: NearSpec, setting: Setting) -> tuple[Problem, ...]:
     """The body exists, and so does the target."""
+    scene = setting.scene
     problems = unknown_body(scene, spec.object, ("object",))
     if isinstance(spec.to, str):
         known = (START, *(frame.name for frame in scene.frames), *(body.name for body in scene.bodies))
@@ -72,4 +88,12 @@ def bodies(spec: NearSpec, scene: Scene) -> tuple[str, ...]:
     return (spec.object, parents.get(spec.to, spec.to))
 
 
-NEAR = Condition(name="near", spec=NearSpec, unit="m", margin=margin, bodies=bodies, check=check)
+NEAR = Condition(
+    name="near",
+    spec=NearSpec,
+    units=("m",),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: unmoving(world, bodies(spec, world.scene)),
+    example="near: {object: cup, to: start, within: 2 cm}",
+)

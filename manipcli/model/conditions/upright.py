@@ -7,11 +7,12 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array, rotate
-from manipcli.model.condition import Condition, Problem, World, unknown_body
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.model.state import WorldState, body_pose
+from manipcli.core.geometry import rotate
+from manipcli.core.units import readable
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
+from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle
 
@@ -23,24 +24,34 @@ class UprightSpec(Model):
     within: Annotated[Angle, Field(gt=0)] = Field(description="Largest tilt [rad].")
 
 
-def margin(spec: UprightSpec, world: World, state: WorldState) -> Array:
-    """`within` minus the tilt [rad] (...), the angle between the object's z axis and the world's, 0 to pi."""
-    z_W = rotate(body_pose(world.scene, state, spec.object).quat_xyzw, np.array([0.0, 0.0, 1.0]))
-    # atan2 and not arccos: exact near 0, where the margin is judged.
-    tilt = np.arctan2(np.hypot(z_W[..., 0], z_W[..., 1]), z_W[..., 2])
-    return np.broadcast_to(spec.within - tilt, np.shape(state.time)).copy()
+def gauge(spec: UprightSpec, world: World) -> Gauge:
+    """`within` minus the tilt [rad], the angle between the object's z axis and the world's, 0 to pi."""
+
+    def look(moments: Moments) -> Reading:
+        z_W = rotate(body_pose(world.scene, moments.states, spec.object).quat_xyzw, np.array([0.0, 0.0, 1.0]))
+        # atan2 and not arccos: exact near 0, where the margin is judged.
+        tilt = np.arctan2(np.hypot(z_W[..., 0], z_W[..., 1]), z_W[..., 2])
+        tilts = np.broadcast_to(tilt, np.shape(moments.times))
+
+        def say(k: int) -> str:
+            return f"'{spec.object}' leans {readable(float(tilts[k]), 'rad')}; within {readable(spec.within, 'rad')}"
+
+        return reading(spec.within - tilts, moments.times, unit="rad", scale=spec.within, say=say)
+
+    return look
 
 
-def check(spec: UprightSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
+def check(spec: UprightSpec, setting: Setting) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(scene, spec.object, ("object",))
+    return unknown_body(setting.scene, spec.object, ("object",))
 
 
 UPRIGHT = Condition(
     name="upright",
     spec=UprightSpec,
-    unit="rad",
-    margin=margin,
-    bodies=lambda spec, scene: (spec.object,),
+    units=("rad",),
+    open=gauge,
     check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object,)),
+    example="upright: {object: cup, within: 5 deg}",
 )

@@ -1,0 +1,165 @@
+"""A run as conditions see it while it goes on: the same moments, ten ticks at a time, that its recording will hold.
+
+Contacts pass the filter of the recorder and times are rounded as in the log, so that what a probe answers live is what
+judging the log gives for the same ticks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from manipcli.control.controller import Controller, ControllerOutput
+from manipcli.flow.log import recorded
+from manipcli.model.condition import World
+from manipcli.model.conditions import CONDITIONS
+from manipcli.model.formula import absent, opened
+from manipcli.model.moments import Moments, Reference, StepTime, Touching
+from manipcli.model.reading import Reading
+from manipcli.model.state import Contact, WorldState
+from manipcli.record.channels import ControllerChannel
+from manipcli.record.contact_filter import ContactFilter
+from manipcli.simulate.session import SLOW
+from manipcli.spec.condition import ConditionSpec
+
+Told = Callable[[Moments, Reading], None]
+"""Sees every answer of a probe: some ticks, and the margins on them."""
+
+
+class Probe:
+    """A condition that is asked while the run goes on, from the tick at which it was opened."""
+
+    def __init__(self, spec: ConditionSpec, world: World, first: int, told: Told | None) -> None:
+        self._gauge = opened(spec, world, CONDITIONS)
+        self._first = first
+        self._told = told
+        self.holds = False
+        """Whether it held at the last tick that was looked at."""
+
+    def look(self, moments: Moments, start: int) -> None:
+        """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""
+        skipped = max(self._first - start, 0)
+        if skipped >= len(moments.times):
+            return
+        shown = moments.part(skipped, len(moments.times))
+        answer = self._gauge(shown)
+        self.holds = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
+        if self._told is not None:
+            self._told(shown, answer)
+
+
+class Live:
+    """Gathers ticks and asks the open probes at every tenth; an observer beside the recorder.
+
+    Args:
+        world: of the run.
+        controllers: in the order of the outputs given to `tick`.
+        period: [s] of a tick.
+    """
+
+    def __init__(self, world: World, controllers: Sequence[Controller], period: float) -> None:
+        self._world = world
+        self._period = period
+        self._probes: dict[Probe, str | None] = {}
+        self._steps = {name: StepTime(name, None, None, "") for name in world.steps}
+        self._filter = ContactFilter()
+        self._contacts: list[Touching] = []
+        self._before: WorldState | None = None
+        n, m = len(world.robot.joint_names), len(world.scene.movable)
+        self._states = WorldState(
+            time=np.zeros(SLOW),
+            position=np.zeros((SLOW, n)),
+            velocity=np.zeros((SLOW, n)),
+            effort=np.zeros((SLOW, n)),
+            body_position=np.zeros((SLOW, m, 3)),
+            body_quat_xyzw=np.zeros((SLOW, m, 4)),
+            body_linear=np.full((SLOW, m, 3), np.nan),
+            body_angular=np.full((SLOW, m, 3), np.nan),
+        )
+        self._references = [
+            (k, Reference(controller.joints, np.full((SLOW, len(controller.joints)), np.nan)))
+            for k, controller in enumerate(controllers)
+            if isinstance(recorded(controller), ControllerChannel)
+        ]
+        self._count = 0
+        self._next = 0
+
+    def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
+        """The next tick; the arrays may be reused afterwards."""
+        k, states = self._count, self._states
+        states.time[k] = self._moment(tick)
+        states.position[k] = state.position
+        states.velocity[k] = state.velocity
+        states.effort[k] = state.effort
+        states.body_position[k] = state.body_position
+        states.body_quat_xyzw[k] = state.body_quat_xyzw
+        for index, reference in self._references:
+            output = outputs[index]
+            reference.position[k] = np.nan if output is None else output.position
+        self._count, self._next = k + 1, tick + 1
+        if self._count == SLOW or self._next % SLOW == 0:
+            self._ask()
+
+    def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
+        """Everything that touches; told before the tick."""
+        changed = self._filter.changed(tick * self._period, contacts)
+        if changed is not None:
+            self._contacts.append(Touching(self._moment(tick), tuple(changed)))
+
+    def step_started(self, step: str) -> None:
+        """The next tick is the first of a step."""
+        if self._steps[step].started is None:
+            self._steps[step] = StepTime(step, self._moment(self._next), None, "")
+
+    def step_ended(self, step: str, outcome: str) -> None:
+        """The last tick was the last of a step; what was to be asked until then is closed."""
+        for probe in [probe for probe, until in self._probes.items() if until == step]:
+            self.close(probe)
+        self._steps[step] = StepTime(step, self._steps[step].started, self._moment(self._next), outcome)
+
+    def absent(self, spec: ConditionSpec) -> str | None:
+        """Why a condition cannot be asked in this run, or None."""
+        return absent(spec, self._world, CONDITIONS)
+
+    def open(self, spec: ConditionSpec, *, step: str | None = None, told: Told | None = None) -> Probe:
+        """Ask a condition from the next tick on, until it is closed.
+
+        Args:
+            spec: one that is not `absent`.
+            step: it is closed when this step ends.
+            told: called with every answer.
+        """
+        probe = Probe(spec, self._world, self._next, told)
+        self._probes[probe] = step
+        return probe
+
+    def close(self, probe: Probe) -> None:
+        """Ask it about the ticks since it was asked last, and no more."""
+        del self._probes[probe]
+        if self._count:
+            probe.look(self._moments(), self._next - self._count)
+
+    def _ask(self) -> None:
+        moments = self._moments()
+        start = self._next - self._count
+        for probe in self._probes:
+            probe.look(moments, start)
+        last = self._count - 1
+        self._before = self._states.map(lambda a: a[last].copy())
+        self._contacts = self._contacts[-1:]
+        self._count = 0
+
+    def _moments(self) -> Moments:
+        count = self._count
+        return Moments(
+            states=self._states.map(lambda a: a[:count]),
+            before=self._before,
+            references=tuple(Reference(one.joints, one.position[:count]) for _, one in self._references),
+            contacts=tuple(self._contacts),
+            steps=tuple(self._steps.values()),
+        )
+
+    def _moment(self, tick: int) -> float:
+        """The time of a tick as the log has it: whole nanoseconds."""
+        return round(tick * self._period * 1e9) / 1e9

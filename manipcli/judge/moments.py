@@ -1,0 +1,91 @@
+"""The spans of a recording as moments for conditions: in the order of robot and scene, with the contacts that hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from manipcli.judge.verdict import StepOutcome
+from manipcli.model.condition import Seen
+from manipcli.model.moments import Moments, Reference, StepTime, Touching
+from manipcli.model.reading import NotEvaluated
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import WorldState
+from manipcli.record.channels import CONTACTS, TF
+from manipcli.record.recording import Recording, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Where the robot's joints and the scene's movable bodies stand in the recorded arrays."""
+
+    joints: list[int]
+    bodies: list[int]
+
+    @staticmethod
+    def of(recording: Recording, robot: RobotModel, scene: Scene) -> Order | NotEvaluated:
+        """The order, or what is missing in the recording."""
+        bodies = tuple(body.name for body in scene.movable)
+        for kind, wanted, there in (
+            ("joint", robot.joint_names, recording.joint_names),
+            ("body", bodies, recording.body_names),
+        ):
+            missing = [name for name in wanted if name not in there]
+            if missing:
+                return NotEvaluated(f"the recording does not hold {kind} '{missing[0]}'")
+        return Order(
+            [recording.joint_names.index(name) for name in robot.joint_names],
+            [recording.body_names.index(name) for name in bodies],
+        )
+
+    def applied(self, s: WorldState) -> WorldState:
+        """The states in the order of robot and scene."""
+        joints, bodies = self.joints, self.bodies
+        return WorldState(
+            time=s.time,
+            position=s.position[:, joints],
+            velocity=s.velocity[:, joints],
+            effort=s.effort[:, joints],
+            body_position=s.body_position[:, bodies],
+            body_quat_xyzw=s.body_quat_xyzw[:, bodies],
+            body_linear=s.body_linear[:, bodies],
+            body_angular=s.body_angular[:, bodies],
+        )
+
+
+def unrecorded(recording: Recording) -> dict[Seen, str]:
+    """Why nothing is known of what the task told not to record."""
+    words: dict[Seen, str] = {"bodies": TF, "contacts": CONTACTS, "references": "/controller_state"}
+    absent = {
+        seen: [topic for topic in recording.absent if topic == word or (seen == "references" and topic.endswith(word))]
+        for seen, word in words.items()
+    }
+    return {
+        seen: f"the log holds no {topics[0]}: `record:` of the task leaves it out"
+        for seen, topics in absent.items()
+        if topics
+    }
+
+
+class MomentsOfSpans:
+    """Spans in, moments out, one after the other; keeps what the next ones need of the last."""
+
+    def __init__(self, order: Order, steps: Sequence[StepOutcome]) -> None:
+        self._order = order
+        self._steps = tuple(
+            StepTime(one.id, one.started, one.ended, "" if one.ended is None else one.outcome) for one in steps
+        )
+        self._last: Moments | None = None
+
+    def next(self, span: Span) -> Moments:
+        """The ticks of the span, of which there is one at least."""
+        held = self._last.contacts[-1:] if self._last is not None else ()
+        self._last = Moments(
+            states=self._order.applied(span.states),
+            before=None if self._last is None else self._last.states.map(lambda a: a[-1]),
+            references=tuple(Reference(trace.joints, trace.reference_position) for trace in span.controllers),
+            contacts=(*held, *(Touching(one.time, one.contacts) for one in span.contacts)),
+            steps=self._steps,
+        )
+        return self._last

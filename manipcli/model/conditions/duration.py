@@ -1,0 +1,47 @@
+"""`duration`: it is over in time."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from manipcli.model.condition import Condition, Gauge, World
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading, reading
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Time
+
+
+class TimeTakenSpec(Model):
+    """The simulated time of the whole run, or of the step that is looked at, is `below` this."""
+
+    below: Annotated[Time, Field(gt=0)] = Field(description="Longest simulated time [s].")
+
+
+def gauge(spec: TimeTakenSpec, world: World) -> Gauge:
+    """`below` minus the time [s] since the first tick."""
+    started: list[float] = []
+
+    def look(moments: Moments) -> Reading:
+        if not started:
+            started.append(float(moments.times[0]))
+        passed = moments.times - started[0]
+
+        def say(k: int) -> str:
+            return f"{passed[k]:.3f} s of {spec.below:g} s"
+
+        return reading(spec.below - passed, moments.times, unit="s", scale=spec.below, say=say)
+
+    return look
+
+
+DURATION = Condition(
+    name="duration",
+    spec=TimeTakenSpec,
+    units=("s",),
+    open=gauge,
+    check=lambda spec, setting: (),
+    absent=lambda spec, world: None,
+    example="duration: {below: 60 s}",
+)

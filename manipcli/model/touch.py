@@ -1,0 +1,50 @@
+"""Parts that touch, as files name them: a body, `robot` (any of its links), `robot/LINK`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manipcli.core.text import did_you_mean
+from manipcli.model.condition import Problem, Setting
+from manipcli.model.state import Contact
+
+ROBOT = "robot"
+
+
+def between(pair: tuple[str, str], contact: Contact) -> bool:
+    """Whether the contact is one of the two with each other."""
+    first, second = pair
+    a, b = contact.a, contact.b
+    return (is_part(first, a) and is_part(second, b)) or (is_part(first, b) and is_part(second, a))
+
+
+def is_part(written: str, part: str) -> bool:
+    """Whether `part` of a contact is what was written, or one of its links."""
+    return written == part or (written == ROBOT and part.startswith(f"{ROBOT}/"))
+
+
+def grips(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
+    """How hard each link of the robot presses on a body [N], the hardest first."""
+    found: dict[str, float] = {}
+    for contact in contacts:
+        other = contact.b if contact.a == body else contact.a if contact.b == body else ""
+        if other.startswith(f"{ROBOT}/"):
+            found[other] = found.get(other, 0.0) + contact.force
+    return sorted(((force, link) for link, force in found.items()), reverse=True)
+
+
+def held_force(contacts: Sequence[Contact], body: str) -> float:
+    """The force [N] of the second hardest link on a body: what holds it between two; 0 where fewer touch."""
+    found = grips(contacts, body)
+    return found[1][0] if len(found) > 1 else 0.0
+
+
+def unknown_part(setting: Setting, name: str, loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+    """Empty if `name` is a body, the robot, or one of its links."""
+    bodies = tuple(body.name for body in setting.scene.bodies)
+    links = tuple(f"{ROBOT}/{link.name}" for link in setting.robot.links)
+    if name == ROBOT or name in bodies or name in links:
+        return ()
+    known = links if name.startswith(f"{ROBOT}/") else (ROBOT, *bodies)
+    message = f"'{name}' is neither a body of the scene nor a part of the robot"
+    return (Problem(loc, message, did_you_mean(name, known)),)

@@ -1,0 +1,190 @@
+"""How margins combine: the robust semantics of signal temporal logic, against every tick computed one by one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manipcli.model.reading import (
+    Extreme,
+    Measured,
+    NotEvaluated,
+    Reading,
+    greatest,
+    least,
+    named,
+    opposite,
+    reading,
+)  # fmt: skip
+
+T = 5
+TIMES = np.arange(T) * 0.1
+UNITS = {"m": 0.02, "rad": 0.1, "N": 5.0}
+"""With the tolerance of every margin in them."""
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One condition: its name, its unit, its margins, and where it applies."""
+
+    name: str
+    unit: str
+    margins: tuple[float, ...]
+    applies: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Node:
+    """`all`, `any` or `not` of others."""
+
+    word: str
+    members: tuple[Node | Leaf, ...]
+
+
+values = st.floats(-1.0, 1.0, allow_subnormal=False).map(lambda x: round(x, 3))
+leaves = st.builds(
+    Leaf,
+    st.sampled_from("abcd"),
+    st.sampled_from(sorted(UNITS)),
+    st.tuples(*[values] * T),
+    st.tuples(*[st.sampled_from([True, True, True, False])] * T),
+)
+formulas = st.recursive(
+    leaves,
+    lambda inner: st.one_of(
+        st.builds(Node, st.just("not"), st.tuples(inner)),
+        st.builds(Node, st.sampled_from(["all", "any"]), st.lists(inner, min_size=1, max_size=3).map(tuple)),
+    ),
+    max_leaves=8,
+)
+
+
+def of(formula: Node | Leaf) -> Reading:
+    """As the program combines it."""
+    if isinstance(formula, Leaf):
+        own = reading(
+            np.array(formula.margins),
+            TIMES,
+            unit=formula.unit,
+            scale=UNITS[formula.unit],
+            say=lambda k: f"{formula.margins[k]:g} {formula.unit}",
+            applies=np.array(formula.applies),
+            idle=f"{formula.name} rests",
+        )
+        return named(own, formula.name)
+    members = [of(one) for one in formula.members]
+    if formula.word == "not":
+        return opposite(members[0], word="not ")
+    return least(members) if formula.word == "all" else greatest(members)
+
+
+def units_of(formula: Node | Leaf) -> set[str]:
+    if isinstance(formula, Leaf):
+        return {formula.unit}
+    return set().union(*(units_of(one) for one in formula.members))
+
+
+def by_hand(formula: Node | Leaf, k: int) -> tuple[float, str, bool]:
+    """Margin and unit at tick `k`, and whether it applies there; each node orders its members by the rule."""
+    if isinstance(formula, Leaf):
+        return formula.margins[k], formula.unit, formula.applies[k]
+    members = [by_hand(one, k) for one in formula.members]
+    applies = all(one[2] for one in members)
+    if formula.word == "not":
+        return -members[0][0], members[0][1], applies
+    mixed = len(units_of(formula)) > 1
+    pick = min if formula.word == "all" else max
+    margin, unit, _ = pick(members, key=lambda one: one[0] / UNITS[one[1]] if mixed else one[0])
+    return margin, unit, applies
+
+
+def holds(formula: Node | Leaf, k: int) -> bool | None:
+    """Plain logic; None on the edge, where a margin of zero means nothing."""
+    if isinstance(formula, Leaf):
+        return None if formula.margins[k] == 0.0 else formula.margins[k] > 0.0
+    members = [holds(one, k) for one in formula.members]
+    if formula.word == "not":
+        return None if members[0] is None else not members[0]
+    decides = formula.word == "any"
+    if decides in members:
+        return decides
+    return None if None in members else not decides
+
+
+@given(formulas)
+@settings(max_examples=150, deadline=None)
+def test_every_tick_is_that_of_its_deciding_member(formula: Node | Leaf) -> None:
+    found = of(formula)
+    assert set(found.units) == units_of(formula)
+    for k in range(T):
+        margin, unit, applies = by_hand(formula, k)
+        told = found.found(k)
+        assert (found.margins[k], bool(found.applies[k])) == (margin, applies)
+        assert (told.margin, told.unit, told.at) == (margin, unit, TIMES[k])
+        assert told.text.endswith(f"{told.unit}")
+        truth = holds(formula, k)
+        assert truth is None or truth == (margin > 0.0)
+
+
+@given(formulas, st.sampled_from(["least", "greatest"]), st.sets(st.integers(1, T - 1)))
+@settings(max_examples=150, deadline=None)
+def test_over_time_it_is_the_extreme_of_what_applies_wherever_it_is_cut(
+    formula: Node | Leaf, pick: str, cuts: set[int]
+) -> None:
+    found = of(formula)
+    ticks = [(*by_hand(formula, k), k) for k in range(T)]
+    mixed = len(units_of(formula)) > 1
+    order = [(one[0] / UNITS[one[1]] if mixed else one[0], one[3]) for one in ticks if one[2]]
+    pieces, whole = Extreme(pick), Extreme(pick)  # type: ignore[arg-type]
+    whole.add(found, TIMES)
+    for first, last in pairwise(sorted({0, T, *cuts})):
+        pieces.add(found, TIMES, first, last)
+    assert pieces.found == whole.found
+    if not order:
+        assert isinstance(whole.found, NotEvaluated)
+        assert whole.found.reason.endswith("rests")
+        return
+    value = (min if pick == "least" else max)(one[0] for one in order)
+    first = next(k for one, k in order if one == value)
+    assert isinstance(whole.found, Measured)
+    assert (whole.found.margin, whole.found.at) == (ticks[first][0], TIMES[first])
+
+
+def test_signs_come_before_sizes_where_units_differ() -> None:
+    tilt = reading(np.array([0.5, -0.001]), TIMES[:2], unit="rad", scale=0.1, say=lambda k: "tilt")
+    near = reading(np.array([0.01, 0.019]), TIMES[:2], unit="m", scale=0.02, say=lambda k: "near")
+    both = least([tilt, near])
+    assert [both.found(k).unit for k in (0, 1)] == ["m", "rad"]
+    assert both.relative == pytest.approx([0.5, -0.01])
+    extreme = Extreme("least")
+    extreme.add(both, TIMES[:2])
+    assert extreme.found == Measured(-0.001, "rad", 0.1, "tilt")
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_a_number_is_never_lost(bad: float) -> None:
+    broken = reading(np.array([1.0, bad, 1.0]), TIMES[:3], unit="m", scale=1.0, say=lambda k: "broken")
+    fine = reading(np.full(3, -0.5), TIMES[:3], unit="m", scale=1.0, say=lambda k: "fine")
+    for pick in ("least", "greatest"):
+        extreme = Extreme(pick)  # type: ignore[arg-type]
+        extreme.add(broken, TIMES[:3], 2)
+        extreme.add(broken, TIMES[:3], 0, 2)
+        assert extreme.found == NotEvaluated("the recorded state is not finite at t = 0.100 s", "m")
+    if math.isnan(bad):
+        for combined in (least([fine, broken]), greatest([fine, broken]), opposite(broken)):
+            extreme = Extreme("least")
+            extreme.add(combined, TIMES[:3])
+            assert isinstance(extreme.found, NotEvaluated)
+
+
+def test_nothing_looked_at_is_nothing_found() -> None:
+    extreme = Extreme("least")
+    assert extreme.found is None
+    extreme.add(reading(np.ones(2), TIMES[:2], unit="m", scale=1.0, say=str), TIMES[:2], 1, 1)
+    assert extreme.found is None
