@@ -8,19 +8,25 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import Format
+from manipcli.cli.options import AllowOutside, Format, PackagePath
+from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import ExitCode
 
 
 def judge(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="An .mcap file of a run.", show_default=False)],
     *,
+    report: ReportFile = None,
+    junit: JunitFile = None,
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
     format_: Format = "text",
 ) -> ExitCode:
     """Judge the log of a run again.
 
-    Nothing but the file is read, and the verdict stored in it is not looked at.
+    Nothing but the file is read, and the verdict stored in it is not looked at; for --report, the meshes, too.
     """
+    outputs = Outputs(report, junit, others=(log,))
     from manipcli import pipeline
     from manipcli.report import json, text
     from manipcli.report.run_report import exit_code
@@ -28,4 +34,6 @@ def judge(
     verdict = pipeline.judge_log(log)
     render = json.render_verdict if format_ == "json" else text.render_verdict
     console.result(render(verdict, str(log)))
+    if outputs.wanted:
+        outputs.of_log(log, verdict, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     return exit_code(verdict)

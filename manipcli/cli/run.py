@@ -10,6 +10,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, TaskFile
+from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import ExitCode
 
 
@@ -28,6 +29,8 @@ def run(
     embed_meshes: Annotated[
         bool, typer.Option("--embed-meshes", help="Put the mesh files into the log: it needs no package then.")
     ] = False,
+    report_file: ReportFile = None,
+    junit: JunitFile = None,
     seed: Seed = None,
     overrides: Overrides = None,
     format_: Format = "text",
@@ -43,27 +46,44 @@ def run(
     to_stdout = log is not None and str(log) == "-"
     if to_stdout:
         refuse_stdout(format_)
+    outputs = Outputs(report_file, junit, others=(task, None if to_stdout else log), quiet=quiet)
     with Interrupts() as interrupts, stdout_or(log) as path:
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
         from manipcli.report import json, text
         from manipcli.report.run_report import exit_code
 
+        folders, words = tuple(package_path or ()), tuple(overrides or ())
         with StepProgress(verbose=verbose, quiet=quiet, interrupts=interrupts) as progress:
             report = pipeline.run_task(
                 task,
-                overrides=tuple(overrides or ()),
+                overrides=words,
                 seed=seed,
                 log=path,
                 force=force,
                 embed_meshes=embed_meshes,
-                package_path=tuple(package_path or ()),
+                package_path=folders,
                 allow_outside=allow_outside,
                 progress=progress,
             )
+        written = report.log
         if to_stdout:
             report = replace(report, log="stdout" if report.log is not None else None)
             console.talk(text.render_run(report, verbose=verbose))
         else:
             console.result(json.render_run(report) if format_ == "json" else text.render_run(report, verbose=verbose))
+        if outputs.wanted and written is not None:
+            outputs.of_log(
+                Path(written),
+                report.verdict,
+                task=task,
+                overrides=words,
+                package_path=folders,
+                allow_outside=allow_outside,
+            )
+        elif outputs.wanted:
+            refused = pipeline.load_task(
+                task, overrides=words, seed=seed, package_path=folders, allow_outside=allow_outside
+            )
+            outputs.of_refusal(refused, report.verdict, task)
         return exit_code(report.verdict)

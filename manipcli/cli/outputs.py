@@ -1,0 +1,107 @@
+"""Files about a run that `run` and `judge` write besides what they print: `--report`, `--junit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.core.errors import Finding, InvalidInput
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from manipcli.flow.load import Task
+    from manipcli.judge.verdict import Verdict
+
+ReportFile = Annotated[
+    Path | None,
+    typer.Option("--report", metavar="FILE.html", help="Write one page for a person: verdict, cause, replay, numbers."),
+]
+JunitFile = Annotated[
+    Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write the verdict as JUnit XML, for CI.")
+]
+
+
+class Outputs:
+    """What is asked for; looked at before anything is run.
+
+    Args:
+        report, junit: where each goes, or None.
+        others: files that the same command writes or reads.
+        quiet: tell nothing.
+
+    Raises:
+        InvalidInput: a file cannot be written there.
+    """
+
+    def __init__(
+        self, report: Path | None, junit: Path | None, *, others: Sequence[Path | None] = (), quiet: bool = False
+    ) -> None:
+        self._report, self._junit, self._quiet = report, junit, quiet
+        taken = [other.resolve() for other in others if other is not None]
+        for option, path in (("--report", report), ("--junit", junit)):
+            if path is None:
+                continue
+            if path.resolve() in taken:
+                raise InvalidInput([Finding("USE081", f"{option} '{path}': the same command has that file already")])
+            if path.is_dir() or not path.parent.is_dir():
+                what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
+                raise InvalidInput([Finding("USE082", f"{option} '{path}': {what}")])
+            taken.append(path.resolve())
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is anything to write."""
+        return self._report is not None or self._junit is not None
+
+    def of_log(
+        self,
+        log: Path,
+        verdict: Verdict,
+        *,
+        task: Path | None = None,
+        overrides: Sequence[str] = (),
+        package_path: Sequence[Path] = (),
+        allow_outside: bool = False,
+    ) -> None:
+        """Writes what is asked for about a log; each file is there whole or not at all.
+
+        Args:
+            log: that was judged.
+            verdict: on it.
+            task, overrides: its file and what was set in it, where the command knows it.
+            package_path, allow_outside: where the meshes may be.
+        """
+        from manipcli.flow.report import file_places, log_page, log_places
+        from manipcli.record.reading import open_recording
+        from manipcli.report.html import render_page
+        from manipcli.report.junit import render_junit
+
+        if self._junit is not None:
+            places = file_places(task, overrides) if task is not None else log_places(open_recording(log), log)
+            file = str(task) if task is not None else ""
+            self._write(self._junit, render_junit(verdict, *places, log=log.name, file=file))
+        if self._report is not None:
+            page = log_page(log, task_file=task, package_path=package_path, allow_outside=allow_outside)
+            self._write(self._report, render_page(page).encode())
+
+    def of_refusal(self, task: Task, verdict: Verdict, file: Path) -> None:
+        """Writes what is asked for about a task of which a step cannot be planned."""
+        from manipcli.flow.report import refused_page, task_places
+        from manipcli.report.html import render_page
+        from manipcli.report.junit import render_junit
+
+        if self._junit is not None:
+            self._write(self._junit, render_junit(verdict, *task_places(task.file), file=str(file)))
+        if self._report is not None:
+            self._write(self._report, render_page(refused_page(task, verdict)).encode())
+
+    def _write(self, path: Path, data: bytes) -> None:
+        from manipcli.core.whole_file import write_whole
+
+        write_whole(path, data)
+        if not self._quiet:
+            console.talk(f"written: {path}")

@@ -1,0 +1,246 @@
+"""A log, or a task that was refused, to the page about it and to what CI reads of it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from manipcli import __version__
+from manipcli.flow.load import Task
+from manipcli.flow.log import CONTROLLERS, ROBOT, TASK, attached, recorded_robot, recorded_scene
+from manipcli.flow.replay import open_playback
+from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.steps import PLAN_FILE
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import Recording
+from manipcli.replay.playback import RATE, Playback
+from manipcli.replay.shots import Shots, telling
+from manipcli.report.facts import run_facts
+from manipcli.report.quantity import quantity
+from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+from manipcli.spec.base import Model
+from manipcli.spec.load import load_task as load_spec
+from manipcli.spec.load import load_task_text
+from manipcli.spec.located import Located
+from manipcli.spec.task import TaskSpec
+
+PICTURE = (480, 360)
+"""Width and height of the picture of a step [pixel]."""
+MOMENT = (800, 600)
+"""Of that of the moment at which the run failed."""
+QUALITY = 82
+"""Of WebP files, 0 to 100."""
+FRAMES = 1500
+"""Of the replay in a page, so that the page of a long run does not grow without end."""
+
+Places = tuple[tuple[Written, ...], tuple[Written, ...]]
+"""Of the steps, and of the expectations, of a task."""
+
+
+def log_page(
+    path: Path, *, task_file: Path | None = None, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> RunPage:
+    """The page about a log, from nothing but the log and the files of its meshes.
+
+    Args:
+        path: the log of a run, or what a killed run left of it.
+        task_file: the task, where that is known: meshes are looked for near the files that it names, too.
+        package_path, allow_outside: see `open_playback`.
+
+    Raises:
+        InvalidInput: the file is no log of ours, is damaged, or holds no tick.
+    """
+    recording = open_recording(path)
+    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
+    near = _near(task_file, task) if task_file is not None else ()
+    playback = open_playback(
+        path, rate=_rate(recording), package_path=(*package_path, *near), allow_outside=allow_outside
+    )
+    verdict = playback.verdict
+    assert verdict is not None, "the log is one of ours"
+    places = log_places(recording, path)
+    causes = _causes(verdict, places, end=playback.end)
+    with Shots(playback, size=PICTURE, captions=False) as shots:
+        pictures = {step.id: _picture(shots, telling(playback, step), PICTURE) for step in playback.steps}
+    moment = None
+    if causes and causes[0].at is not None:
+        with Shots(playback, size=MOMENT, captions=False) as shots:
+            moment = _picture(shots, causes[0].at, MOMENT)
+    return RunPage(
+        verdict=verdict,
+        log=path.name,
+        lost=recording.lost,
+        causes=causes,
+        steps=places[0],
+        expectations=places[1],
+        limits=tuple(_limit(one.body) for one in task.expect),
+        facts=run_facts(recording, recorded_robot(recording, path), recorded_scene(recording, path), verdict.steps),
+        playback=playback,
+        pictures=pictures,
+        moment=moment,
+        sources=tuple(
+            Source(name, recording.attachments[name].decode("utf-8", "replace"))
+            for name in (TASK, ROBOT, CONTROLLERS)
+            if name in recording.attachments
+        ),
+        provenance=_provenance(recording, verdict, path),
+        hashes=_hashes(recording, path),
+        notes=playback.notes,
+    )
+
+
+def refused_page(task: Task, verdict: Verdict) -> RunPage:
+    """The page about a task of which a step cannot be planned: there is no log, and the file is shown as written."""
+    places = task_places(task.file)
+    causes = _causes(verdict, places, end=None)
+    file = Path(task.file.place().file)
+    return RunPage(
+        verdict=verdict,
+        causes=causes,
+        steps=places[0],
+        expectations=places[1],
+        limits=(None,) * len(verdict.expectations),
+        sources=(Source(file.name, file.read_text("utf-8", "replace")),),
+        provenance=(
+            ("manipcli", __version__),
+            ("engine", verdict.engine),
+            ("seed", str(verdict.seed)),
+            ("run", "nothing was run"),
+        ),
+    )
+
+
+def log_places(recording: Recording, path: Path) -> Places:
+    """Where the log says that steps were written, and the lines of steps and expectations in the resolved task."""
+    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
+    known = _step_places(recording)
+    steps = tuple(
+        Written(known.get(str(step.id), "").rpartition(":")[0], TASK, task.place("steps", k).line)
+        for k, step in enumerate(task.spec.steps)
+    )
+    return steps, tuple(Written("", TASK, task.place("expect", k).line) for k in range(len(task.spec.expect)))
+
+
+def task_places(task: Located[TaskSpec]) -> Places:
+    """Where steps and expectations stand in the file of a task."""
+
+    def written(*key: str | int) -> Written:
+        place = task.place(*key)
+        name = Path(place.file).name
+        return Written(f"{name}:{place.line}", name, place.line) if place.line > 0 else Written("")
+
+    steps = tuple(written("steps", k) for k in range(len(task.spec.steps)))
+    return steps, tuple(written("expect", k) for k in range(len(task.spec.expect)))
+
+
+def file_places(path: Path, overrides: Sequence[str]) -> Places:
+    """The same of a task file that is read for this alone.
+
+    Raises:
+        InvalidInput: it cannot be used.
+    """
+    return task_places(load_spec(path, model=task_spec(), overrides=overrides))
+
+
+def _step_places(recording: Recording) -> dict[str, str]:
+    """Where each step was written, `pour.yaml:21:5`, by its id; of those begun, where the plan does not say."""
+    places = {event.step: event.place for event in recording.events if event.place}
+    try:
+        # Any: what a file holds is not known before it is looked at.
+        plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
+        return places | {str(step["id"]): str(step["place"]) for step in plan["steps"]}
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return places
+
+
+def _near(task_file: Path, task: TaskSpec) -> tuple[Path, ...]:
+    """Where the packages of a task's robot and of its scene may be."""
+    folder = task_file.resolve().parent
+    robot = (folder / task.robot).resolve().parent
+    return (robot, *list(robot.parents)[:2], folder)
+
+
+def _rate(recording: Recording) -> float:
+    last = max((event.time for event in recording.events), default=0.0)
+    return min(RATE, FRAMES / last) if last > 0.0 else RATE
+
+
+def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cause, ...]:
+    """Errors, then steps that went wrong, then expectations that are not met. `end` [s]: None where nothing was run."""
+    if verdict.verdict == "passed":
+        return ()
+    hint = next((finding.hint for finding in verdict.errors if finding.hint), None) or ""
+    causes = []
+    if verdict.verdict == "error":
+        causes = [Cause(finding.message, "", end, hint=finding.hint or "") for finding in verdict.errors]
+        hint = ""
+    for step, written in zip(verdict.steps, places[0], strict=False):
+        if step.outcome not in ("done", "not_run"):
+            at = None if end is None else step.ended if step.ended is not None else end
+            causes.append(Cause(f"step '{step.id}' {_STEP_WORDS[step.outcome]}", step.text, at, written, hint))
+            hint = ""
+    for one, written in zip(verdict.expectations, places[1], strict=False):
+        if one.outcome != "passed" and end is not None:
+            causes.append(Cause(f"expectation '{one.name}' {_missed(one)}", one.text, one.at, written))
+    failing = [step for step in verdict.steps if step.outcome not in ("done", "not_run")]
+    if verdict.verdict == "failed" and not failing and _before_or_after(verdict):
+        causes.insert(0, Cause(verdict.text, "", end))
+    return tuple(causes)
+
+
+_STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
+
+
+def _missed(one: ExpectationOutcome) -> str:
+    if one.outcome == "not_evaluated":
+        return "was never evaluated"
+    return f"fails by {quantity(abs(one.margin), one.unit)}" if one.margin else "fails"
+
+
+def _before_or_after(verdict: Verdict) -> bool:
+    """Whether the run ended before its first step or after its last: neither a step nor an expectation says why."""
+    undone: list[StepOutcome] = [step for step in verdict.steps if step.outcome == "not_run"]
+    return bool(undone) or all(one.outcome == "passed" for one in verdict.expectations)
+
+
+def _limit(spec: Model) -> float | None:
+    """What a margin is measured from: conditions and expectations call it `within` or `below`."""
+    for key in ("within", "below"):
+        value = getattr(spec, key, None)
+        if isinstance(value, float) and value > 0.0:
+            return value
+    return None
+
+
+def _picture(shots: Shots, time: float, size: tuple[int, int]) -> Picture:
+    from PIL import Image
+
+    run: Playback = shots.playback
+    stream = io.BytesIO()
+    Image.fromarray(shots.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
+    return Picture(float(run.times[run.index(time)]), stream.getvalue(), size)
+
+
+def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tuple[str, str], ...]:
+    run = recording.metadata.get("run", {})
+    return (
+        ("log", path.name),
+        *recording.metadata.get("versions", {}).items(),
+        ("engine", verdict.engine),
+        ("seed", str(verdict.seed)),
+        ("control period", f"{1e3 * recording.period:g} ms"),
+        ("run", run.get("status", "") or "did not come to its end"),
+    )
+
+
+def _hashes(recording: Recording, path: Path) -> tuple[tuple[str, str], ...]:
+    """SHA-256 of the log, of the files that it carries, and of the meshes."""
+    with path.open("rb") as file:
+        log = hashlib.file_digest(file, "sha256").hexdigest()
+    carried = {name: hashlib.sha256(data).hexdigest() for name, data in recording.attachments.items()}
+    return ((path.name, log), *carried.items(), *recording.metadata.get("meshes", {}).items())

@@ -1,0 +1,183 @@
+"""The sections of the page that measure a run: grasps, tracking and limits, energy and power."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.core.units import readable
+from manipcli.report.facts import JointFacts, RunFacts, Use
+from manipcli.report.holds import HoldFacts, Slip, Spread
+from manipcli.report.html_parts import heading, meter, number, of_limit, percent, seek, table
+from manipcli.report.markup import Markup, element, joined
+from manipcli.report.quantity import quantity
+
+
+def grasps(facts: RunFacts) -> Markup | None:
+    """What was held, how hard, and how it moved in the hand."""
+    if not facts.holds:
+        return None
+    rows = []
+    for hold in facts.holds:
+        one = hold.hold
+        how = one.ended if one.lifted is not None else f"never lifted, {one.ended}"
+        links = f"{_few(hold.touching)} touch: {', '.join(hold.links)}" if hold.links else "none touches"
+        rows.append(
+            (
+                joined(element("b", one.body), element("small", f"{one.grasped:.2f} to {one.until:.2f} s: {how}")),
+                _forces(hold),
+                element("small", links),
+                _slip(hold.slip, "m"),
+                _slip(hold.turn, "rad"),
+                seek(one.grasped),
+            )
+        )
+    about = (
+        "From the end of the closing motion until the object stands again or is not touched. Force: the sum of the "
+        "normal forces of the robot's links. Slip: how far the middle of the object moved in the tool frame since then."
+    )
+    return element(
+        "section",
+        heading("grasps", "Grasps", about),
+        table(("object", "contact force", "links", "slip", "turn", "from"), rows, stacks=True),
+    )
+
+
+def _few(touching: Spread) -> str:
+    least, most = round(touching.least), round(touching.most)
+    return f"{least}" if least == most else f"{least} to {most}, on average {touching.mean:.1f},"
+
+
+def _forces(hold: HoldFacts) -> Markup:
+    force = hold.force
+    about = f"{number(force.least, 'N')} to {number(force.most, 'N')}"
+    return joined(element("b", number(force.mean, "N")), element("small", f"on average; {about}"))
+
+
+def _slip(slip: Slip | None, unit: str) -> Markup:
+    if slip is None:
+        return joined("–")
+    last = f"at {slip.at:.2f} s; {quantity(slip.last, unit)} at the end"
+    return joined(element("b", quantity(slip.most, unit)), element("small", last))
+
+
+def joints(facts: RunFacts) -> Markup | None:
+    """Tracking and limits of each joint."""
+    if not facts.joints:
+        return None
+    cut = any(joint.saturated for joint in facts.joints)
+    rows = []
+    for k, joint in enumerate(facts.joints):
+        row = [
+            element("b", joint.name),
+            _error(joint),
+            "–" if joint.error_rms is None else quantity(joint.error_rms, joint.unit),
+            _sparkline(facts, facts.errors[:, k], joint),
+            _position(joint),
+            _use(joint.velocity, f"{joint.unit}/s"),
+            _use(joint.effort, "N" if joint.unit == "m" else "N m"),
+        ]
+        rows.append((*row, _ticks(joint.saturated, facts.period) if cut else None))
+    headers = ["joint", "largest error", "RMS", "error over time", "position", "velocity", "effort"]
+    shown = [tuple(cell or "" for cell in row[: len(headers) + cut]) for row in rows]
+    worn = ", ".join(f"{name} {_ticks(count, facts.period)}" for name, count in facts.actuators)
+    about = (
+        "Error: measured against the reference of its controller; each curve is drawn to its own height. Limits: how "
+        "much of each was used at the nearest approach; of a position, of the way from the middle to its limit."
+    )
+    return element(
+        "section",
+        heading("joints", "Tracking and limits", about),
+        table([*headers, *(["cut at limits"] if cut else [])], shown, numbers=("RMS",), stacks=True),
+        element("p", f"Actuators that had no more to give: {worn}.", class_="about") if worn else None,
+    )
+
+
+def _ticks(count: int, period: float) -> str:
+    return f"{count} ticks ({number(count * period, 's')})" if count else "–"
+
+
+def _error(joint: JointFacts) -> Markup:
+    if joint.error is None:
+        return joined(element("small", "no reference"))
+    return element("span", element("b", quantity(joint.error.value, joint.unit)), seek(joint.error.at), class_="at")
+
+
+def _position(joint: JointFacts) -> Markup:
+    use = joint.position
+    if use is None:
+        return joined(element("small", "no limit"))
+    away = quantity(abs(use.limit - use.value), joint.unit)
+    beyond = "beyond" if use.share > 1.0 else "from"
+    return _meter(use, f"{away} {beyond} {readable(use.limit, joint.unit)}".replace("-", "−"))
+
+
+def _use(use: Use | None, unit: str) -> Markup:
+    return joined(element("small", "no limit")) if use is None else _meter(use, of_limit(use.value, use.limit, unit))
+
+
+def _meter(use: Use, told: str) -> Markup:
+    return element(
+        "span",
+        element("span", percent(use.share), class_="share"),
+        meter(use.share, told=f"{told} at {use.at:.2f} s", mark=False),
+        element("small", told),
+        class_="seeks use",
+        data_seek=f"{use.at:.6f}",
+    )
+
+
+def _sparkline(facts: RunFacts, errors: Array, joint: JointFacts) -> Markup:
+    """|error| over the run, filled, and where steps begin."""
+    known = np.nan_to_num(errors)
+    top = float(known.max())
+    if joint.error is None or top <= 0.0:
+        return joined(element("small", "none" if joint.error is not None else ""))
+    high = 24.0 - 22.0 * known / top
+    count = len(known)
+    points = " ".join(f"{240.0 * (k + 0.5) / count:.1f},{y:.1f}" for k, y in enumerate(high.tolist()))
+    length = max(facts.end - facts.start, 1e-9)
+    begins = [240.0 * (step.started - facts.start) / length for step in facts.steps[1:]]
+    told = f"error of {joint.name}: at most {quantity(joint.error.value, joint.unit)}"
+    drawn = (
+        *(element("line", x1=x, x2=x, y1="0", y2="24") for x in begins),
+        element("polygon", points=f"0,24 {points} 240,24"),
+    )
+    svg = element(
+        "svg", *drawn, class_="spark", viewBox="0 0 240 24", preserveAspectRatio="none", role="img", aria_label=told
+    )
+    return element("span", svg, class_="seeks", data_seek=f"{joint.error.at:.6f}", title=told)
+
+
+def energy(facts: RunFacts) -> Markup | None:
+    """Work and power, by joint and by step."""
+    if not facts.steps:
+        return None
+    columns = [step.id for step in facts.steps]
+    given, taken = (sum(getattr(one, key) for one in facts.joints) for key in ("given", "taken"))
+    peak = max(step.total.value for step in facts.steps)
+    sums = [
+        _work(given, taken, peak),
+        *(_work(float(one.given.sum()), float(one.taken.sum()), one.total.value) for one in facts.steps),
+    ]
+    rows = []
+    for k, joint in enumerate(facts.joints):
+        cells = [_work(float(one.given[k]), float(one.taken[k]), float(one.power[k])) for one in facts.steps]
+        rows.append((element("b", joint.name), _work(joint.given, joint.taken, joint.power.value), *cells))
+    headers = ("", "whole run", *columns)
+    about = (
+        "Mechanical energy that the joints gave: the integral of effort times velocity where that is positive; what "
+        "they took back; and the largest power, of all joints that which they gave together."
+    )
+    return element(
+        "section",
+        heading("energy", "Energy and power", about),
+        table(headers, [(element("b", "all joints"), *sums)], numbers=headers[1:]),
+        element("details", element("summary", "each joint"), table(headers, rows, numbers=headers[1:])),
+    )
+
+
+def _work(given: float, taken: float, power: float) -> Markup:
+    return joined(
+        number(given, "J"), element("small", f"{number(taken, 'J')} back"), element("small", number(power, "W"))
+    )
