@@ -71,7 +71,7 @@ def rewrite_log() -> Rewrite:
     """Writes a log once more with the mcap library, all its checksums valid.
 
     `message(topic, message)` gives the bytes that take the place of a message's, or None to leave it out;
-    `attachment(name, data)` and `metadata(name, values)` what takes the place of those.
+    `attachment(name, data)` and `metadata(name, values)` give what takes the place of those, or None.
     """
 
     def rewrite(
@@ -80,7 +80,7 @@ def rewrite_log() -> Rewrite:
         *,
         message: Callable[[str, Message], bytes | None] = lambda _, one: one.data,
         attachment: Callable[[str, bytes], bytes | None] = lambda _, data: data,
-        metadata: Callable[[str, dict[str, str]], dict[str, str]] = lambda _, values: values,
+        metadata: Callable[[str, dict[str, str]], dict[str, str] | None] = lambda _, values: values,
         chunk_size: int = 1 << 20,
     ) -> Path:
         with source.open("rb") as file, target.open("wb") as out:
@@ -100,7 +100,9 @@ def rewrite_log() -> Rewrite:
                 if data is not None:
                     writer.add_attachment(held.create_time, held.log_time, held.name, held.media_type, data)
             for record in reader.iter_metadata():
-                writer.add_metadata(record.name, metadata(record.name, record.metadata))
+                values = metadata(record.name, record.metadata)
+                if values is not None:
+                    writer.add_metadata(record.name, values)
             for _, channel, one in reader.iter_messages(log_time_order=False):
                 data = message(channel.topic, one)
                 if data is not None:

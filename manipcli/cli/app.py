@@ -18,6 +18,7 @@ from manipcli.cli import (
     check,
     check_urdf,
     console,
+    diff,
     info,
     judge,
     plan,
@@ -56,6 +57,7 @@ app.command("judge")(judge.judge)
 app.command("info")(info.info)
 app.command("at")(at.at)
 app.command("repair")(repair.repair)
+app.command("diff")(diff.diff)
 app.command("plot")(plot.plot)
 app.command("view")(view.view)
 app.command("replay")(replay.replay)
