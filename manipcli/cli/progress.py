@@ -59,6 +59,14 @@ class StepProgress:
         if self._verbose and not self._live and not self._quiet:
             console.talk(f"{self._head}: started")
 
+    def told(self, text: str, *, detail: bool) -> None:
+        """Something that was not planned happened in the step that is on; a `detail` is told to the verbose."""
+        if self._quiet or (detail and not self._verbose):
+            return
+        if self._live:
+            console.redraw("")
+        console.talk(f"{self._head}: {text}")
+
     def tick(self, simulated_time: float, wall: float) -> None:
         """Called often, so it does nothing unless a drawing is due. Both times in s from the start."""
         self._may_stop()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
+from manipcli.core.text import listed
 from manipcli.judge.examine import examine
 from manipcli.judge.expectation import Seams
 from manipcli.judge.steps import step_outcomes
@@ -33,8 +34,9 @@ def judge(
     """Judge a recording by what its task expected.
 
     The order of importance: a run that was interrupted, did not end or has lost its end is an `error`, whatever else is
-    true of it; a step that is not done makes it `failed`; so does an expectation that is not met, or could not be
-    evaluated. With no expectations the steps alone decide, and the text says so.
+    true of it; a step that is not done makes it `failed`, unless it was tolerated (`on_fail: continue`); so does an
+    expectation that is not met, or could not be evaluated. With no expectations the steps alone decide, and the text
+    says so.
 
     Args:
         recording: the log.
@@ -86,9 +88,9 @@ def _verdict(
     """The word, and in one line why. `cause`: what ended the simulation, in a step, before the first or after all."""
     if errors:
         return "error", errors[0].message
-    if cause and all(step.outcome in ("done", "not_run") for step in steps):
+    if cause and all(step.outcome in ("done", "not_run") or step.tolerated for step in steps):
         return "failed", cause
-    undone = next((step for step in steps if step.outcome != "done"), None)
+    undone = next((step for step in steps if step.outcome != "done" and not step.tolerated), None)
     if undone is not None:
         why = f": {undone.text}" if undone.text else ""
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ')}{why}"
@@ -99,6 +101,9 @@ def _verdict(
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
     done = f"all {len(steps)} steps done" if len(steps) > 1 else "its one step done"
+    failed = [step.id for step in steps if step.tolerated]
+    if failed:
+        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, and {listed(failed)} may fail"
     if not expectations:
         return "passed", f"{done}; the task states no expectations"
     met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "its one expectation met"

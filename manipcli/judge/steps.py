@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any, get_args
 
-from manipcli.judge.verdict import StepOutcome, StepWord
+from manipcli.judge.verdict import Attempt, StepOutcome, StepWord
 from manipcli.record.recording import Recording, TaskEvent
 
 PLAN_FILE = "plan.json"
@@ -17,7 +18,7 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
     """One outcome a step, in the order of the plan; without a plan in the log, in the order they started.
 
     A step that started and never ended was `interrupted` when the run was, else `failed`; one that never started is
-    `not_run`. Of several ends of one step (a retry) the last counts.
+    `not_run`. Of several attempts at one step the last counts.
     """
     planned = _planned(recording)
     known = {step_id for step_id, _, _ in planned}
@@ -32,29 +33,36 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
 
 def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:
     mine = [event for event in events if event.step == step_id]
-    started = next((event.time for event in mine if event.kind == "step_started"), None)
-    end = next((event for event in reversed(mine) if event.kind == "step_ended"), None)
-    word: StepWord
-    text = ""
-    if end is not None:
-        word, text = _word(end.outcome), end.text
-        if word != end.outcome:
-            text = f"unknown outcome '{end.outcome}' {text}".rstrip()
-    elif started is None:
-        word = "not_run"
-    elif interrupted:
-        word = "interrupted"
-    else:
-        word, text = "failed", "started and never ended"
+    attempts = tuple(_attempts(mine, interrupted))
+    last = attempts[-1] if attempts else None
     return StepOutcome(
         id=step_id,
         verb=verb,
-        outcome=word,
-        started=started,
-        ended=None if end is None else end.time,
+        outcome="not_run" if last is None else last.outcome,
+        started=None if last is None else attempts[0].started,
+        ended=None if last is None else last.ended,
         planned_duration=duration,
-        text=text,
+        text="" if last is None else last.text,
+        attempts=attempts,
+        tolerated=bool(mine) and mine[-1].kind == "step_tolerated",
+        replanned=tuple(event.text for event in mine if event.kind == "replanned"),
     )
+
+
+def _attempts(events: Sequence[TaskEvent], interrupted: bool) -> Iterator[Attempt]:
+    """From each start to the last end before the next one; those of one step."""
+    starts = [k for k, event in enumerate(events) if event.kind == "step_started"]
+    for start, stop in pairwise([*starts, len(events)]):
+        begun = events[start].time
+        end = next((event for event in reversed(events[start:stop]) if event.kind == "step_ended"), None)
+        if end is None:
+            word: StepWord = "interrupted" if interrupted else "failed"
+            yield Attempt(word, begun, None, "" if interrupted else "started and never ended")
+            continue
+        word, text = _word(end.outcome), end.text
+        if word != end.outcome:
+            text = f"unknown outcome '{end.outcome}' {text}".rstrip()
+        yield Attempt(word, begun, end.time, text)
 
 
 def _word(text: str) -> StepWord:

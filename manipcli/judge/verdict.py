@@ -16,8 +16,22 @@ INTERRUPTED = "RUN101"
 
 
 @dataclass(frozen=True, slots=True)
+class Attempt:
+    """One attempt at a step: from when to when [s], and how it ended."""
+
+    outcome: StepWord
+    started: float
+    ended: float | None
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class StepOutcome:
-    """How one step went; times in simulated seconds, None where it never started or ended."""
+    """How one step went; times in simulated seconds, None where it never started or ended.
+
+    `outcome` and `text` are those of the last of `attempts`. `tolerated`: it failed, and the task says that it may.
+    `replanned`: each time that it was planned again while the task ran, why.
+    """
 
     id: str
     verb: str
@@ -26,6 +40,9 @@ class StepOutcome:
     ended: float | None
     planned_duration: float
     text: str = ""
+    attempts: tuple[Attempt, ...] = ()
+    tolerated: bool = False
+    replanned: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,9 @@ from manipcli.plan.step import Grip, Motion, Situation, StepPlan
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.verify import verify
 
+GRAZE = 1e-4
+"""[m] by which a finger that withdraws may come nearer than it was: rounding, and the arm's own curve."""
+
 
 class Draft:
     """The motions of one step. What refuses one is told with its label, unless the step has no other."""
@@ -107,6 +110,23 @@ class Draft:
         with self._told(label):
             trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
         self._add(label, trajectory, None, allowed=allowed)
+
+    def withdraw(self, X_WT: Transform, body: str, *, speed: float = 1.0) -> None:
+        """The tool on a straight line to a pose, away from a `body` that the hand, open now, was closed on.
+
+        Where a finger is nearer to it than the clearance, because it did not sit quite in the middle of the hand, the
+        finger may stay as near as it is, and no nearer.
+        """
+        with self._told("withdraw"):
+            trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
+        near, distance = self._planner.near(self._now, body)
+        if near:
+            query = self._planner.grasping(self._now, body, margin=min(0.0, distance) - GRAZE)
+            times, positions = self._swept(trajectory, None)
+            hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
+            if hit is not None:
+                raise self._planner.refusal(self._now, hit, "would come", f"at t = {hit.time:.2f} s of 'withdraw'")
+        self._add("withdraw", trajectory, None, allowed=near)
 
     def turn(self, label: str, axis: Array, angle: float, *, speed: float = 1.0) -> None:
         """The tool turns in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
@@ -287,8 +307,8 @@ class Draft:
     def _refuse_collision(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, allowed: Pairs
     ) -> None:
-        query = self._planner.query(self._now, allowed)
         times, positions = self._swept(trajectory, grip)
+        query = self._planner.query(self._now, allowed)
         hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
         if hit is not None:
             when = f"at t = {hit.time:.2f} s of '{label}'"

@@ -227,9 +227,16 @@ class Planner:
         there = self.checker.at(situation.bodies, carried=carried, margin=TOUCHING, only=body)
         return frozenset((hit.a, hit.b) for hit in there.every(situation.position))
 
-    def grasping(self, situation: Situation, body: str) -> CollisionQuery:
-        """Touches where the hand, which carries nothing yet, touches this body."""
-        return self.checker.at(situation.bodies, only=body)
+    def grasping(self, situation: Situation, body: str, *, margin: float = 0.0) -> CollisionQuery:
+        """Touches where the hand, which carries nothing, is nearer than the `margin` [m] to this body."""
+        return self.checker.at(situation.bodies, only=body, margin=margin)
+
+    def near(self, situation: Situation, body: str) -> tuple[Pairs, float]:
+        """The parts of the hand, which carries nothing, that are nearer to this body than the clearance, and the least
+        distance [m] among them, negative where they overlap."""
+        hits = self.grasping(situation, body, margin=CLEARANCE).every(situation.position)
+        own = [hit for hit in hits if tuple(reversed((hit.a, hit.b))) in self.hand_contacts(body)]
+        return frozenset((hit.a, hit.b) for hit in own), min((hit.distance for hit in own), default=CLEARANCE)
 
 
 def _within(interior: Interior, X_SP: Transform) -> bool:

@@ -112,6 +112,17 @@ def step_object(step: StepOutcome) -> dict[str, Json]:
         "ended": number(step.ended),
         "planned_duration": number(step.planned_duration),
         "text": step.text,
+        "tolerated": step.tolerated,
+        "attempts": [
+            {
+                "outcome": attempt.outcome,
+                "started": number(attempt.started),
+                "ended": number(attempt.ended),
+                "text": attempt.text,
+            }
+            for attempt in step.attempts
+        ],
+        "replanned": list(step.replanned),
     }
 
 

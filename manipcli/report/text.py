@@ -58,7 +58,7 @@ def describe(finding: Finding) -> str:
 
 def describe_step(step: StepOutcome) -> str:
     """One step as one line, for a log that is read while it grows."""
-    line = f"{step.id}: {step.outcome}"
+    line = f"{step.id}: {_word(step)}{_tries(step)}"
     if step.started is not None and step.ended is not None:
         line += f" ({step.started:.2f} s to {step.ended:.2f} s)"
     return f"{line}: {step.text}" if step.text and step.outcome != "done" else line
@@ -83,14 +83,14 @@ def _causes(verdict: Verdict) -> list[str]:
     if verdict.verdict == "passed":
         return []
     causes = [describe(finding) for finding in verdict.errors]
-    if not causes and all(step.outcome in ("done", "not_run") for step in verdict.steps):
+    if not causes and all(step.outcome in ("done", "not_run") or step.tolerated for step in verdict.steps):
         undone = any(step.outcome == "not_run" for step in verdict.steps)
         if undone or all(expectation.outcome == "passed" for expectation in verdict.expectations):
             return [f"{FAIL} {verdict.text}"]  # it ended before the first step, or after the last
     causes += [
-        f"{FAIL} step '{step.id}' {_STEP_WORDS[step.outcome]}{f': {step.text}' if step.text else ''}"
+        f"{FAIL} step '{step.id}' {_STEP_WORDS[step.outcome]}{_tries(step)}{f': {step.text}' if step.text else ''}"
         for step in verdict.steps
-        if step.outcome not in ("done", "not_run")
+        if step.outcome not in ("done", "not_run") and not step.tolerated
     ]
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
@@ -98,6 +98,15 @@ def _causes(verdict: Verdict) -> list[str]:
         if expectation.outcome != "passed"
     ]
     return causes
+
+
+def _word(step: StepOutcome) -> str:
+    return f"{step.outcome.replace('_', ' ')}{' (may fail)' if step.tolerated else ''}"
+
+
+def _tries(step: StepOutcome) -> str:
+    """How often it was tried, where that was more than once."""
+    return f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
 
 
 _STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
@@ -115,7 +124,7 @@ def _summary(verdict: Verdict) -> str:
 def steps_table(steps: Sequence[StepOutcome]) -> str:
     rows = [
         (
-            f"{PASS if step.outcome == 'done' else FAIL} {step.outcome.replace('_', ' ')}",
+            f"{PASS if step.outcome == 'done' else FAIL} {_word(step)}{_tries(step)}",
             step.id,
             step.verb,
             _seconds(step.started),

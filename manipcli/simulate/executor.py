@@ -20,9 +20,13 @@ from manipcli.simulate.session import SLOW, Session
 
 Until = Callable[[WorldState], bool]
 """Whether the condition that a step waits for holds in a state."""
+Alarm = Callable[[WorldState], str]
+"""What is wrong with the state of a tick, for which everything stops at once; nothing where it may go on."""
 
 UNTIL_TICKS: Final = SLOW
 """Control ticks between two looks at an `until`: at those whose state has the velocities of the bodies."""
+REST: Final = 0.5
+"""How long [s] the robot holds still after it was stopped."""
 PATIENCE: Final = 30.0
 """A motion without a deadline that takes so much longer [s] than planned is given up."""
 
@@ -38,6 +42,10 @@ class MotionEnd:
 DONE: Final = MotionEnd("done")
 
 
+class Alarmed(Exception):
+    """An alarm went off in the tick before; the robot still moves."""
+
+
 class Executor:
     """Carries motions out, one after the other.
 
@@ -45,14 +53,22 @@ class Executor:
         session: what is stepped.
         touch: whether anything can touch; where nothing can, a hand that closed on nothing is no failure.
         told: is told of every goal: the name of the controller, and the handle.
+        alarm: is asked after every tick; `run`, `wait` and `hold` raise `Alarmed` with what it answers.
     """
 
     def __init__(
-        self, session: Session, *, touch: bool = True, told: Callable[[str, GoalHandle], None] | None = None
+        self,
+        session: Session,
+        *,
+        touch: bool = True,
+        told: Callable[[str, GoalHandle], None] | None = None,
+        alarm: Alarm | None = None,
     ) -> None:
         self._session = session
         self._touch = touch
         self._tell = told
+        self._alarm = alarm
+        self._handles: tuple[GoalHandle, ...] = ()
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
         """Send the motion's goals and tick until all are reached and its duration is over.
@@ -61,6 +77,8 @@ class Executor:
             motion: what to do.
             until: waited for in addition, where the motion awaits it.
             deadline: simulated time [s] at which the step's time is over; None: `PATIENCE` after the planned end.
+
+        What does not end well ends with all goals canceled: the controllers bring the joints to rest.
         """
         session = self._session
         given_up = session.time + motion.duration + PATIENCE
@@ -70,15 +88,17 @@ class Executor:
             told = _told(switched)
             if not switched.ok:
                 return MotionEnd("failed", told)
-        handles = self._send(motion)
+        handles = self._handles = self._send(motion)
         last_tick = session.ticks + round(motion.duration / session.period)
         awaited = until if motion.awaits else None
         while True:
-            state = session.tick()
+            state = self._tick()
             for handle in handles:
                 if handle.result is not None and handle.result.status != "succeeded":
+                    self._cancel()
                     return MotionEnd("failed", handle.result.text)
             if session.manager.faults:
+                self._cancel()
                 return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
             if not busy and awaited is not None and session.ticks % UNTIL_TICKS == 0 and awaited(state):
@@ -87,17 +107,17 @@ class Executor:
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
                 why = _late(handles)
-                self._cancel(handles)
+                self._cancel()
                 return MotionEnd("timeout", why)
             if deadline is None and session.time >= given_up:
                 late = f"it is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
-                self._cancel(handles)
+                self._cancel()
                 return MotionEnd("timeout", late)
 
     def wait(self, until: Until, *, deadline: float) -> MotionEnd:
         """Hold still until the condition holds."""
         while self._session.time < deadline:
-            state = self._session.tick()
+            state = self._tick()
             if self._session.manager.faults:
                 return _fault(self._session)
             if self._session.ticks % UNTIL_TICKS == 0 and until(state):
@@ -107,7 +127,24 @@ class Executor:
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
         for _ in range(round(duration / self._session.period)):
+            self._tick()
+
+    def stop(self) -> None:
+        """Cancel what is on, let the joints slow down within their limits, and hold still; no alarm is heard now."""
+        self._cancel()
+        for _ in range(round(REST / self._session.period)):
             self._session.tick()
+
+    def _tick(self) -> WorldState:
+        """
+        Raises:
+            Alarmed: something is wrong with the state.
+        """
+        state = self._session.tick()
+        wrong = "" if self._alarm is None else self._alarm(state)
+        if wrong:
+            raise Alarmed(wrong)
+        return state
 
     def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
         handles = []
@@ -151,8 +188,8 @@ class Executor:
             widened(trajectory.velocities, rest), widened(trajectory.accelerations, rest),
         )  # fmt: skip
 
-    def _cancel(self, handles: tuple[GoalHandle, ...]) -> None:
-        for handle in handles:
+    def _cancel(self) -> None:
+        for handle in self._handles:
             handle.cancel()
 
 

@@ -15,6 +15,7 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.spec.base import Model, problem
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec
 from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
+from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 
 __all__ = [
@@ -206,6 +207,21 @@ class StepSpec(KeyedSpec):
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
     until: ConditionSpec | None = Field(None, description="The step ends once this holds, too.")
     timeout: Annotated[Time, Field(gt=0)] | None = Field(None, description="Fails the step after this [s], above 0.")
+    on_fail: OnFail = Field(
+        "stop",
+        description="After a failure: `stop` ends the run, `continue` goes on (the step does not count then), "
+        "`{retry: n, with: {param: value}}` tries again. Default `stop`.",
+    )
+
+    @property
+    def retry(self) -> RetrySpec | None:
+        """How it is tried again, if it is."""
+        return self.on_fail if isinstance(self.on_fail, RetrySpec) else None
+
+    @property
+    def may_fail(self) -> bool:
+        """Whether the run goes on after the last attempt has failed."""
+        return (self.on_fail if self.retry is None else self.retry.then) == "continue"
 
     @property
     def verb(self) -> str:
@@ -233,6 +249,11 @@ class TaskSpec(Model):
         None,
         description="The named pose that the robot starts in. Default: `home` if it has one; else every joint at 0, or "
         "at the limit nearest to 0.",
+    )
+    replan: bool | ReplanSpec = Field(
+        True,
+        description="Whether a step is planned again where things are not as it was planned for, and from which "
+        "difference on. Default true.",
     )
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")

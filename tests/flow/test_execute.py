@@ -10,7 +10,7 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.core.errors import SimulationFailed
-from manipcli.flow import execute
+from manipcli.flow import execute, steps_run
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.step import Motion
 from manipcli.record.reading import read_recording
@@ -93,7 +93,7 @@ def test_a_goal_that_leaves_its_tolerance_ends_the_run_with_joint_value_limit_an
         assert word in moved.text
     assert moved.ended is not None
     assert moved.ended < 0.5
-    assert verdict.simulated_time == pytest.approx(moved.ended + execute.AFTERMATH, abs=0.01)
+    assert verdict.simulated_time == pytest.approx(moved.ended + steps_run.AFTERMATH, abs=0.01)
 
 
 def test_a_move_of_one_joint_leaves_the_others_where_they_are(run: Run, tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_the_time_for_an_until_ends_with_it(run: Run, monkeypatch: pytest.Monkey
         return replace(plan, steps=(longer,))
 
     monkeypatch.setattr(pipeline, "plan_task", with_a_sequel)
-    monkeypatch.setattr(execute, "DEFAULT_UNTIL_TIME", 0.2)
+    monkeypatch.setattr(steps_run, "DEFAULT_UNTIL_TIME", 0.2)
     step = run(scene(*WAITING, steps=NEAR)).steps[0]
     assert step.outcome == "done"
     assert step.ended == pytest.approx(0.6, abs=0.011)
@@ -159,7 +159,11 @@ class Stopping:
     def __init__(self, at: float, error: BaseException) -> None:
         self._at, self._error = at, error
 
+    def warned(self, findings: object) -> None: ...
+
     def step_started(self, step: object, index: int, total: int) -> None: ...
+
+    def told(self, text: str, *, detail: bool) -> None: ...
 
     def tick(self, simulated_time: float, wall: float) -> None:
         if simulated_time >= self._at:

@@ -62,7 +62,7 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
         draft.open(spec.posture)
-        draft.straight("withdraw", backed_off(X_WT, retreat, slope), speed=spec.speed)
+        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed)
         return draft.plan()
 
     candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), (slopes()[k] for k in (1, 2, 0)))

@@ -1,0 +1,245 @@
+"""The loop over steps: planned again where things are elsewhere, tried again where the task says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.control.action import GoalHandle
+from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.flow.live import Live, Probe
+from manipcli.flow.load import Task
+from manipcli.flow.onlooker import Progress
+from manipcli.flow.plan import Plan, PlannedStep, plan_step
+from manipcli.flow.replan import Measured, after
+from manipcli.judge.verdict import StepOutcome
+from manipcli.plan.step import Situation
+from manipcli.record.recorder import Recorder
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.executor import DONE, Executor, MotionEnd, Until
+from manipcli.simulate.session import Session
+from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.retry import retried
+from manipcli.spec.task import StepSpec
+
+DEFAULT_UNTIL_TIME: Final = 30.0
+"""How long [s] an `until` without `timeout` is waited for."""
+AFTERMATH: Final = 0.6
+"""How long [s] the world is watched after the last step, so that "at rest" can be judged."""
+LEFT_BEHIND: Final = 0.05
+"""A held object further than this [m] from where it was planned is no longer held."""
+MOST_CUT: Final = 3
+"""Joints that are named as cut at their limits."""
+
+
+def saturated_ticks(session: Session) -> dict[str, dict[str, int]]:
+    """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
+    joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
+    actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
+    return {"saturated joints": joints, "saturated actuators": actuators}
+
+
+class StepsRun:
+    """One pass over the steps.
+
+    Args:
+        task, plan: what to do.
+        session: in which world; its clock stands at 0.
+        recorder: is told of everything that happens.
+        live: asks the conditions that steps wait for; is told of steps.
+        progress: is told of steps, and of what was not planned.
+        told: is told of every goal, see `Executor`.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        plan: Plan,
+        session: Session,
+        recorder: Recorder,
+        live: Live,
+        progress: Progress | None,
+        *,
+        told: Callable[[str, GoalHandle], None],
+    ) -> None:
+        self._task = task
+        self._live = live
+        self._plan = plan
+        self._session = session
+        self._recorder = recorder
+        self._progress = progress
+        self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
+        self._executor = Executor(session, touch=self._physics, told=told)
+        replan = task.spec.replan
+        self._replans = replan is not False
+        limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
+        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._believed = plan.start
+        self._failed = False
+
+    def steps(self) -> None:
+        """Every step in order, until one fails that may not."""
+        total = len(self._plan.steps)
+        planned_start = self._plan.start
+        for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
+            if self._progress is not None:
+                self._progress.step_started(planned, index, total)
+            outcome = self._step(index, step, planned, planned_start)
+            if self._progress is not None:
+                self._progress.step_ended(outcome)
+            if outcome.outcome != "done" and not outcome.tolerated:
+                break
+            planned_start = planned.plan.end
+        self._executor.hold(AFTERMATH)
+
+    def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
+        """All attempts at a step."""
+        began = self._session.time
+        retry = step.retry
+        attempts = 1 if retry is None else 1 + retry.retry
+        end = DONE
+        self._live.step_started(planned.id)
+        for attempt in range(1, attempts + 1):
+            if attempt > 1:
+                step = retried(self._task.file, index)
+            self._event("step_started", planned, "", self._nth(step, attempt, attempts))
+            end = self._attempt(step, planned, planned_start, again=attempt > 1)
+            self._event("step_ended", planned, end.outcome, end.text)
+            if end.outcome == "done" or self._session.manager.faults:
+                break
+            self._failed = True
+            if attempt < attempts:
+                self._tell(f"{end.outcome}: {end.text}; it is tried again", detail=False)
+            if attempt < attempts or step.may_fail:
+                self._executor.stop()
+        self._live.step_ended(planned.id, end.outcome)
+        tolerated = end.outcome != "done" and step.may_fail and not self._session.manager.faults
+        if tolerated:
+            self._event("step_tolerated", planned, "", "on_fail: continue")
+        return StepOutcome(
+            id=planned.id,
+            verb=planned.verb,
+            outcome=end.outcome,
+            started=began,
+            ended=self._session.time,
+            planned_duration=planned.plan.duration,
+            text=end.text,
+            tolerated=tolerated,
+        )
+
+    def _nth(self, step: StepSpec, attempt: int, attempts: int) -> str:
+        """What an attempt begins with; nothing where there is but one."""
+        if attempts == 1:
+            return ""
+        changed = {} if step.retry is None or attempt == 1 else step.retry.with_
+        values = ", ".join(f"{name} = {value}" for name, value in changed.items())
+        return f"attempt {attempt} of {attempts}{f', with {values}' if values else ''}"
+
+    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: Situation, *, again: bool) -> MotionEnd:
+        """One attempt, planned anew where things are not as they were planned to be, or `again`."""
+        ticks, saturated = self._session.ticks, saturated_ticks(self._session)
+        now = self._measured.situation(self._believed)
+        differences = self._measured.differences(planned_start, now, step)
+        anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
+        if anew:
+            try:
+                planned = replace(planned, plan=plan_step(self._plan.planner, step, now))
+            except NotPlannable as refusal:
+                self._believed = now
+                why = f", where {'; '.join(differences)}" if differences else ""
+                return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}")
+            why = "; ".join(differences) or "it is tried again"
+            self._event("replanned", planned, "", why)
+            self._tell(f"planned again: {why}", detail=True)
+            self._failed = False
+        try:
+            end = self._motions(step, planned, now)
+        except SimulationFailed as failure:
+            text = str(failure) + _cut_since(saturated, self._session, ticks)
+            self._event("step_ended", planned, "failed", text)
+            raise
+        if end.outcome == "done":
+            return end
+        found = "" if anew or not differences else f"; when it began, {'; '.join(differences)}"
+        return MotionEnd(end.outcome, end.text + found + _cut_since(saturated, self._session, ticks))
+
+    def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
+        probe = self._until(step)
+        try:
+            return self._until_done(step, planned, before, None if probe is None else lambda _: probe.holds)
+        finally:
+            if probe is not None:
+                self._live.close(probe)
+
+    def _until_done(self, step: StepSpec, planned: PlannedStep, before: Situation, until: Until | None) -> MotionEnd:
+        """Every motion of the plan, which begins in `before`, and what the step waits for."""
+        deadline = None if step.timeout is None else self._session.time + step.timeout
+        awaited = until is not None
+        texts = []
+        for k, motion in enumerate(planned.plan.motions):
+            self._event("phase_started", planned, "", motion.label)
+            self._believed = after(planned.plan, before, done=k)
+            over = deadline
+            if motion.awaits and until is not None and over is None:
+                over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
+            end = self._executor.run(motion, until=until, deadline=over)
+            if end.outcome != "done":
+                return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
+            awaited = awaited and not motion.awaits
+            texts += [end.text] if end.text else []
+        self._believed = planned.plan.end
+        if awaited and until is not None:
+            if deadline is None:
+                deadline = self._session.time + DEFAULT_UNTIL_TIME
+            end = self._executor.wait(until, deadline=deadline)
+            if end.outcome != "done":
+                return end
+        return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    def _left_behind(self, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where the object that the step ends with in the hand is not there; None where it is."""
+        carried = planned.plan.end.carried
+        if carried is None or not self._physics:
+            return None
+        scene = self._task.scene
+        k = scene.movable.index(scene.body(carried.body))
+        away = float(np.linalg.norm(self._session.state.body_position[k] - planned.plan.end.bodies[k].p))
+        if away <= LEFT_BEHIND:
+            return None
+        where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
+        return MotionEnd("failed", f"{where}: it slipped, or was never held")
+
+    def _until(self, step: StepSpec) -> Probe | None:
+        """The step's condition, asked from now on; None where there is none, or only physics could answer it."""
+        if step.until is None or self._live.absent(step.until) is not None:
+            return None
+        return self._live.open(step.until)
+
+    def _tell(self, text: str, *, detail: bool) -> None:
+        if self._progress is not None:
+            self._progress.told(text, detail=detail)
+
+    def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
+        )
+
+
+def _moves(planned: PlannedStep) -> bool:
+    """Whether a step does anything that depends on where things are."""
+    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+
+
+def _cut_since(before: dict[str, dict[str, int]], session: Session, tick: int) -> str:
+    """What had nothing left to give since `tick`, the worst first; nothing where everything had."""
+    counts = {
+        f"{kind.removeprefix('saturated ').removesuffix('s')} '{name}'": count - before[kind][name]
+        for kind, ticks in saturated_ticks(session).items()
+        for name, count in ticks.items()
+    }
+    worst = sorted((name for name, count in counts.items() if count), key=lambda name: -counts[name])[:MOST_CUT]
+    cut = ", ".join(f"{name} in {counts[name]}" for name in worst)
+    return f"; cut at its limits: {cut} of {session.ticks - tick} ticks" if cut else ""

@@ -1,0 +1,51 @@
+"""A step as it reads with other parameters: what `on_fail: {retry: 2, with: {tilt: 140 deg}}` tries."""
+
+from __future__ import annotations
+
+from manipcli.spec.expression import escaped, substitute
+from manipcli.spec.located import Located, Source, validate
+from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at
+
+
+def retried(file: Located[TaskSpec], index: int) -> StepSpec:
+    """The step `steps[index]` of a task with the parameters under its `on_fail`; without any, as it is.
+
+    Raises:
+        InvalidInput: a parameter is unknown, or the step cannot be meant with it; told at the places of the file.
+    """
+    source, step = file.source, file.spec.steps[index]
+    changed = node_at(source.root, ("steps", index, "on_fail", "with"))
+    if step.retry is None or not step.retry.with_ or not isinstance(changed, MappingNode):
+        return step
+    root = _written(source.root)
+    assert isinstance(root, MappingNode)
+    params = child(root, "params")
+    entries = {} if not isinstance(params, MappingNode) else dict(params.entries)
+    told = []
+    for name, entry in changed.entries.items():
+        if name not in entries:
+            path = ("steps", index, "on_fail", "with", name)
+            hint = f"params: {', '.join(entries)}" if entries else "the task has no params: block"
+            told.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
+        entries[name] = Entry(entry.key_place, _escaped(entry.node))
+    block = Entry(changed.place, MappingNode(entries, changed.place))
+    again, findings = substitute(MappingNode({"params": block, **root.without("params").entries}, root.place), "TASK")
+    tree = Source(source.name, again, source.area, source.kept)
+    return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
+
+
+def _written(node: Node) -> Node:
+    """The tree before expressions were computed."""
+    if isinstance(node, MappingNode):
+        return MappingNode({k: Entry(e.key_place, _written(e.node)) for k, e in node.entries.items()}, node.place)
+    if isinstance(node, SequenceNode):
+        return SequenceNode(tuple(map(_written, node.items)), node.place)
+    return _escaped(node) if node.written is None else ScalarNode(node.written, node.place)
+
+
+def _escaped(node: Node) -> Node:
+    """A value that is to stay as it is."""
+    if isinstance(node, ScalarNode) and isinstance(node.value, str):
+        return ScalarNode(escaped(node.value), node.place)
+    return node
