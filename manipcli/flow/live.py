@@ -24,7 +24,7 @@ from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 
 Told = Callable[[Moments, Reading], None]
-"""Sees every answer of a probe: some ticks, and the margins on them."""
+"""Sees every answer of a probe: some ticks, and the margins on them. Neither is valid afterwards."""
 
 
 class Probe:
@@ -65,18 +65,21 @@ class Live:
         self._steps = {name: StepTime(name, None, None, "") for name in world.steps}
         self._filter = ContactFilter()
         self._contacts: list[Touching] = []
-        self._before: WorldState | None = None
         n, m = len(world.robot.joint_names), len(world.scene.movable)
-        self._states = WorldState(
-            time=np.zeros(SLOW),
-            position=np.zeros((SLOW, n)),
-            velocity=np.zeros((SLOW, n)),
-            effort=np.zeros((SLOW, n)),
-            body_position=np.zeros((SLOW, m, 3)),
-            body_quat_xyzw=np.zeros((SLOW, m, 4)),
-            body_linear=np.full((SLOW, m, 3), np.nan),
-            body_angular=np.full((SLOW, m, 3), np.nan),
+        # Row 0 is the tick before the others.
+        self._rows = WorldState(
+            time=np.zeros(SLOW + 1),
+            position=np.zeros((SLOW + 1, n)),
+            velocity=np.zeros((SLOW + 1, n)),
+            effort=np.zeros((SLOW + 1, n)),
+            body_position=np.zeros((SLOW + 1, m, 3)),
+            body_quat_xyzw=np.zeros((SLOW + 1, m, 4)),
+            body_linear=np.full((SLOW + 1, m, 3), np.nan),
+            body_angular=np.full((SLOW + 1, m, 3), np.nan),
         )
+        self._before = self._rows.map(lambda a: a[0, ...])
+        self._block = self._rows.map(lambda a: a[1:])
+        self._first = True
         self._references = [
             (k, Reference(controller.joints, np.full((SLOW, len(controller.joints)), np.nan)))
             for k, controller in enumerate(controllers)
@@ -87,7 +90,7 @@ class Live:
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """The next tick; the arrays may be reused afterwards."""
-        k, states = self._count, self._states
+        k, states = self._count, self._block
         states.time[k] = self._moment(tick)
         states.position[k] = state.position
         states.velocity[k] = state.velocity
@@ -141,21 +144,25 @@ class Live:
             probe.look(self._moments(), self._next - self._count)
 
     def _ask(self) -> None:
-        moments = self._moments()
-        start = self._next - self._count
-        for probe in self._probes:
-            probe.look(moments, start)
-        last = self._count - 1
-        self._before = self._states.map(lambda a: a[last].copy())
-        self._contacts = self._contacts[-1:]
-        self._count = 0
+        if self._probes:
+            moments = self._moments()
+            start = self._next - self._count
+            for probe in self._probes:
+                probe.look(moments, start)
+        rows, last = self._rows, self._count
+        for array in (rows.time, rows.position, rows.velocity, rows.effort, rows.body_position, rows.body_quat_xyzw):
+            array[0] = array[last]
+        del self._contacts[:-1]
+        self._count, self._first = 0, False
 
     def _moments(self) -> Moments:
         count = self._count
+        whole = count == SLOW
+        references = [reference for _, reference in self._references]
         return Moments(
-            states=self._states.map(lambda a: a[:count]),
-            before=self._before,
-            references=tuple(Reference(one.joints, one.position[:count]) for _, one in self._references),
+            states=self._block if whole else self._block.map(lambda a: a[:count]),
+            before=None if self._first else self._before,
+            references=tuple(one if whole else Reference(one.joints, one.position[:count]) for one in references),
             contacts=tuple(self._contacts),
             steps=tuple(self._steps.values()),
         )

@@ -114,7 +114,6 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         ),
         errors=refusal.findings,
         text=f"{reason}: {refusal}",
-        drawn=task.drawn,
     )
 
 

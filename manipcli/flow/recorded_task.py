@@ -11,13 +11,9 @@ from pathlib import Path
 from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.flow.load import Task, unusable
-from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
+from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
-from manipcli.flow.sample import sampled
-from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
-from manipcli.judge.drawn import SAMPLE, Drawn
-from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.build_scene import build_scene
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.simulate.engines import ENGINES
@@ -81,30 +77,10 @@ def recorded_task(
         findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
         places=_places(recording, path, task.spec),
     )
-    drawn = _drawn(recording, path)
-    if drawn is not None:
-        made = sampled(
-            made,
-            bind(task, robot_file, controllers)[0],
-            drawn,
-            robot_of=lambda file: meshes.robot(rebuild_robot(file.spec, attached(recording, path, URDF))),
-            scene_of=lambda file: scene if from_files else build_scene(file.spec),
-        )
     files = mesh_files(made)
     _check_there(files, path, meshes)
     unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))
     return RecordedTask(made, EMBEDDED in recording.metadata, unlike, meshes)
-
-
-def _drawn(recording: Recording, path: Path) -> Drawn | None:
-    """Which sample the run was of, if it was of one."""
-    if SAMPLE not in recording.metadata:
-        return None
-    try:
-        return Drawn.from_metadata(recording.metadata[SAMPLE])
-    except ValueError:
-        message = f"{path.name}: what was drawn for its sample cannot be read"
-        raise InvalidInput([Finding("LOG103", message)]) from None
 
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]:

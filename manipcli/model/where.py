@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manipcli.core.geometry import Array, rotate
+from manipcli.core.geometry import Array, matrix_from_quat, rotate
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState, body_pose
 
@@ -28,10 +28,9 @@ def highest(scene: Scene, states: WorldState, name: str) -> Array:
 
 
 def _half_height(scene: Scene, states: WorldState, name: str) -> Array:
-    """Half the height of the turned box: sum_i |z . e_i| size_i / 2, with its edges e_i in the world."""
-    quat = body_pose(scene, states, name).quat_xyzw
-    edges = rotate(quat[..., None, :], np.diag(scene.body(name).size))
-    return np.asarray(np.sum(np.abs(edges[..., 2]), axis=-1) / 2.0)
+    """Half the height of the turned box: sum_i |z . e_i| size_i / 2, with the directions e_i of its edges."""
+    R_WO = matrix_from_quat(body_pose(scene, states, name).quat_xyzw)
+    return np.asarray(np.abs(R_WO[..., 2, :]) @ scene.body(name).size / 2.0)
 
 
 def point_text(points: Array, k: int) -> str:

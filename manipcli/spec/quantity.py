@@ -68,6 +68,8 @@ Speed = Annotated[float, Unit((units.SPEED,))]
 Acceleration = Annotated[float, Unit((units.ACCELERATION,))]
 Energy = Annotated[float, Unit((units.ENERGY,))]
 """In J, which is N m: a torque is not told apart."""
+Share = Annotated[float, Unit((units.NUMBER,))]
+"""`0.1` or `"10 %"`."""
 JointValue = Annotated[float, Unit((units.ANGLE, units.LENGTH))]
 """Position of a joint, revolute or prismatic."""
 JointVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY, units.SPEED))]

@@ -141,6 +141,56 @@ def test_later_stages_can_point_at_any_value() -> None:
 
 
 @pytest.mark.parametrize(
+    ("written", "message", "hint"),
+    [
+        (
+            "always: {any: [{near: {object: a, within: 1 kg}}]}",
+            "18:47: error[TASK207]: expect[1].always.any[0].near.within:",
+            "",
+        ),
+        (
+            "always: {any: [{nea: {}}]}",
+            "18:21: error[TASK203]: expect[1].always.any[0]: unknown condition 'nea'",
+            "'near'",
+        ),
+        (
+            "nver: {near: {}}",
+            "18:5: error[TASK203]: expect[1]: unknown expectation 'nver'",
+            "did you mean 'never' or 'near'?",
+        ),
+        ("all: {near: {}}", "18:10: error[TASK205]: expect[1].all: expected a list", ""),
+        ("never: []", "18:12: error[TASK209]: expect[1].never: expected a condition: a mapping with one name", ""),
+        (
+            "near: {object: a, within: 1}\n    durng: x",
+            "19:5: error[TASK201]: expect[1]: unknown key 'durng'",
+            "'during'",
+        ),
+        (
+            "near: {object: a, within: 1}\n    at: x\n    during: y",
+            "20:5: error[TASK208]: expect[1]: say either",
+            "a time",
+        ),
+        ("never: {near: {object: a, within: 1}}\n    at: x", "19:5: error[TASK208]: expect[1]: `at` is one moment", ""),
+        (
+            "near: {object: a, within: 1}\n    within: 2 s",
+            "19:5: error[TASK208]: expect[1]: `within` beside",
+            "eventually",
+        ),
+        ("near: {object: a, within: 1}\n    id: 2nd", "19:9: error[TASK208]: expect[1].id: '2nd' cannot be an id", ""),
+        (
+            "near: {object: a, within: 1}\n    id: x\n  - near: {object: a, within: 1}\n    id: x",
+            "21:9: error[TASK210]",
+            "",
+        ),
+    ],
+)
+def test_mistakes_in_expectations_are_told_where_they_are(written: str, message: str, hint: str) -> None:
+    (found,) = findings(f"{TASK}  - {written}\n")
+    assert str(found).startswith(f"t.yaml:{message}"), str(found)
+    assert hint in (found.hint or "")
+
+
+@pytest.mark.parametrize(
     ("old", "new", "expected", "hint"),
     [
         (

@@ -22,7 +22,7 @@ class AtPoseSpec(Model):
 
     pose: str = Field(description="A named pose of the robot.")
     group: str | None = Field(default=None, description="Only this group's joints; default: all that the pose names.")
-    within: Annotated[Angle, Field(gt=0)] = Field(default=0.02, description="Largest difference of a joint [rad].")
+    within: Annotated[Angle, Field(gt=0)] = Field(default=0.02, description="Largest difference [rad]. Default 0.02.")
 
 
 def gauge(spec: AtPoseSpec, world: World) -> Gauge:

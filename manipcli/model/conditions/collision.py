@@ -28,7 +28,7 @@ class NoCollisionSpec(Model):
         min_length=1, description="Each two of: a body, `robot` (any of its links), `robot/LINK`."
     )
     below: Annotated[Force, Field(ge=0)] = Field(
-        default=0.0, description="Largest normal force [N] that does not count; 0: any touch that presses counts."
+        default=0.0, description="Largest normal force [N] that does not count. Default 0: any touch counts."
     )
 
 
@@ -58,7 +58,8 @@ class CollisionSpec(Model):
 def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
     """`below` minus the largest normal force [N] between any of the pairs.
 
-    A pair that does not press has the margin `below`: 0 N to spare when any touch counts, which still passes.
+    A pair that does not press has the margin `below`: 0 N to spare when any touch counts, which still passes; where
+    units differ, it is then compared to 1 N.
     """
     return _gauge(spec.pairs, spec.below, -1.0)
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
 from manipcli.model.moments import Moments
-from manipcli.model.reading import Reading, least, reading
-from manipcli.model.robot import Joint, RobotModel
+from manipcli.model.reading import Measured, Reading
+from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
+from manipcli.spec.quantity import Share
 
 Quantity = Literal["position", "velocity", "effort"]
 ALL: tuple[Quantity, ...] = ("position", "velocity", "effort")
@@ -32,44 +33,52 @@ class LimitsSpec(Model):
     of: tuple[Quantity, ...] = Field(
         default=ALL, min_length=1, description="Which limits. Default [position, velocity, effort]."
     )
-    spare: Annotated[float, Field(ge=0, lt=1)] = Field(
+    spare: Annotated[Share, Field(ge=0, lt=1)] = Field(
         default=0.0, description="Share of each limit (of half of its range, for positions) to be left. Default 0."
     )
 
 
+@dataclass(frozen=True, slots=True)
 class _Bound:
-    """One limit of one joint: |value - middle| is at most `half`."""
+    """One limit of one joint: |value - middle| is at most `half`; `column` of position, velocity, effort abreast."""
 
-    def __init__(self, joint: Joint, column: int, what: Quantity, spare: float, lower: float, upper: float) -> None:
-        self.joint, self.column, self.what = joint.name, column, what
-        self.middle, self.half = (lower + upper) / 2.0, (upper - lower) / 2.0
-        self.allowed = self.half * (1.0 - spare)
-        self.unit = _UNITS[what][1 if joint.type == "prismatic" else 0]
-
-    def reading(self, moments: Moments) -> Reading:
-        states = moments.states
-        every: Array = {"position": states.position, "velocity": states.velocity, "effort": states.effort}[self.what]
-        values = every[:, self.column]
-
-        def say(k: int) -> str:
-            low, high = (readable(self.middle + sign * self.allowed, self.unit) for sign in (-1.0, 1.0))
-            value = readable(float(values[k]), self.unit)
-            return f"{self.what} of joint '{self.joint}' is {value}; allowed {low} to {high}"
-
-        margins = self.allowed - np.abs(values - self.middle)
-        return reading(margins, moments.times, unit=self.unit, scale=self.half or 1.0, say=say)
+    joint: str
+    what: Quantity
+    unit: str
+    column: int
+    middle: float
+    half: float
 
 
 def gauge(spec: LimitsSpec, world: World) -> Gauge:
-    """The least distance of a measured position, velocity or effort to its limit; joint and quantity that decide are
-    those with the least share of their limit left.
+    """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
 
     The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
     """
     bounds = _bounds(spec, world.robot)
+    columns = [bound.column for bound in bounds]
+    middle, half = np.array([bound.middle for bound in bounds]), np.array([bound.half for bound in bounds])
+    allowed, scale = half * (1.0 - spec.spare), np.where(half > 0.0, half, 1.0)
+    units = tuple(sorted({bound.unit for bound in bounds}))
 
     def look(moments: Moments) -> Reading:
-        return least([bound.reading(moments) for bound in bounds])
+        states = moments.states
+        values = np.concatenate((states.position, states.velocity, states.effort), axis=1)[:, columns]
+        margins = allowed - np.abs(values - middle)
+        relative = margins / scale
+        worst = np.argmin(margins if len(units) == 1 else relative, axis=1)
+        ticks = np.arange(len(worst))
+
+        def found(k: int) -> Measured:
+            j = int(worst[k])
+            one = bounds[j]
+            low, high = (readable(one.middle + sign * float(allowed[j]), one.unit) for sign in (-1.0, 1.0))
+            value = readable(float(values[k, j]), one.unit)
+            text = f"{one.what} of joint '{one.joint}' is {value}; allowed {low} to {high}"
+            return Measured(float(margins[k, j]), one.unit, float(moments.times[k]), text)
+
+        everywhere = np.ones(len(ticks), dtype=bool)
+        return Reading(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
 
     return look
 
@@ -79,14 +88,19 @@ def _bounds(spec: LimitsSpec, robot: RobotModel) -> list[_Bound]:
     found = []
     for name in names:
         joint = robot.joint(name)
+        limits, n = joint.limits, len(robot.joint_names)
         (column,) = robot.indices((name,))
-        limits = joint.limits
-        if "position" in spec.of and limits.lower is not None and limits.upper is not None:
-            found.append(_Bound(joint, column, "position", spec.spare, limits.lower, limits.upper))
-        if "velocity" in spec.of and limits.velocity is not None:
-            found.append(_Bound(joint, column, "velocity", spec.spare, -limits.velocity, limits.velocity))
-        if "effort" in spec.of and limits.effort is not None:
-            found.append(_Bound(joint, column, "effort", spec.spare, -limits.effort, limits.effort))
+        symmetric = {"velocity": limits.velocity, "effort": limits.effort}
+        for k, what in enumerate(ALL):
+            unit = _UNITS[what][1 if joint.type == "prismatic" else 0]
+            if what not in spec.of:
+                continue
+            if what == "position" and limits.lower is not None and limits.upper is not None:
+                middle, half = (limits.lower + limits.upper) / 2.0, (limits.upper - limits.lower) / 2.0
+                found.append(_Bound(name, what, unit, column, middle, half))
+            most = symmetric.get(what)
+            if most is not None:
+                found.append(_Bound(name, what, unit, k * n + column, 0.0, most))
     return found
 
 

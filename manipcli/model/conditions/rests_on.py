@@ -13,6 +13,7 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.touch import between
 from manipcli.spec.base import Model
+from manipcli.spec.quantity import Share
 
 
 class RestsOnSpec(Model):
@@ -20,7 +21,7 @@ class RestsOnSpec(Model):
 
     object: str = Field(description="A body of the scene that can move.")
     of: str = Field(description="The body that carries it.")
-    share: Annotated[float, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
+    share: Annotated[Share, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
 
 
 def gauge(spec: RestsOnSpec, world: World) -> Gauge:

@@ -11,7 +11,7 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
 from manipcli.model.moments import Moments
-from manipcli.model.reading import Reading, least, reading
+from manipcli.model.reading import Measured, Reading
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue
 
@@ -31,45 +31,40 @@ def gauge(spec: TrackingSpec, world: World) -> Gauge:
     robot = world.robot
     joints = robot.group(spec.group).joints
     columns = robot.indices(joints)
-    endless = [robot.joint(name).type == "continuous" for name in joints]
-    units = ["m" if robot.joint(name).type == "prismatic" else "rad" for name in joints]
+    endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
+    unit_of = ["m" if robot.joint(name).type == "prismatic" else "rad" for name in joints]
+    units = tuple(sorted(set(unit_of)))
 
     def look(moments: Moments) -> Reading:
-        readings = []
-        for name, column, turns, unit in zip(joints, columns, endless, units, strict=True):
-            reference = _reference(moments, name)
-            error = reference - moments.states.position[:, column]
-            if turns:
-                error = np.remainder(error + np.pi, 2.0 * np.pi) - np.pi
-            readings.append(_one(spec, moments, name, np.abs(error), unit, reference))
-        return least(readings)
+        reference = _references(moments, joints)
+        error = reference - moments.states.position[:, columns]
+        error[:, endless] = np.remainder(error[:, endless] + np.pi, 2.0 * np.pi) - np.pi
+        error = np.abs(error)
+        known = ~np.isnan(reference)
+        worst = np.argmax(error, axis=1)
+        margins = spec.within - error[np.arange(len(worst)), worst]
+
+        def found(k: int) -> Measured:
+            name, unit = joints[worst[k]], unit_of[worst[k]]
+            off, within = readable(float(error[k, worst[k]]), unit), readable(spec.within, unit)
+            text = f"joint '{name}' is {off} from its reference; within {within}"
+            return Measured(float(margins[k]), unit, float(moments.times[k]), text)
+
+        idle = [f"no controller of joint '{name}' was active" for name, there in zip(joints, known.T, strict=True)
+                if not there.all()]  # fmt: skip
+        return Reading(margins, margins / spec.within, units, np.asarray(known.all(axis=1)), "".join(idle[:1]), found)
 
     return look
 
 
-def _one(spec: TrackingSpec, moments: Moments, name: str, error: Array, unit: str, reference: Array) -> Reading:
-    def say(k: int) -> str:
-        off = readable(float(error[k]), unit)
-        return f"joint '{name}' is {off} from its reference; within {readable(spec.within, unit)}"
-
-    return reading(
-        spec.within - error,
-        moments.times,
-        unit=unit,
-        scale=spec.within,
-        say=say,
-        applies=~np.isnan(reference),
-        idle=f"no controller of joint '{name}' was active",
-    )
-
-
-def _reference(moments: Moments, joint: str) -> Array:
-    """(T,) what the joint should follow: that of the controller that is active."""
-    found = np.full(len(moments.times), np.nan)
+def _references(moments: Moments, joints: tuple[str, ...]) -> Array:
+    """(T, k) what the joints should follow: of each, that of the controller that is active."""
+    found = np.full((len(moments.times), len(joints)), np.nan)
     for one in moments.references:
-        if joint in one.joints:
-            position = one.position[:, one.joints.index(joint)]
-            found = np.where(np.isnan(found), position, found)
+        for k, name in enumerate(joints):
+            if name in one.joints:
+                position = one.position[:, one.joints.index(name)]
+                found[:, k] = np.where(np.isnan(found[:, k]), position, found[:, k])
     return found
 
 

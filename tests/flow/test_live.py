@@ -1,0 +1,171 @@
+"""Live and judged answers of every condition are the same numbers on every tick of a recorded run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli import pipeline
+from manipcli.flow import execute
+from manipcli.flow.live import Live
+from manipcli.flow.load import load_task
+from manipcli.flow.log import judge_recording
+from manipcli.judge import expectation
+from manipcli.model.condition import World
+from manipcli.model.conditions import CONDITIONS
+from manipcli.model.formula import leaves
+from manipcli.model.moments import Moments
+from manipcli.model.reading import Reading
+from manipcli.record.reading import open_recording
+from manipcli.spec.condition import ConditionSpec
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
+TASK = f"""\
+task: small
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+start: home
+scene:
+  desk: {{box: {{size: [0.6, 1.0, 0.4]}}, pose: {{xyz: [0.85, 0, 0.2]}}, fixed: true}}
+  cup: {{cup: {{radius: 36 mm, height: 110 mm}}, mass: 150 g, rests_on: desk, at: [0.75, 0.0], friction: 1.0}}
+  ball: {{sphere: {{radius: 14 mm}}, mass: 10 g, inside: cup}}
+  tray: {{tray: {{size: [0.3, 0.3, 0.05]}}, rests_on: desk, at: [0.70, 0.32], fixed: true}}
+steps:
+  - pick: {{object: cup, approach: {{from: side, distance: 9 cm}}, grasp: {{posture: wrap, force: 8 N, height: 68 mm}}}}
+  - lift: {{object: cup, by: 8 cm}}
+    until: {{all: [{{grasped: {{object: cup}}}}, {{moved: {{object: cup, by: 6 cm}}}}]}}
+    timeout: 3 s
+  - wait: 123 ms
+expect:
+  - always: {{inside: {{object: ball, of: cup}}}}
+  - always: {{outside: {{object: ball, of: tray}}}}
+  - always: {{upright: {{object: cup, within: 5 deg}}}}
+  - always: {{near: {{object: cup, to: start, within: 20 cm}}}}
+  - always: {{above: {{object: cup, of: desk}}}}
+  - always: {{rests_on: {{object: cup, of: desk}}}}
+  - always: {{at_rest: {{object: ball}}}}
+  - always: {{moved: {{object: cup, by: 1 cm, turn: 1 deg}}}}
+  - always: {{unmoved: {{object: ball, within: 10 cm, turn: 3 deg}}}}
+  - always: {{grasped: {{object: cup}}}}
+  - always: {{slip: {{object: cup, within: 5 mm, turn: 5 deg}}}}
+  - always: {{contact_force: {{pair: [robot, cup], below: 60 N, above: 1 N}}}}
+  - always: {{collision: [robot, cup]}}
+  - always: {{no_collision: {{pairs: [[robot, desk], [ball, cup]]}}}}
+  - always: {{at_pose: {{pose: home}}}}
+  - always: {{tracking: {{group: arm, within: 0.05 rad}}}}
+  - always: {{limits: {{spare: 5 %}}}}
+  - always: {{tool_speed: {{below: 1 m/s}}}}
+  - always: {{energy: {{below: 50 J}}}}
+  - always: {{duration: {{below: 60 s}}}}
+  - always: {{step_done: {{step: lift_1}}}}
+  - always: {{any: [{{tool_speed: {{below: 0.1 m/s}}}}, {{not: {{grasped: {{object: cup}}}}}}]}}
+  - always: {{moved: {{object: cup, by: 1 cm}}}}
+    during: lift_1
+"""
+
+
+@dataclass
+class Answers:
+    """What a condition answered, tick by tick."""
+
+    times: list[float] = field(default_factory=list)
+    margins: list[float] = field(default_factory=list)
+    applies: list[bool] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+
+    def told(self, moments: Moments, answer: Reading) -> None:
+        for k, time in enumerate(moments.times):
+            applies = bool(answer.applies[k])
+            self.times.append(float(time))
+            self.applies.append(applies)
+            self.margins.append(float(answer.margins[k]) if applies else 0.0)
+            self.texts.append(answer.found(k).text if applies and k % 7 == 0 else "")
+
+
+class Watching(Live):
+    """Opens a probe for everything that the task expects of the whole run, and one with the step."""
+
+    opened: list[Answers]
+    of_step: Answers
+
+    def __init__(self, world: World, *rest: object) -> None:
+        super().__init__(world, *rest)  # type: ignore[arg-type]
+        type(self).opened = []
+        for one in EXPECT:
+            type(self).opened.append(Answers())
+            self.open(one, told=self.opened[-1].told)
+
+    def step_started(self, step: str) -> None:
+        super().step_started(step)
+        if step == "lift_1":
+            type(self).of_step = Answers()
+            self.open(OF_STEP, step=step, told=self.of_step.told)
+
+
+EXPECT: list[ConditionSpec] = []
+OF_STEP: ConditionSpec
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
+    """The task, run with a live probe for each expectation, and what judging its log asks and answers."""
+    global OF_STEP
+    folder = tmp_path_factory.mktemp("live")
+    file = folder / "small.yaml"
+    file.write_text(TASK)
+    *whole, last = load_task(file).spec.expect
+    EXPECT[:], OF_STEP = [one.condition for one in whole], last.condition
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(execute, "Live", Watching)
+        report = pipeline.run_task(file, log=folder / "small.mcap")
+    assert [step.outcome for step in report.verdict.steps] == ["done"] * 3
+    found: list[Answers] = []
+    plain = expectation.opened
+
+    def kept(spec: ConditionSpec, world: World, seam: expectation.Seams) -> object:
+        gauge, answers = plain(spec, world, seam), Answers()
+        found.append(answers)
+
+        def look(moments: Moments) -> Reading:
+            answer = gauge(moments)
+            answers.told(moments, answer)
+            return answer
+
+        return look
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(expectation, "opened", kept)
+        log = folder / "small.mcap"
+        assert judge_recording(open_recording(log), log) == report.verdict
+    return found
+
+
+def test_every_condition_is_among_them(judged: list[Answers]) -> None:
+    assert {leaf.name for one in EXPECT for leaf in leaves(one)} == set(CONDITIONS.names)
+    assert len(judged) == len(EXPECT) + 1
+
+
+def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> None:
+    for spec, live, later in zip(EXPECT, Watching.opened, judged[:-1], strict=True):
+        count = len(live.times)  # the last block may not have been full
+        assert 0 <= len(later.times) - count < 10, spec.name
+        assert count > 3000
+        assert live.times == later.times[:count], spec.name
+        assert live.applies == later.applies[:count], spec.name
+        # The same numbers through the same functions; arrays of other lengths round elsewhere in their last bit.
+        np.testing.assert_allclose(live.margins, later.margins[:count], rtol=1e-12, atol=1e-12, err_msg=spec.name)
+        changing = spec.name not in ("outside", "no_collision")
+        assert not changing or len(set(live.margins)) > 1, spec.name
+
+
+def test_what_counts_from_the_start_of_a_step_does_so_live_too(judged: list[Answers]) -> None:
+    live, later = Watching.of_step, judged[-1]
+    assert live.times == later.times
+    np.testing.assert_allclose(live.margins, later.margins, rtol=1e-12, atol=1e-12)
+    assert live.margins[0] == -0.01
+    assert live.margins[-1] >= 0.05
