@@ -17,10 +17,11 @@ from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import Task, load_libraries, load_task
+from manipcli.flow.load import Task, load_libraries
 from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.flow.recorded_task import recorded_task
+from manipcli.flow.sample import load_task
 from manipcli.flow.verify import compared, refused_as_unlike
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.record.reading import open_recording
@@ -50,6 +51,7 @@ def run_task(
     *,
     overrides: Sequence[str] = (),
     seed: int | None = None,
+    sample: int | None = None,
     log: Path | None = None,
     force: bool = False,
     embed_meshes: bool = False,
@@ -63,6 +65,7 @@ def run_task(
         path: the task file.
         overrides: `scene.cup.mass=80 g`, as after `--set`.
         seed: instead of the task's.
+        sample: which one of its `vary:`; None for the task as it is written.
         log: where the log goes; default `runs/<task>.mcap`, which is replaced.
         force: replace `log` if it exists.
         embed_meshes: put the files of all meshes into the log, so that it is shown without any package.
@@ -77,7 +80,9 @@ def run_task(
         InvalidInput: a file or the log's path cannot be used; nothing was simulated.
     """
     began = time.perf_counter()
-    task = load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
+    task = load_task(
+        path, overrides=overrides, seed=seed, sample=sample, package_path=package_path, allow_outside=allow_outside
+    )
     load_libraries(task)
     loaded = time.perf_counter()
     try:

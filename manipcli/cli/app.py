@@ -19,6 +19,7 @@ from manipcli.cli import (
     check_urdf,
     console,
     diff,
+    graph,
     info,
     judge,
     plan,
@@ -58,6 +59,7 @@ app.command("info")(info.info)
 app.command("at")(at.at)
 app.command("repair")(repair.repair)
 app.command("diff")(diff.diff)
+app.command("graph")(graph.graph)
 app.command("plot")(plot.plot)
 app.command("view")(view.view)
 app.command("replay")(replay.replay)

@@ -1,0 +1,52 @@
+"""`manipcli graph TASK|LOG`: who feeds whom."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.core.errors import ExitCode
+
+
+def graph(
+    file: Annotated[Path, typer.Argument(metavar="TASK|LOG", help="A task file, or a log.", show_default=False)],
+    *,
+    format_: Annotated[
+        Literal["text", "dot", "mermaid", "json"],
+        typer.Option("--format", help="A tree, a graph for Graphviz or for Mermaid, or one JSON object."),
+    ] = "text",
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+) -> ExitCode:
+    """Show who feeds whom: task, planner, controllers, joint limits, drives, engine, sensors, topics.
+
+    Of a log with how many messages each topic has.
+    """
+    from manipcli.flow.graph import log_graph, task_graph
+    from manipcli.report.graph import render
+
+    if _is_log(file):
+        made = log_graph(file)
+    else:
+        made = task_graph(file, package_path=tuple(package_path or ()), allow_outside=allow_outside)
+    console.result(render(made, format_))
+    return ExitCode.PASSED
+
+
+def _is_log(file: Path) -> bool:
+    """By its first bytes, whatever it is called."""
+    from manipcli.record.container import MAGIC
+
+    if file.suffix in (".mcap", ".partial"):
+        return True
+    try:
+        if not file.is_file():
+            return False
+        with file.open("rb") as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False

@@ -27,6 +27,12 @@ Seed = Annotated[
     int | None,
     typer.Option("--seed", metavar="N", min=0, help="Seed of planner and noise; the task's when absent."),
 ]
+Sample = Annotated[
+    int | None,
+    typer.Option(
+        "--sample", metavar="N", min=0, help="Sample N of the task's `vary:`; the task as written when absent."
+    ),
+]
 PackagePath = Annotated[
     list[Path] | None,
     typer.Option("--package-path", metavar="DIR", help="A further place to look for packages; repeatable."),

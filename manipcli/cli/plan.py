@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, TaskFile
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.core.errors import ExitCode
 
 
@@ -19,6 +19,7 @@ def plan(
         Path | None, typer.Option("--csv", metavar="FILE", help="Write every point of every trajectory there.")
     ] = None,
     seed: Seed = None,
+    sample: Sample = None,
     overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
@@ -35,6 +36,7 @@ def plan(
         task,
         overrides=tuple(overrides or ()),
         seed=seed,
+        sample=sample,
         package_path=tuple(package_path or ()),
         allow_outside=allow_outside,
     )

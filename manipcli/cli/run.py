@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, TaskFile
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
 from manipcli.core.errors import ExitCode
 
@@ -32,6 +32,7 @@ def run(
     report_file: ReportFile = None,
     junit: JunitFile = None,
     seed: Seed = None,
+    sample: Sample = None,
     overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
@@ -59,6 +60,7 @@ def run(
                 task,
                 overrides=words,
                 seed=seed,
+                sample=sample,
                 log=path,
                 force=force,
                 embed_meshes=embed_meshes,
@@ -83,7 +85,7 @@ def run(
             )
         elif outputs.wanted:
             refused = pipeline.load_task(
-                task, overrides=words, seed=seed, package_path=folders, allow_outside=allow_outside
+                task, overrides=words, seed=seed, sample=sample, package_path=folders, allow_outside=allow_outside
             )
             outputs.of_refusal(refused, report.verdict, task)
         return exit_code(report.verdict)

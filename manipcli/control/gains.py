@@ -12,7 +12,9 @@ from manipcli.model.condition import Problem
 from manipcli.spec.controllers import GainsSpec, Interface
 
 
-def joint_gains(name: str, joints: tuple[str, ...], gains: Mapping[str, GainsSpec]) -> tuple[GainsSpec, ...]:
+def joint_gains(
+    name: str, joints: tuple[str, ...], gains: Mapping[str, GainsSpec | Mapping[str, float]]
+) -> tuple[GainsSpec, ...]:
     """The gains (n) in the order of the joints, all zero where none are given.
 
     Raises:
@@ -21,7 +23,7 @@ def joint_gains(name: str, joints: tuple[str, ...], gains: Mapping[str, GainsSpe
     unknown = sorted(set(gains) - set(joints))
     if unknown:
         raise InvalidArgument("CTRL102", f"controller '{name}': '{unknown[0]}' has gains, but is not one of its joints")
-    return tuple(gains.get(joint, GainsSpec()) for joint in joints)
+    return tuple(GainsSpec.model_validate(gains.get(joint, GainsSpec())) for joint in joints)
 
 
 def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], compat: Compat | None) -> Pid:
@@ -77,4 +79,4 @@ def idle_gains(joints: Sequence[str], gains: Mapping[str, GainsSpec], interface:
         if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
             message = f"the gains of joint '{joint}' are all zero; on the {interface} interface it would not move"
-            yield Problem(loc, message, f"give gains.{joint}.p", "CTRL103")
+            yield Problem(loc, message, f"give gains.{joint}.p; `manipcli tune` proposes it", "CTRL103")

@@ -1,7 +1,8 @@
 """Joint limits on commands, after the controllers and before the transmissions: pure functions, n joints at once.
 
 The rules are those of ros2_control's `joint_limits` for hard limits and of ROS 1's `joint_limits_interface` for soft
-ones. All arguments broadcast; infinite (or, for `k_position` and `k_velocity`, 0) means that there is no such limit.
+ones. All arguments broadcast; infinite (or, for `k_position` and `k_velocity`, 0) means that there is no such limit. A
+command that is NaN stays NaN.
 
 A soft limit bounds the velocity v near it, before the hard one is met:
 
@@ -45,7 +46,7 @@ def limit_position(
     soft_lower: npt.ArrayLike = -math.inf,
     soft_upper: npt.ArrayLike = math.inf,
     k_position: npt.ArrayLike = 0.0,
-    dt: float,
+    dt: float | None = None,
 ) -> Array:
     """Clamped to [lower, upper] and to what can be reached from `previous` within `dt`; [lower, upper] wins.
 
@@ -59,20 +60,25 @@ def limit_position(
         position: (n) measured; None where `previous` is given.
         measured_velocity: (n), only for the acceleration.
         soft_lower, soft_upper, k_position: soft limits; k_position [1/s].
-        dt: [s], above 0.
+        dt: [s], above 0; needed by the limits of velocity and acceleration and by soft limits.
 
     Returns:
         (n)
 
     Raises:
         InvalidArgument: a measured position is more than `OUT_OF_BOUNDS` beyond its limits; neither `previous` nor
-            `position` is given while a limit needs it.
+            `position`, or no `dt`, is given while a limit needs it; a dt that is not above 0.
     """
     low, high = _floats(lower), _floats(upper)
     if position is not None:
         _refuse_out_of_bounds(_floats(position), low, high)
     limited = _floats(command)
     before = previous if previous is not None else position
+    if dt is None:
+        if not _are_idle(velocity, acceleration, k_position):
+            raise InvalidArgument("CTRL193", "a velocity limit on positions needs `dt`")
+        return np.asarray(np.minimum(np.maximum(limited, low), high))
+    _refuse_time(dt)
     fastest = np.minimum(_floats(velocity), np.abs(_floats(measured_velocity)) + _floats(acceleration) * dt)
     if before is None:
         if np.isfinite(fastest).any() or np.any(_floats(k_position) > 0.0):
@@ -88,7 +94,7 @@ def limit_velocity(
     command: npt.ArrayLike,
     *,
     velocity: npt.ArrayLike = math.inf,
-    dt: float,
+    dt: float | None = None,
     position: npt.ArrayLike | None = None,
     lower: npt.ArrayLike = -math.inf,
     upper: npt.ArrayLike = math.inf,
@@ -108,7 +114,7 @@ def limit_velocity(
     Args:
         command: (n) rad/s or m/s.
         velocity, acceleration, lower, upper: hard limits.
-        dt: [s], above 0.
+        dt: [s], above 0; needed with `position` and with `previous`.
         position: (n) measured; None: position limits, soft ones included, are not looked at.
         previous: (n) the velocity command before; None: the acceleration is not limited.
         soft_lower, soft_upper, k_position: soft limits; k_position [1/s].
@@ -116,8 +122,16 @@ def limit_velocity(
 
     Returns:
         (n)
+
+    Raises:
+        InvalidArgument: a dt that is not above 0, or none where it is needed.
     """
     fastest = _floats(velocity)
+    if dt is None:
+        if position is not None or previous is not None:
+            raise InvalidArgument("CTRL193", "limits on velocities by `position` or `previous` need `dt`")
+        return np.asarray(np.minimum(np.maximum(_floats(command), -fastest), fastest))
+    _refuse_time(dt)
     low, high = -fastest, fastest
     if position is not None:
         q, q_low, q_high = _floats(position), _floats(lower), _floats(upper)
@@ -209,6 +223,17 @@ def limit_acceleration(
     if deceleration is not None and velocity is not None:
         most = np.where(wanted * _floats(velocity) < 0.0, _floats(deceleration), most)
     return np.asarray(np.minimum(np.maximum(wanted, -most), most))
+
+
+def _are_idle(velocity: npt.ArrayLike, acceleration: npt.ArrayLike, k_position: npt.ArrayLike) -> bool:
+    """Whether nothing limits how fast a position may change."""
+    endless = np.isinf(_floats(velocity)).all() and np.isinf(_floats(acceleration)).all()
+    return bool(endless and not np.any(_floats(k_position) > 0.0))
+
+
+def _refuse_time(dt: float) -> None:
+    if not dt > 0.0:
+        raise InvalidArgument("CTRL193", f"dt is {dt} s; expected a time above 0")
 
 
 def _floats(values: npt.ArrayLike) -> Array:

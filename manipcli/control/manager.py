@@ -16,7 +16,7 @@ switch is whole or not at all, and happens between two updates: there is no cloc
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Protocol
+from typing import Protocol, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -106,6 +106,7 @@ class ControllerManager:
     Raises:
         InvalidInput: every conflict at once: two of one name, an interface claimed twice, a joint that is unknown or
             follows another.
+        InvalidArgument: a period that is not above 0.
     """
 
     def __init__(
@@ -117,6 +118,8 @@ class ControllerManager:
         following: Sequence[str] = (),
         feed_forward: FeedForwardLaw | None = None,
     ) -> None:
+        if not 0.0 < period < np.inf:
+            raise InvalidArgument("CTRL165", f"a control period of {period} s; expected a time above 0")
         self.joints = tuple(joints)
         self.period = period
         self.following = tuple(following)
@@ -164,7 +167,7 @@ class ControllerManager:
             update_rate: [Hz] of its updates, a whole fraction of the control rate; None: at every tick.
 
         Raises:
-            InvalidArgument: its name is taken, its rate does not divide the control rate.
+            InvalidArgument: its name is taken, its rate does not divide the control rate or is not above 0.
             InvalidInput: a joint that the robot does not have or that follows another.
         """
         if controller.name in self._slots:
@@ -227,11 +230,15 @@ class ControllerManager:
         told; it is refused only when none of a list is left, or when claims clash.
 
         Args:
-            activate, deactivate: names.
-            strictness: see above.
+            activate, deactivate: names, or one name.
+            strictness: see above; in any case of letters.
             time: simulated time [s], for the results of goals that end.
+
+        Raises:
+            InvalidArgument: another strictness.
         """
-        lists = Switch(activate=tuple(activate), deactivate=tuple(deactivate), strictness=strictness)
+        word = _strictness(strictness)
+        lists = Switch(activate=_names(activate), deactivate=_names(deactivate), strictness=word)
         return self.carry_out(lists, time=time)
 
     def switch_to(
@@ -239,7 +246,7 @@ class ControllerManager:
     ) -> SwitchResult:
         """Has all of `names` active, and nobody else on their joints. Those that are active stay as they are. See
         `switch`."""
-        return self.carry_out(Switch(to=tuple(names), strictness=strictness), time=time)
+        return self.carry_out(Switch(to=_names(names), strictness=_strictness(strictness)), time=time)
 
     def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:
         """A switch as a step asks for it; see `switch` and `switch_to`."""
@@ -319,6 +326,11 @@ class ControllerManager:
 
     def _look(self, state: JointVectors, contact_force: Array | None) -> None:
         """The slots' own parts of vectors that are not those of the tick before."""
+        for name in ("position", "velocity", "effort"):
+            vector = getattr(state, name)
+            if not isinstance(vector, np.ndarray) or vector.shape != (len(self.joints),):
+                message = f"measured {name}: {vector!r}; expected an array of {len(self.joints)} numbers"
+                raise InvalidArgument("CTRL166", message)
         vectors = self._seen = (state.position, state.velocity, state.effort)
         self._felt = contact_force
         for slot in self._active:
@@ -328,6 +340,9 @@ class ControllerManager:
         """One control tick at `time` [s]; see the module for the vectors.
 
         A controller that raises is deactivated, its goal aborted with the cause; its joints are braked. `faults` grows.
+
+        Raises:
+            InvalidArgument: measured vectors that are no arrays of one number a joint.
         """
         seen = self._seen
         if seen is None or seen[0] is not state.position or self._felt is not contact_force:
@@ -377,12 +392,27 @@ def _cause(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
+def _names(given: Collection[str] | str) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def _strictness(word: str) -> Strictness:
+    known: dict[str, Strictness] = {each: each for each in get_args(Strictness)}
+    found = known.get(str(word).lower())
+    if found is None:
+        message = f"unknown strictness '{word}'; expected {' or '.join(known)}"
+        raise InvalidArgument("CTRL164", message, hint=did_you_mean(str(word), known))
+    return found
+
+
 def ticks_between(update_rate: float, period: float) -> int:
     """Control ticks of `period` [s] between two updates at `update_rate` [Hz].
 
     Raises:
-        InvalidArgument: the rate does not divide the control rate.
+        InvalidArgument: the rate does not divide the control rate, or is not above 0.
     """
+    if not 0.0 < update_rate < np.inf:
+        raise InvalidArgument("CTRL163", f"an update rate of {update_rate:g} Hz; expected one above 0")
     every = 1.0 / (update_rate * period)
     if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6 * every:
         message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"

@@ -44,10 +44,10 @@ class Pid:
 
     def __init__(
         self,
-        *,
         p: npt.ArrayLike = 0.0,
         i: npt.ArrayLike = 0.0,
         d: npt.ArrayLike = 0.0,
+        *,
         u_min: npt.ArrayLike = -math.inf,
         u_max: npt.ArrayLike = math.inf,
         i_min: npt.ArrayLike = -math.inf,
@@ -60,7 +60,9 @@ class Pid:
         words = np.atleast_1d(np.asarray(antiwindup))
         for word in words:
             if word not in ("none", "back_calculation", "conditional_integration"):
-                raise InvalidArgument("CTRL110", f"unknown anti-windup '{word}'")
+                known = "'none', 'back_calculation' or 'conditional_integration'"
+                hint = "ROS 1's `antiwindup: true` is 'conditional_integration' with compat='ros1'"
+                raise InvalidArgument("CTRL110", f"unknown anti-windup '{word}'; expected {known}", hint=hint)
         if compat not in ("ros1", "ros2"):
             raise InvalidArgument("CTRL110", f"compat = {compat!r}; expected 'ros1' or 'ros2'")
         if compat == "ros1" and (words == "back_calculation").any():
@@ -80,10 +82,10 @@ class Pid:
 
     def set_gains(
         self,
-        *,
         p: npt.ArrayLike = 0.0,
         i: npt.ArrayLike = 0.0,
         d: npt.ArrayLike = 0.0,
+        *,
         u_min: npt.ArrayLike = -math.inf,
         u_max: npt.ArrayLike = math.inf,
         i_min: npt.ArrayLike = -math.inf,
@@ -170,7 +172,7 @@ class Pid:
             InvalidArgument: a negative dt, or an error of another size than the gains.
         """
         errors = np.zeros((2, self._size))
-        if self._scalar:
+        if self._scalar and (isinstance(error, float) or np.ndim(error) == 0):
             errors[0, 0] = error
         elif np.shape(error) == (self._size,):
             errors[0] = error

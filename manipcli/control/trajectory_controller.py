@@ -59,9 +59,9 @@ class JointTrajectoryController:
         name: of the controller.
         joints: (n) distinct names.
         command_interfaces: what the command is, one row each: [position], [position, velocity], [position, velocity,
-            acceleration], [velocity], [effort] or [position, effort].
+            acceleration], [velocity], [effort] or [position, effort]; one alone need not stand in a list.
         state_interfaces: what may be read: [position], and velocity, and acceleration; needed by the commands.
-        gains: by joint name; needed for [effort] and [velocity].
+        gains: by joint name, a `GainsSpec` or its fields; needed for [effort] and [velocity].
         constraints: tolerances; those of `stopped_velocity_tolerance` 0 and absent ones are not enforced.
         limits: (n) of the joints; waypoints beyond them are refused.
         types: (n) joint types: a `continuous` joint takes the shortest way and its error is the shortest angle.
@@ -95,9 +95,9 @@ class JointTrajectoryController:
         *,
         name: str,
         joints: Sequence[str],
-        command_interfaces: Sequence[Interface] = ("effort",),
+        command_interfaces: Sequence[Interface] | Interface = ("effort",),
         state_interfaces: Sequence[str] = ("position", "velocity"),
-        gains: Mapping[str, GainsSpec] | None = None,
+        gains: Mapping[str, GainsSpec | Mapping[str, float]] | None = None,
         constraints: ConstraintsSpec | None = None,
         limits: Sequence[JointLimits] | None = None,
         types: Sequence[JointType] | None = None,
@@ -116,6 +116,8 @@ class JointTrajectoryController:
     ) -> None:
         self.name = name
         self.joints = tuple(joints)
+        if isinstance(command_interfaces, str):
+            command_interfaces = (command_interfaces,)
         self.interfaces: tuple[Interface, ...] = tuple(command_interfaces)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)

@@ -190,7 +190,7 @@ def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
             k, j = (int(index) for index in np.argwhere(beyond)[0])
             raise GoalRejected("CTRL124", _beyond(facts, j, float(positions[k, j]), f"point {k}"))
     if trajectory.velocities is not None:
-        velocities, what, first = trajectory.velocities, "point", 0
+        velocities, what, first = trajectory.velocities, "at point", 0
     elif trajectory.interpolation == "splines":
         velocities = np.diff(trajectory.positions, axis=0) / np.diff(trajectory.times)[:, None]
         what, first = "on the way to point", 1

@@ -34,6 +34,8 @@ LEAST_DAMPING: Final = 0.3
 """Ratio at the largest inertia, where the control step allows no more."""
 SLOW_INTEGRAL: Final = 0.1
 """Of the frequency of the loop: how fast an integral takes over where nothing carries the weight."""
+WEIGHTLESS: Final = 1e-6
+"""Of the effort: what carries no more has no weight to hold, only rounding."""
 SETTLED: Final = 0.02
 """Of the step: closer for good counts as settled."""
 LEAST_FREQUENCY: Final = 1e-3
@@ -222,7 +224,8 @@ def _tuned(load: Load, k: int, controller: str, draft: _Draft, wish: Wish, step:
     p, i, d = draft.gains
     clamp = None
     if not draft.carried:
-        clamp = _short(1.2 * float(np.abs(load.gravity[:, k]).max()) or 0.1 * float(load.effort[k]))
+        weight, effort = float(np.abs(load.gravity[:, k]).max()), float(load.effort[k])
+        clamp = _short(1.2 * weight if weight > WEIGHTLESS * effort else 0.1 * effort)
     loop = _loop(load, k, draft.inertia, draft.gains, wish)
     return Tuned(
         controller=controller,

@@ -33,7 +33,7 @@ SETTLED_SHIFT: Final = 0.01
 
 def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
     """The task's controllers, for its robot (and its `kinematics`, if they are at hand) and control period."""
-    file = task.controllers_file
+    file = task.true.controllers
     period = task.spec.simulation.control_period
     compat = task.robot_file.spec.compat
     return build_controllers(
@@ -47,18 +47,18 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
     Raises:
         SimulationFailed: the world does not stand still before the start, or leaves the plausible.
     """
-    simulation = task.spec.simulation
+    simulation, true = task.spec.simulation, task.true
     settings = EngineSettings(
         step=simulation.step,
         substeps=round(simulation.control_period / simulation.step),
         start=plan.start.position,
     )
-    engine = ENGINES[simulation.engine].open(task.robot, task.scene, settings)
+    engine = ENGINES[simulation.engine].open(true.robot, true.scene, settings)
     try:
         with stdout_to_stderr():
             session = Session(
-                robot=task.robot,
-                scene=task.scene,
+                robot=true.robot,
+                scene=true.scene,
                 engine=engine,
                 manager=manager,
                 period=simulation.control_period,

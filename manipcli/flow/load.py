@@ -15,7 +15,9 @@ from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.switches import foreseen
+from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.drawn import Drawn
 from manipcli.judge.expectation import expectation_problems
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import build_scene
@@ -40,6 +42,15 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
+class Truth:
+    """What is simulated, where planning knows something else: robot and scene of the engine, controllers and gains."""
+
+    robot: RobotModel
+    scene: Scene
+    controllers: Located[ControllersSpec]
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """A task that can be planned: the three files as written, and the robot and scene that they mean.
 
@@ -54,6 +65,13 @@ class Task:
     scene: Scene
     findings: tuple[Finding, ...]
     places: tuple[str, ...] = ()
+    drawn: Drawn | None = None
+    truth: Truth | None = None
+
+    @property
+    def true(self) -> Truth:
+        """What is simulated."""
+        return self.truth or Truth(self.robot, self.scene, self.controllers_file)
 
     @property
     def name(self) -> str:
@@ -135,6 +153,8 @@ def load_task(
         found = unusable(read, commanding, built[0], scene or named_scene(read.spec))
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
+    if task is not None and robot_file and controllers_file:
+        gathered.findings += bind(task, robot_file, controllers_file)[1]
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
         raise gathered.refusal()
     robot, notes = built

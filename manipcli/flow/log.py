@@ -17,6 +17,7 @@ from manipcli.flow.embedding import embeddable
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
 from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
@@ -63,7 +64,7 @@ def open_log(
     return Recorder(
         path,
         robot=task.robot,
-        scene=task.scene,
+        scene=task.true.scene,
         controllers=[recorded(controller) for controller in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
@@ -71,7 +72,7 @@ def open_log(
             (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
             (CONTROLLERS, YAML, resolved(task.controllers).encode()),
             (URDF, XML, task.robot.urdf.encode()),
-            (SCENE, JSON, scene_to_json(task.scene)),
+            (SCENE, JSON, scene_to_json(task.true.scene)),
             (PLAN, JSON, plan.to_json()),
             *((one.attachment, BYTES, one.path.read_bytes()) for one in embedded),
         ],
@@ -83,6 +84,7 @@ def open_log(
                 "physics": engine.physics,
                 "period": repr(task.spec.simulation.control_period),
             },
+            **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
             "versions": {"manipcli": __version__, engine.name: engine.version()},
             "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
             **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),

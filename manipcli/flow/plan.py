@@ -114,6 +114,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         ),
         errors=refusal.findings,
         text=f"{reason}: {refusal}",
+        drawn=task.drawn,
     )
 
 

@@ -29,10 +29,8 @@ from manipcli.spec.load import load_task_text
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
-PICTURE = (480, 360)
-"""Width and height of the picture of a step [pixel]."""
-MOMENT = (800, 600)
-"""Of that of the moment at which the run failed."""
+PICTURE = (640, 480)
+"""Width and height of a picture [pixel]."""
 QUALITY = 82
 """Of WebP files, 0 to 100."""
 FRAMES = 1500
@@ -65,12 +63,10 @@ def log_page(
     assert verdict is not None, "the log is one of ours"
     places = log_places(recording, path)
     causes = _causes(verdict, places, end=playback.end)
+    worst = causes[0].at if causes else None
     with Shots(playback, size=PICTURE, captions=False) as shots:
-        pictures = {step.id: _picture(shots, telling(playback, step), PICTURE) for step in playback.steps}
-    moment = None
-    if causes and causes[0].at is not None:
-        with Shots(playback, size=MOMENT, captions=False) as shots:
-            moment = _picture(shots, causes[0].at, MOMENT)
+        pictures = {step.id: _picture(shots, telling(playback, step)) for step in playback.steps}
+        moment = _picture(shots, worst) if worst is not None else None
     return RunPage(
         verdict=verdict,
         log=path.name,
@@ -97,11 +93,10 @@ def log_page(
 def refused_page(task: Task, verdict: Verdict) -> RunPage:
     """The page about a task of which a step cannot be planned: there is no log, and the file is shown as written."""
     places = task_places(task.file)
-    causes = _causes(verdict, places, end=None)
     file = Path(task.file.place().file)
     return RunPage(
         verdict=verdict,
-        causes=causes,
+        causes=_causes(verdict, places, end=None),
         steps=places[0],
         expectations=places[1],
         limits=(None,) * len(verdict.expectations),
@@ -217,13 +212,13 @@ def _limit(spec: Model) -> float | None:
     return None
 
 
-def _picture(shots: Shots, time: float, size: tuple[int, int]) -> Picture:
+def _picture(shots: Shots, time: float) -> Picture:
     from PIL import Image
 
     run: Playback = shots.playback
     stream = io.BytesIO()
     Image.fromarray(shots.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
-    return Picture(float(run.times[run.index(time)]), stream.getvalue(), size)
+    return Picture(float(run.times[run.index(time)]), stream.getvalue(), PICTURE)
 
 
 def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tuple[str, str], ...]:

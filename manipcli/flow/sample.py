@@ -1,0 +1,156 @@
+"""One sample of a task that varies: what is planned with, and what only the world knows.
+
+Where things are, how large they are, limits and the clock are seen by planner and controllers. Masses, coefficients of
+contact, gravity, actuators and everything of the controllers act in the world alone: planner and the models of
+controllers keep what the files say (`Varied.only_world`).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.flow import load
+from manipcli.flow.load import Task, Truth
+from manipcli.flow.vary import Varied, bind, draw
+from manipcli.judge.drawn import Drawn, Number
+from manipcli.model.build_robot import build_robot
+from manipcli.model.build_scene import build_scene
+from manipcli.model.packages import Packages
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.spec.base import Model
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located, Source, validate
+from manipcli.spec.override import Override, apply
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.tree import Node, ScalarNode, SequenceNode
+
+M = TypeVar("M", bound=Model)
+
+RobotOf = Callable[[Located[RobotSpec]], RobotModel]
+SceneOf = Callable[[Located[TaskSpec]], Scene]
+
+
+def load_task(
+    path: Path,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    sample: int | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> Task:
+    """Read a task and everything it names; see `flow.load.load_task`.
+
+    Args:
+        sample: which one of `vary:`; None for the task as it is written.
+
+    Raises:
+        InvalidInput: also where nothing varies, or a drawn value cannot be.
+    """
+    task = load.load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
+    if sample is None:
+        return task
+    robot_path = Path(os.path.normpath(path.parent / task.spec.robot))
+    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    varied, _ = bind(task.file, task.robot_file, task.controllers_file)
+    if not varied:
+        message = f"there is no sample {sample}: task '{task.name}' has no `vary:`"
+        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
+    drawn = draw(varied, task.spec.simulation.seed, sample)
+    return sampled(
+        task,
+        varied,
+        drawn,
+        robot_of=lambda file: build_robot(
+            file.spec,
+            file=robot_path,
+            package_path=package_path,
+            allow_outside=allow_outside,
+            place=lambda loc: file.place(*loc),
+        )[0],
+        scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), resolve=packages.resolve),
+    )
+
+
+def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: RobotOf, scene_of: SceneOf) -> Task:
+    """The task with drawn values.
+
+    Args:
+        task: as it is written.
+        varied: what varies, and `drawn`: the value of each.
+        robot_of, scene_of: build what a changed file means.
+
+    Raises:
+        InvalidInput: a drawn value is out of range, or no scene can be built with it.
+    """
+    values = dict(drawn.values)
+    changes = [(one, values[one.path]) for one in varied if one.path in values]
+    seen = [(one, value) for one, value in changes if not one.only_world]
+    written = _Files(task.file, task.robot_file, task.controllers_file)
+    try:
+        planned = written.changed(seen)
+        true = written.changed(changes)
+        robot = task.robot if planned.robot is written.robot else robot_of(planned.robot)
+        scene = task.scene if planned.task is written.task else scene_of(planned.task)
+        truth = Truth(
+            robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
+            scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
+            controllers=true.controllers,
+        )
+    except InvalidInput as invalid:
+        told = [replace(one, message=f"{one.message} (sample {drawn.number})") for one in invalid.findings]
+        raise InvalidInput(told) from None
+    return replace(
+        task, file=planned.task, robot_file=planned.robot, robot=robot, scene=scene, drawn=drawn, truth=truth
+    )
+
+
+Changes = Sequence[tuple[Varied, Number]]
+
+
+def _same(changes: Changes, seen: Changes, area: str) -> bool:
+    """Whether of this file nothing changes that is not seen."""
+    return sum(one.area == area for one, _ in changes) == sum(one.area == area for one, _ in seen)
+
+
+@dataclass(frozen=True, slots=True)
+class _Files:
+    """The three files of a task."""
+
+    task: Located[TaskSpec]
+    robot: Located[RobotSpec]
+    controllers: Located[ControllersSpec]
+
+    def changed(self, changes: Changes) -> _Files:
+        """With these values in their places; a value that is refused is told where it is varied."""
+        overrides = [
+            Override(one.area, one.parts, _node(value, place := self.task.source.key_place("vary", one.key)), place)
+            for one, value in changes
+        ]
+        return _Files(
+            _changed(self.task, overrides), _changed(self.robot, overrides), _changed(self.controllers, overrides)
+        )
+
+
+def _changed(file: Located[M], overrides: Iterable[Override]) -> Located[M]:
+    source = file.source
+    mine = [one for one in overrides if one.area == source.area]
+    if not mine:
+        return file
+    root, findings = apply(source.root, mine, type(file.spec), source.area)
+    return validate(
+        Source(source.name, root, source.area, source.kept), type(file.spec), findings=[*file.findings, *findings]
+    )
+
+
+def _node(value: Number, place: Place) -> Node:
+    if isinstance(value, tuple):
+        return SequenceNode(tuple(ScalarNode(one, place) for one in value), place)
+    return ScalarNode(value, place)

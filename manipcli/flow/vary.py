@@ -1,0 +1,322 @@
+"""`vary:` bound to the numbers of a task's files, and drawn.
+
+A sample is a pure function of seed, sample number and path: the uniform deviate of component k of a path is
+
+    u = (first 52 bits of SHA-256("seed/sample/path/k") + 1/2) / 2^52
+
+so that no path changes the draws of another, and no library's version those of any. From it `uniform` is a + (b - a) u,
+`normal` the quantile of u, `choice` item floor(n u).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from statistics import NormalDist
+from typing import Final, get_args, get_origin
+
+from pydantic import BaseModel
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import did_you_mean, escape
+from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
+from manipcli.judge.drawn import Drawn, Number
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Area, Located
+from manipcli.spec.quantity import Unit
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
+
+EVERY: Final = "*"
+"""In a path: each name of a mapping, or each item of a list."""
+_TASK_KEYS: Final = ("scene", "frames", "simulation")
+_CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
+
+Path = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """What is drawn for one path: `rows` of amounts [SI], one a component.
+
+    They are least and most of `uniform`, mean and deviation of `normal`, the items of `choice` and `grid`; of these the
+    components are drawn `together` where an item was written as a list.
+    """
+
+    word: str
+    rows: tuple[tuple[float, ...], ...]
+    together: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """A number or vector of a file that is drawn.
+
+    Attributes:
+        path: as after `--set`; `key`: as in `vary:`, where `*` may stand for several.
+        area, parts: the file, and the path in it.
+        nominal: the value in the file, one number a component; `vector`: whether it is written as a list.
+        whole: it is a whole number.
+        how: `offset`, `scale`, or nothing where the value itself is drawn.
+        law: from what.
+    """
+
+    key: str
+    path: str
+    area: Area
+    parts: Path
+    nominal: tuple[float, ...]
+    vector: bool
+    whole: bool
+    how: str
+    law: Law
+
+    @property
+    def only_world(self) -> bool:
+        """Whether planner and models of controllers keep the value in the file: it changes how things move, not where
+        they are."""
+        match self.area, self.parts:
+            case ("CTRL", _) | ("TASK", ("simulation", "gravity", *_)) | ("ROBOT", ("friction" | "actuators", *_)):
+                return True
+            case "TASK", ("scene", _, field, *_):
+                return field in _CONTACT
+        return False
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """How many items each of its grids has."""
+        return (
+            (len(self.law.rows),) * (1 if self.law.together else len(self.nominal)) if self.law.word == "grid" else ()
+        )
+
+    def value(self, seed: int, sample: int, items: Sequence[int]) -> Number:
+        """What is drawn; `items`: of each of its grids, which one."""
+        drawn = [self._component(k, seed, sample, items) for k in range(len(self.nominal))]
+        if self.how == "offset":
+            drawn = [a + b for a, b in zip(self.nominal, drawn, strict=True)]
+        elif self.how == "scale":
+            drawn = [a * b for a, b in zip(self.nominal, drawn, strict=True)]
+        values = [round(one) if self.whole else one for one in drawn]
+        return tuple(values) if self.vector else values[0]
+
+    def _component(self, k: int, seed: int, sample: int, items: Sequence[int]) -> float:
+        rows, which = self.law.rows, 0 if self.law.together else k
+        u = deviate(seed, sample, self.path, which)
+        match self.law.word:
+            case "uniform":
+                least, most = rows[0][k], rows[1][k]
+                if self.whole and self.how != "scale":
+                    return least + math.floor(u * (most - least + 1.0))
+                return least + (most - least) * u
+            case "normal":
+                return NormalDist(rows[0][k], rows[1][k]).inv_cdf(u)
+            case "choice":
+                return rows[math.floor(u * len(rows))][k]
+        return rows[items[which]][k]
+
+
+def deviate(seed: int, sample: int, path: str, component: int) -> float:
+    """Uniform in (0, 1)."""
+    digest = sha256(f"{seed}/{sample}/{path}/{component}".encode()).digest()
+    return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2.0**52
+
+
+def draw(varied: Sequence[Varied], seed: int, sample: int) -> Drawn:
+    """Sample `sample` of what is varied, in its order."""
+    rest = sample
+    items: list[int] = []
+    for size in reversed([size for one in varied for size in one.axes]):
+        rest, item = divmod(rest, size)
+        items.insert(0, item)
+    values: list[tuple[str, Number]] = []
+    for one in varied:
+        own = len(one.axes)
+        values.append((one.path, one.value(seed, sample, items[:own])))
+        items = items[own:]
+    return Drawn(sample, tuple(values))
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem(Exception):
+    """Why a path or an amount cannot be meant; `loc`: where below the path's own block, () for the path itself."""
+
+    message: str
+    hint: str | None = None
+    loc: tuple[str | int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Leaf:
+    """What stands at the end of a path."""
+
+    parts: Path
+    value: object
+    unit: Unit | None
+
+
+def bind(
+    task: Located[TaskSpec], robot: Located[RobotSpec], controllers: Located[ControllersSpec]
+) -> tuple[tuple[Varied, ...], tuple[Finding, ...]]:
+    """Everything that the task varies, in the order of its file; and what cannot be meant."""
+    found: list[Varied] = []
+    findings: list[Finding] = []
+    for key, spec in task.spec.vary.items():
+        try:
+            new = _bound(key, spec, task.spec, robot.spec, controllers.spec)
+            for one in new:
+                _refuse_overlap(one, found)
+        except _Problem as problem:
+            loc = ("vary", key, *problem.loc)
+            findings.append(task.source.finding(234, loc, problem.message, hint=problem.hint, key=not problem.loc))
+        else:
+            found += new
+    return tuple(found), tuple(findings)
+
+
+def _bound(
+    key: str, spec: VarySpec, task: TaskSpec, robot: RobotSpec, controllers: ControllersSpec
+) -> tuple[Varied, ...]:
+    first, *rest = key.split(".")
+    area: Area
+    if first == "robot":
+        area, prefix, leaves = "ROBOT", "robot.", _leaves(robot, tuple(rest))
+    elif first == "controllers":
+        area, prefix, leaves = "CTRL", "", _leaves(controllers, (first, *rest))
+    elif first in _TASK_KEYS:
+        area, prefix, leaves = "TASK", "", _leaves(task, (first, *rest))
+    else:
+        known = (*_TASK_KEYS, "robot", "controllers")
+        message = f"'{escape(first)}' cannot be varied, only {', '.join(known[:-1])} and {known[-1]}"
+        raise _Problem(message, did_you_mean(first, known) if first not in TaskSpec.model_fields else None)
+    return tuple(_varied(key, f"{prefix}{'.'.join(leaf.parts)}", area, leaf, spec) for leaf in leaves)
+
+
+def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Varied:
+    vector = isinstance(leaf.value, tuple)
+    values = leaf.value if isinstance(leaf.value, tuple) else (leaf.value,)
+    nominal = tuple(one for one in values if isinstance(one, int | float) and not isinstance(one, bool))
+    if leaf.value is None:
+        raise _Problem(f"there is no value at '{path}' that could vary", "write one into the file first")
+    if len(nominal) != len(values) or not nominal:
+        raise _Problem(f"'{path}' is no number, and no list of numbers")
+    whole = all(isinstance(one, int) for one in nominal)
+    how = spec.word if spec.word in ("offset", "scale") else ""
+    dimensions = (NUMBER,) if how == "scale" or leaf.unit is None else leaf.unit.dimensions
+    law = _law(spec.distribution, len(nominal), vector, dimensions, (how,) if how else ())
+    if whole and how != "scale" and law.word != "normal":
+        broken = next((one for row in law.rows for one in row if not float(one).is_integer()), None)
+        if broken is not None:
+            loc = (*((how,) if how else ()), law.word)
+            raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
+    return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
+
+
+def _law(
+    spec: DistributionSpec, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: tuple[str, ...]
+) -> Law:
+    word = spec.word
+    written: tuple[tuple[Value, tuple[str | int, ...]], ...]
+    if spec.normal is not None:
+        written = ((spec.normal.mean, (*loc, word, "mean")), (spec.normal.sd, (*loc, word, "sd")))
+    else:
+        written = tuple((value, (*loc, word, k)) for k, value in enumerate(getattr(spec, word)))
+    rows = tuple(_row(value, count, vector, dimensions, at) for value, at in written)
+    if word == "uniform" and any(a > b for a, b in zip(*rows, strict=True)):
+        raise _Problem("the least value is above the most", "write [least, most]", (*loc, word))
+    if word == "normal" and not all(sd > 0.0 for sd in rows[1]):
+        raise _Problem("the standard deviation must be above 0", loc=(*loc, word))
+    lists = word in ("choice", "grid") and any(isinstance(value, tuple) for value, _ in written)
+    return Law(word, rows, together=lists)
+
+
+def _row(
+    value: Value, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: tuple[str | int, ...]
+) -> tuple[float, ...]:
+    """One amount a component, in SI."""
+    if not isinstance(value, tuple):
+        return (_si(value, dimensions, loc),) * count
+    if not vector:
+        raise _Problem("a list of amounts for a single number", "write a number, or a text with a unit", loc)
+    if len(value) != count:
+        raise _Problem(f"expected {count} amounts, got {len(value)}", loc=loc)
+    return tuple(_si(one, dimensions, (*loc, k)) for k, one in enumerate(value))
+
+
+def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: tuple[str | int, ...]) -> float:
+    if not isinstance(amount, str):
+        return amount
+    try:
+        return to_si(amount, *dimensions)
+    except UnitError as error:
+        raise _Problem(error.cause, error.hint, loc) from None
+
+
+def _refuse_overlap(one: Varied, before: Sequence[Varied]) -> None:
+    for other in before:
+        shorter = min(len(one.parts), len(other.parts))
+        if one.area == other.area and one.parts[:shorter] == other.parts[:shorter]:
+            raise _Problem(f"'{one.path}' is varied by '{other.key}' already")
+
+
+def _leaves(root: BaseModel, parts: Path) -> list[_Leaf]:
+    """What stands at the end of a path, or of each path that its `*` stand for.
+
+    Raises:
+        _Problem: nothing does.
+    """
+    return list(_below(root, type(root), (), (), parts))
+
+
+def _below(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> Iterator[_Leaf]:
+    if not rest:
+        yield _Leaf(done, value, _unit(annotation, metadata))
+        return
+    part, further = rest[0], rest[1:]
+    known = _children(value, annotation)
+    if part == EVERY and not isinstance(value, BaseModel):
+        there = [leaf for name, child in known.items() for leaf in _tried(*child, (*done, name), further)]
+        if not there:
+            raise _Problem(f"nothing stands at '{'.'.join((*done, *rest))}'")
+        yield from there
+        return
+    if part not in known:
+        where = f"'{'.'.join(done)}'" if done else "the file"
+        holds = f"there is no '{escape(part)}' in {where}" if known else f"{where} has nothing in it"
+        raise _Problem(holds, did_you_mean(part, known, kind="there are"))
+    yield from _below(*known[part], (*done, part), further)
+
+
+def _tried(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> list[_Leaf]:
+    """What one of many names leads to: not each of them needs to have all of the path."""
+    try:
+        return [leaf for leaf in _below(value, annotation, metadata, done, rest) if leaf.value is not None]
+    except _Problem:
+        return []
+
+
+def _children(value: object, annotation: object) -> dict[str, tuple[object, object, Sequence[object]]]:
+    """What stands directly below a value, by name: value, annotation and metadata."""
+    if isinstance(value, BaseModel):
+        return {
+            field.alias or name: (getattr(value, name), field.annotation, field.metadata)
+            for name, field in type(value).model_fields.items()
+        }
+    if isinstance(value, dict):
+        return {str(name): (one, annotation, ()) for name, one in value.items()}
+    if isinstance(value, tuple):
+        return {str(k): (one, annotation, ()) for k, one in enumerate(value)}
+    return {}
+
+
+def _unit(annotation: object, metadata: Sequence[object]) -> Unit | None:
+    """The unit that a field's type states, however deep in it."""
+    for one in (*metadata, *getattr(annotation, "__metadata__", ())):
+        if isinstance(one, Unit):
+            return one
+    if get_origin(annotation) is None:
+        return None
+    units = (_unit(one, ()) for one in get_args(annotation))
+    return next((unit for unit in units if unit is not None), None)

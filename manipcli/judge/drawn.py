@@ -1,0 +1,60 @@
+"""Which sample of a task's `vary:` a run was, and what was drawn for it: as the log keeps it and reports tell it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+SAMPLE = "sample"
+"""Metadata of the log of a sample: `number`, and `values` as JSON by their paths, in SI."""
+
+Number = float | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """Sample `number`: for each path, as after `--set`, its value in SI (a whole number is an `int`)."""
+
+    number: int
+    values: tuple[tuple[str, Number], ...]
+
+    def __str__(self) -> str:
+        """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`."""
+        return f"sample {self.number}: {', '.join(f'{path}={_shown(value)}' for path, value in self.values)}"
+
+    def to_metadata(self) -> dict[str, str]:
+        """What `from_metadata` reads."""
+        return {"number": str(self.number), "values": json.dumps(dict(self.values))}
+
+    @staticmethod
+    def from_metadata(metadata: Mapping[str, str]) -> Drawn:
+        """What a log says.
+
+        Raises:
+            ValueError: this is not what `to_metadata` writes.
+        """
+        read = json.loads(metadata.get("values", "null"))
+        number = metadata.get("number", "")
+        if not isinstance(read, dict) or not number.isdecimal():
+            raise ValueError("no sample")
+        return Drawn(int(number), tuple((path, _number(value)) for path, value in read.items()))
+
+
+def _number(value: object) -> Number:
+    if isinstance(value, list):
+        return tuple(_scalar(one) for one in value)
+    return _scalar(value)
+
+
+def _scalar(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError("no number")
+    return value
+
+
+def _shown(value: Number) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    return f"{value:.4g}"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import listed
+from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.expectation import Seams
 from manipcli.judge.steps import step_outcomes
@@ -63,7 +64,16 @@ def judge(
         expectations=examined.outcomes,
         errors=errors,
         text=text,
+        drawn=_drawn(recording),
     )
+
+
+def _drawn(recording: Recording) -> Drawn | None:
+    """Which sample this was; None also where the log says what no sample is."""
+    try:
+        return Drawn.from_metadata(recording.metadata[SAMPLE]) if SAMPLE in recording.metadata else None
+    except ValueError:
+        return None
 
 
 def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from manipcli.core.errors import Finding
+from manipcli.judge.drawn import Drawn
 
 VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]
@@ -59,7 +60,10 @@ class ExpectationOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The judgement of one recording. `errors`: why there is none, or why it is incomplete or was never made."""
+    """The judgement of one recording. `errors`: why there is none, or why it is incomplete or was never made.
+
+    `drawn`: which sample of the task's `vary:` it is of; None: the task as it is written.
+    """
 
     task: str
     verdict: VerdictWord
@@ -70,3 +74,4 @@ class Verdict:
     expectations: tuple[ExpectationOutcome, ...]
     errors: tuple[Finding, ...] = ()
     text: str = ""
+    drawn: Drawn | None = None

@@ -20,7 +20,7 @@ from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
-from manipcli.plan.trajectory import JointTrajectory
+from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
 
 GRAZE = 1e-4
@@ -167,7 +167,7 @@ class Draft:
         q, v, a = points.sample(times)
         smooth = bool(np.isfinite(limits.acceleration).all())
         trajectory = JointTrajectory.of_arrays(
-            names=points.names, times=times, positions=q, velocities=v, accelerations=a if smooth else None
+            points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
         )
         with self._told(label):
             verify(trajectory, limits)

@@ -10,7 +10,7 @@ that sampling at ticks returns the planned values themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
-from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, TrajectoryPoint, Waypoint, read_points, seconds
+from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, TrajectoryPoint, Waypoint, as_point, read_points, seconds
 
 __all__ = ["CUBIC", "LINEAR", "QUINTIC", "JointTrajectory", "Samples", "TrajectoryPoint", "Waypoint"]
 
@@ -37,12 +37,13 @@ class JointTrajectory:
 
     Args:
         names: (n) joints, in the order of every point's arrays.
-        points: `TrajectoryPoint`s or whatever has their fields; times strictly increasing from the start of the goal.
-            Points without positions have theirs integrated from their velocities, or accelerations, by the trapezoid
-            rule; without a `start` such a trajectory cannot be sampled until somebody says where it starts.
-        start: where the joints are at its own `time_from_start`; leads in to the first point. Velocities and
-            accelerations that it lacks and the first point has count as 0. Unused when the first point's time is
-            not later: the reference then steps to that point.
+        points: `TrajectoryPoint`s or whatever has their fields, a mapping too; times strictly increasing from the
+            start of the goal. Points without positions have theirs integrated from their velocities, or accelerations,
+            by the trapezoid rule; without a `start` such a trajectory cannot be sampled until somebody says where it
+            starts.
+        start: where the joints are at its own `time_from_start`, or their positions (n) at 0 s; leads in to the first
+            point. Velocities and accelerations that it lacks and the first point has count as 0. Unused when the first
+            point's time is not later: the reference then steps to that point.
         interpolation: `splines`; or `none`: between two points the later one holds at once (the lead-in holds `start`).
 
     Attributes:
@@ -78,12 +79,20 @@ class JointTrajectory:
     def __init__(
         self,
         names: Sequence[str],
-        points: Sequence[Waypoint],
-        start: Waypoint | None = None,
+        points: Sequence[Waypoint | Mapping[str, object]],
+        start: Waypoint | Mapping[str, object] | Sequence[float] | Array | None = None,
         *,
         interpolation: Interpolation = "splines",
     ) -> None:
-        read = read_points(points, start, len(names))
+        if isinstance(names, str):
+            raise InvalidArgument("TRAJ100", f"the names are one text, '{names}'; expected a list of joints")
+        if not isinstance(points, Sequence):
+            raise InvalidArgument("TRAJ101", f"the points are {type(points).__name__}; expected a list of them")
+        given = [as_point(point, f"point {k}") for k, point in enumerate(points)]
+        if isinstance(start, Sequence | np.ndarray):
+            start = TrajectoryPoint(start)
+        begin = None if start is None else as_point(start, "the start state")
+        read = read_points(given, begin, len(names))
         highest = int(read.orders.max())
         self._set(
             tuple(names), frozen(read.times), frozen(read.positions),
@@ -92,7 +101,7 @@ class JointTrajectory:
             None if read.efforts is None else frozen(read.efforts),
             None if bool((read.orders == highest).all()) else read.orders,
             interpolation, led_in=read.led_in, integrated=read.integrated,
-            source=tuple(points) if read.relative else None,
+            source=tuple(given) if read.relative else None,
         )  # fmt: skip
 
     @classmethod
@@ -304,10 +313,13 @@ class JointTrajectory:
                     length = (self.times[i + 1] - self.times[i])[:, None]
                     position[rows], velocity[rows], acceleration[rows] = evaluate(i, tau, length)
         # The end of a curve is the point itself, not its rounded curve; of what the point lacks, the curve knows more.
+        # Where it lacks the velocity, too, a straight line ends at rest, as it goes on afterwards.
         last = t >= self.times[-1]
         given = self.order if self.orders is None else int(self.orders[-1])
         position[last] = self.positions[-1]
-        if given >= CUBIC and self.velocities is not None:
+        if given == LINEAR:
+            velocity[last] = 0.0
+        elif self.velocities is not None:
             velocity[last] = self.velocities[-1]
         if given >= QUINTIC and self.accelerations is not None:
             acceleration[last] = self.accelerations[-1]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from datetime import timedelta
 from typing import Final, Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.core.text import did_you_mean
 
 LINEAR, CUBIC, QUINTIC = 0, 1, 2
 """What a point gives: positions; velocities too; accelerations too."""
@@ -21,7 +23,7 @@ Values = Sequence[float] | Array
 
 
 class RosDuration(Protocol):
-    """builtin_interfaces/Duration."""
+    """builtin_interfaces/Duration; ROS 1's, with `secs` and `nsecs`, will do, too."""
 
     @property
     def sec(self) -> int: ...
@@ -154,7 +156,10 @@ def _row(point: Waypoint, n: int, what: str) -> _Row:
     values: list[Array | None] = []
     for field in FIELDS:
         given = getattr(point, field, None)
-        array = np.zeros(0) if given is None else np.asarray(given, dtype=np.float64)
+        try:
+            array = np.zeros(0) if given is None else np.atleast_1d(np.asarray(given, dtype=np.float64))
+        except (TypeError, ValueError):
+            raise InvalidArgument("TRAJ102", f"{what} has {field} that are no numbers: {given!r}") from None
         if array.size and array.shape != (n,):
             message = f"{what} has {array.size} {'efforts' if field == 'effort' else field}; expected "
             raise InvalidArgument("TRAJ102", message + _one_a_joint(n))
@@ -164,15 +169,44 @@ def _row(point: Waypoint, n: int, what: str) -> _Row:
         raise InvalidArgument("TRAJ102", f"{what} has 0 positions; expected {_one_a_joint(n)}")
     if position is not None and velocity is None and acceleration is not None:
         raise InvalidArgument("TRAJ103", f"{what} has accelerations but no velocities", hint="give velocities too")
-    return _Row(seconds(point), position, velocity, acceleration, effort)
+    return _Row(seconds(point, what), position, velocity, acceleration, effort)
 
 
-def seconds(point: Waypoint) -> float:
-    """Its `time_from_start` [s]."""
-    time = point.time_from_start
+def as_point(given: Waypoint | Mapping[str, object], what: str) -> Waypoint:
+    """A point, whose fields may also stand in a mapping, as a message in YAML does.
+
+    Raises:
+        InvalidArgument: what has no such field, or is no point.
+    """
+    if isinstance(given, Mapping):
+        known = [field.name for field in fields(TrajectoryPoint)]
+        for key in given:
+            if key not in known:
+                raise InvalidArgument("TRAJ112", f"{what} has an unknown '{key}'", hint=did_you_mean(str(key), known))
+        return TrajectoryPoint(**given)  # type: ignore[arg-type]  # what they hold is looked at where it is read
+    if not hasattr(given, "positions"):
+        message = f"{what} is {given!r}; expected a TrajectoryPoint, or what has its fields"
+        raise InvalidArgument("TRAJ112", message)
+    return given
+
+
+def seconds(point: Waypoint, what: str = "a point") -> float:
+    """Its `time_from_start` [s].
+
+    Raises:
+        InvalidArgument: it is no time.
+    """
+    time: object = getattr(point, "time_from_start", None)
     if isinstance(time, int | float | np.number):
         return float(time)
-    return time.sec + 1e-9 * time.nanosec
+    if isinstance(time, timedelta):
+        return time.total_seconds()
+    for pair in (("sec", "nanosec"), ("secs", "nsecs")):
+        said = [time.get(key) if isinstance(time, Mapping) else getattr(time, key, None) for key in pair]
+        whole, nano = (0 if each is None else each for each in said)
+        if said != [None, None] and isinstance(whole, int | np.integer) and isinstance(nano, int | np.integer):
+            return float(whole + 1e-9 * nano)
+    raise InvalidArgument("TRAJ113", f"{what} has the time_from_start {time!r}; expected seconds, or a duration of ROS")
 
 
 def _one_a_joint(n: int) -> str:

@@ -249,8 +249,8 @@ def _pushes(playback: Playback, poses: Poses, pack: _Pack) -> Json | None:
     rows = [[*push.point, *push.direction, push.force] for pushes in each for push in pushes]
     return {
         "first": pack.add(np.cumsum([0, *map(len, each)]), "I"),
-        # To a millionth: the rest is not the same in every process.
-        "rows": pack.add(np.round(np.array(rows).reshape(-1, 7), 6), "f"),
+        # To a millionth, and no -0: the rest is not the same in every process.
+        "rows": pack.add(np.round(np.array(rows).reshape(-1, 7), 6) + 0.0, "f"),
         "scale": forces.scale,
         "longest": LONGEST,
     }

@@ -1,0 +1,195 @@
+"""Who feeds whom, as a tree for a terminal, for Graphviz, for Mermaid and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from manipcli.core.text import escape
+from manipcli.report.json import Json, dumps
+
+Kind = Literal["task", "planner", "controller", "limits", "drive", "engine", "sensor", "robot", "scene", "topic"]
+GraphFormat = Literal["text", "dot", "mermaid", "json"]
+
+_SHAPES: Final[Mapping[Kind, tuple[str, str, str]]] = {
+    # of Graphviz, and what stands around a label of Mermaid
+    "task": ("note", "[", "]"),
+    "planner": ("box", "[", "]"),
+    "controller": ("box", "[", "]"),
+    "limits": ("box", "[", "]"),
+    "drive": ("box", "[", "]"),
+    "engine": ("box3d", "[[", "]]"),
+    "sensor": ("parallelogram", "[/", "/]"),
+    "robot": ("note", "[", "]"),
+    "scene": ("note", "[", "]"),
+    "topic": ("ellipse", "([", "])"),
+}
+_SAID: Final = ("task", "controller", "engine", "robot", "scene")
+"""Kinds whose names do not say what they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One that feeds or is fed.
+
+    Attributes:
+        id: of its own.
+        kind: what it is.
+        name: as people call it.
+        type: of the messages of a topic.
+        details: short facts.
+        items: lines that belong to it: the steps of a task.
+        idle: it does nothing at the start.
+    """
+
+    id: str
+    kind: Kind
+    name: str
+    type: str = ""
+    details: tuple[str, ...] = ()
+    items: tuple[str, ...] = ()
+    idle: bool = False
+
+    @property
+    def title(self) -> str:
+        """Its name, and what it is where that says nothing of it."""
+        return f"{self.kind} {self.name}" if self.kind in _SAID else self.name
+
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """The type without its package, and the details."""
+        return (self.type.rpartition("/")[2], *self.details) if self.type else self.details
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """`source` feeds `target` with `label`; `idle`: not at the start; `back`: against the flow, as what is measured."""
+
+    source: str
+    target: str
+    label: str = ""
+    idle: bool = False
+    back: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Nodes in the order of the flow; every edge joins two of them."""
+
+    name: str
+    nodes: tuple[Node, ...]
+    edges: tuple[Edge, ...]
+    notes: tuple[str, ...] = ()
+
+
+def render(graph: Graph, kind: GraphFormat) -> str:
+    """The graph in one of its formats."""
+    return {"text": render_text, "dot": render_dot, "mermaid": render_mermaid, "json": render_json}[kind](graph)
+
+
+def render_text(graph: Graph) -> str:
+    """A tree: each node stands where it is fed first, and where else it is fed `->` and its name."""
+    nodes = {node.id: node for node in graph.nodes}
+    feeder: dict[str, Edge] = {}
+    for edge in graph.edges:
+        feeder.setdefault(edge.target, edge)
+    shown: set[str] = set()
+
+    def below(node: Node, edge: Edge | None, first: str, rest: str) -> Iterator[str]:
+        by = f"  <- {edge.label}" if edge is not None and edge.label else ""
+        if edge is not None and feeder[node.id] is not edge:
+            yield f"{first}-> {node.title}{by}"
+            return
+        shown.add(node.id)
+        about = f"  ({', '.join(node.facts)})" if node.facts else ""
+        yield f"{first}{node.title}{about}{by}"
+        out = [one for one in graph.edges if one.source == node.id]
+        for item in node.items:
+            yield f"{rest}{'│ ' if out else '  '}{item}"
+        for k, one in enumerate(out):
+            branch, more = ("└─ ", "   ") if k == len(out) - 1 else ("├─ ", "│  ")
+            if one.target in shown and feeder[one.target] is one:
+                yield f"{rest}{branch}-> {nodes[one.target].title}"  # the circle is closed
+            else:
+                yield from below(nodes[one.target], one, rest + branch, rest + more)
+
+    lines = [f"note: {note}" for note in graph.notes]
+    for node in graph.nodes:
+        if node.id not in feeder:
+            lines += below(node, None, "", "")
+    for node in graph.nodes:
+        if node.id not in shown:  # of a circle that nothing feeds
+            lines += below(node, None, "", "")
+    return "\n".join(lines)
+
+
+def render_dot(graph: Graph) -> str:
+    """For Graphviz: `manipcli graph TASK --format dot | dot -Tsvg`."""
+    numbers = {node.id: f"n{k}" for k, node in enumerate(graph.nodes)}
+    lines = [f"digraph {_dot(graph.name)} {{", "  rankdir=LR;", '  node [fontname="sans-serif"];']
+    lines.append('  edge [fontname="sans-serif", fontsize=10];')
+    for node in graph.nodes:
+        style = ", style=dashed" if node.idle else ""
+        lines.append(f"  {numbers[node.id]} [shape={_SHAPES[node.kind][0]}, label={_dot(*_label(node))}{style}];")
+    for edge in graph.edges:
+        words = [f"label={_dot(edge.label)}"] if edge.label else []
+        words += ["style=dashed"] if edge.idle else []
+        words += ["constraint=false"] if edge.back else []
+        about = f" [{', '.join(words)}]" if words else ""
+        lines.append(f"  {numbers[edge.source]} -> {numbers[edge.target]}{about};")
+    return "\n".join([*lines, "}"])
+
+
+def _dot(*lines: str) -> str:
+    """A quoted string; a line ends with `\\l`, which also sets it to the left, where there are several."""
+    quoted = [escape(line).replace("\\", "\\\\").replace('"', '\\"') for line in lines]
+    return f'"{quoted[0]}"' if len(quoted) == 1 else '"' + "".join(f"{line}\\l" for line in quoted) + '"'
+
+
+def render_mermaid(graph: Graph) -> str:
+    """For Mermaid, as in Markdown of code hosts."""
+    numbers = {node.id: f"n{k}" for k, node in enumerate(graph.nodes)}
+    lines = ["flowchart LR"]
+    for node in graph.nodes:
+        _, left, right = _SHAPES[node.kind]
+        label = "<br/>".join(map(_mermaid, _label(node)))
+        lines.append(f'  {numbers[node.id]}{left}"{label}"{right}')
+    for edge in graph.edges:
+        arrow = "-.->" if edge.idle else "-->"
+        about = f'|"{_mermaid(edge.label)}"|' if edge.label else ""
+        lines.append(f"  {numbers[edge.source]} {arrow}{about} {numbers[edge.target]}")
+    idle = [numbers[node.id] for node in graph.nodes if node.idle]
+    if idle:
+        lines += ["  classDef idle stroke-dasharray: 4 3", f"  class {','.join(idle)} idle"]
+    return "\n".join(lines)
+
+
+def _mermaid(text: str) -> str:
+    """Everything that it could read as markup as an entity, by its number."""
+    return "".join(one if one.isalnum() or one in " _-./,:()=…→+" else f"#{ord(one)};" for one in escape(text))
+
+
+def _label(node: Node) -> tuple[str, ...]:
+    return (node.title, *node.facts, *node.items)
+
+
+def render_json(graph: Graph) -> str:
+    """Nodes and edges as they are."""
+    nodes: list[Json] = [
+        {
+            "id": node.id,
+            "kind": node.kind,
+            "name": node.name,
+            "type": node.type or None,
+            "details": list(node.details),
+            "items": list(node.items),
+            "idle": node.idle,
+        }
+        for node in graph.nodes
+    ]
+    edges: list[Json] = [
+        {"source": one.source, "target": one.target, "label": one.label, "idle": one.idle, "feedback": one.back}
+        for one in graph.edges
+    ]
+    return dumps({"name": graph.name, "nodes": nodes, "edges": edges, "notes": list(graph.notes)})

@@ -108,8 +108,8 @@ def _position(joint: JointFacts) -> Markup:
     if use is None:
         return joined(element("small", "no limit"))
     away = quantity(abs(use.limit - use.value), joint.unit)
-    beyond = "beyond" if use.share > 1.0 else "from"
-    return _meter(use, f"{away} {beyond} {readable(use.limit, joint.unit)}".replace("-", "−"))
+    where = "beyond" if use.share > 1.0 else "left to"
+    return _meter(use, f"{away} {where} {readable(use.limit, joint.unit)}".replace("-", "−"))
 
 
 def _use(use: Use | None, unit: str) -> Markup:

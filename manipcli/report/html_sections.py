@@ -34,14 +34,16 @@ def head(page: RunPage) -> Markup:
     told: list[tuple[str, str]] = []
     if page.facts is not None:
         told.append(("simulated", f"{verdict.simulated_time:.2f} s"))
-    done = sum(step.outcome == "done" for step in verdict.steps)
-    told.append(("steps done", f"{done} of {len(verdict.steps)}"))
-    if verdict.expectations:
+        done = sum(step.outcome == "done" for step in verdict.steps)
+        told.append(("steps done", f"{done} of {len(verdict.steps)}"))
+    if verdict.expectations and page.facts is not None:
         met = sum(one.outcome == "passed" for one in verdict.expectations)
         told.append(("expectations met", f"{met} of {len(verdict.expectations)}"))
     if page.facts is not None:
         told += _figures(page.facts)
     figures = (element("div", element("dt", name), element("dd", value)) for name, value in told)
+    if page.facts is None:
+        told.append(("simulated", "nothing: the task was refused"))
     lost = element("p", f"The log is incomplete: {page.lost}", class_="warn") if page.lost is not None else None
     return element(
         "header",
@@ -90,7 +92,7 @@ def causes(page: RunPage) -> Markup | None:
 
 def expectations(page: RunPage) -> Markup | None:
     """Each with its signed margin, in numbers and as a bar."""
-    if not page.verdict.expectations:
+    if not page.verdict.expectations or page.facts is None:
         return None
     rows = []
     for one, written, limit in page.judged:
@@ -215,18 +217,23 @@ def sources(page: RunPage) -> Markup | None:
     if not page.sources:
         return None
     about = "As resolved: defaults, parameters and overrides written out, numbers in SI."
-    return element(
-        "section", heading("files", "Files", about if page.facts is not None else ""), *map(_source, page.sources)
-    )
+    shown = [_source(source, page) for source in page.sources]
+    return element("section", heading("files", "Files", about if page.facts is not None else ""), *shown)
 
 
-def _source(source: Source) -> Markup:
+def _source(source: Source, page: RunPage) -> Markup:
+    """Folded, but for the file of a task that was refused; the lines that causes are about are marked."""
     lines = source.text.splitlines()
-    rows = (element("li", element("code", line or " "), id=anchor(source.name, k)) for k, line in enumerate(lines, 1))
+    marked = {one.written.line for one in page.causes if one.written is not None and one.written.file == source.name}
+    rows = (
+        element("li", element("code", line or " "), id=anchor(source.name, k), class_="marked" if k in marked else None)
+        for k, line in enumerate(lines, 1)
+    )
     return element(
         "details",
         element("summary", element("b", source.name), f" {len(lines)} lines"),
         element("ol", *rows, class_="source"),
+        open=page.facts is None,
     )
 
 

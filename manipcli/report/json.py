@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from manipcli.core.errors import Finding
+from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
@@ -82,6 +83,7 @@ def _object(
         "text": judged.text if judged is not None else "",
         "seed": judged.seed if judged is not None else None,
         "engine": judged.engine if judged is not None else None,
+        "sample": _sample(judged.drawn) if judged is not None and judged.drawn is not None else None,
         "simulated_time": number(judged.simulated_time) if judged is not None else None,
         "wall_time": number(wall_time),
         "real_time_factor": number(real_time_factor),
@@ -101,6 +103,10 @@ def _object(
         ],
         "errors": [finding_object(finding) for finding in errors],
     }
+
+
+def _sample(drawn: Drawn) -> Json:
+    return {"number": drawn.number, "values": dict(drawn.values)}
 
 
 def step_object(step: StepOutcome) -> dict[str, Json]:

@@ -66,7 +66,8 @@ def _run(verdict: Verdict) -> Element:
     if verdict.verdict == "error":
         lines = [str(finding) + (f"\nhint: {finding.hint}" if finding.hint else "") for finding in verdict.errors]
         _add(case, "error", verdict.text or "error", verdict.errors[0].code if verdict.errors else "error", lines)
-    elif verdict.verdict == "failed" and not _steps_failed(verdict) and not _unmet(verdict):
+    elif verdict.verdict == "failed" and not _steps_failed(verdict) and (_undone(verdict) or not _unmet(verdict)):
+        # It ended before its first step, or after its last.
         _add(case, "failure", verdict.text, "failed", [])
     return case
 
@@ -103,6 +104,10 @@ def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str
 
 def _steps_failed(verdict: Verdict) -> bool:
     return any(step.outcome not in ("done", "not_run") for step in verdict.steps)
+
+
+def _undone(verdict: Verdict) -> bool:
+    return any(step.outcome == "not_run" for step in verdict.steps)
 
 
 def _unmet(verdict: Verdict) -> bool:

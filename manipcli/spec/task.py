@@ -13,10 +13,12 @@ from typing import Annotated, Final, Literal, get_args
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.spec.base import Model, problem
+from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec
 from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
+from manipcli.spec.vary import VarySpec
 
 __all__ = [
     "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "Positive", "RatesSpec",
@@ -255,6 +257,12 @@ class TaskSpec(Model):
         description="Whether a step is planned again where things are not as it was planned for, and from which "
         "difference on. Default true.",
     )
+    vary: dict[str, VarySpec] = Field(
+        {},
+        description="What `--sample N` draws, by the path of a number as after `--set`; `*` for every name: "
+        "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
+    )
+    baseline: BaselineSpec = Field(BaselineSpec(), description="How much worse than its baseline a run may be.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")
 

@@ -174,7 +174,7 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
         return _report(PASSED)
 
     pipeline.run_task = run_task
-    words = "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --set a.b=1 --set c=x=y --package-path p"
+    words = "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p"
     assert main([*words.split(), "--allow-outside", "-q"]) == 0
     del given["progress"]
     assert given == {
@@ -183,6 +183,7 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
         "force": True,
         "embed_meshes": True,
         "seed": 3,
+        "sample": 7,
         "overrides": ("a.b=1", "c=x=y"),
         "package_path": (Path("p"),),
         "allow_outside": True,

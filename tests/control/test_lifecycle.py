@@ -245,6 +245,39 @@ def test_an_update_rate_that_does_not_divide_the_control_rate_is_an_error_and_no
         ControllerManager(joints=JOINTS, period=PERIOD).load(Spring("one"), update_rate=rate)
 
 
+@pytest.mark.parametrize("wrong", [0.0, -5.0, math.nan, math.inf])
+def test_a_rate_or_period_that_is_not_above_zero_is_refused(wrong):
+    with pytest.raises(InvalidArgument, match="expected one above 0"):
+        ControllerManager(joints=JOINTS, period=PERIOD).load(Spring("one"), update_rate=wrong)
+    with pytest.raises(InvalidArgument, match="expected a time above 0"):
+        ControllerManager(joints=JOINTS, period=wrong)
+
+
+def test_a_strictness_is_read_in_any_case_and_never_guessed():
+    manager = manager_of(Spring("one"))
+    assert not manager.switch(["one", "nobody"], strictness="STRICT").ok
+    with pytest.raises(InvalidArgument, match="unknown strictness 'AUTO'; expected strict or best_effort"):
+        manager.switch("one", strictness="AUTO")
+    assert manager.switch(["one", "nobody"], strictness="BEST_EFFORT").activated == ("one",)
+
+
+def test_one_name_need_not_stand_in_a_list():
+    manager = manager_of(Spring("one"), Spring("two"))
+    assert manager.switch("one").activated == ("one",)
+    assert manager.switch("two", "one").activated == ("two",)
+    assert manager.switch_to("one").deactivated == ("two",)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros(2), [0.0, 0.0, 0.0], None])
+def test_measured_vectors_are_arrays_of_one_number_a_joint(wrong):
+    manager = manager_of(Spring("one"), active=["one"])
+    world = World()
+    world.velocity = wrong
+    with pytest.raises(InvalidArgument, match=r"measured velocity: .* expected an array of 3 numbers"):
+        manager.update(0.0, world)
+    assert manager.faults == ()
+
+
 class OwnError(Exception):
     pass
 

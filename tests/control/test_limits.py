@@ -47,6 +47,22 @@ def test_a_velocity_limit_on_positions_needs_where_it_starts():
     assert limit_position(3.0, lower=-1.0, upper=2.0, dt=1.0) == 2.0
 
 
+def test_time_is_asked_for_only_where_something_changes_with_it():
+    assert limit_position(3.0, lower=-1.0, upper=2.0) == 2.0
+    assert limit_velocity(3.0, velocity=2.0) == 2.0
+    for limited in (
+        lambda dt: limit_position(1.0, velocity=1.0, previous=0.0, dt=dt),
+        lambda dt: limit_position(1.0, previous=0.0, soft_upper=0.5, k_position=2.0, dt=dt),
+        lambda dt: limit_velocity(1.0, acceleration=1.0, previous=0.0, dt=dt),
+        lambda dt: limit_velocity(1.0, upper=1.0, position=0.0, dt=dt),
+    ):
+        with pytest.raises(InvalidArgument, match="`dt`"):
+            limited(None)
+        for wrong in (0.0, -1.0, math.nan):
+            with pytest.raises(InvalidArgument, match="expected a time above 0"):
+                limited(wrong)
+
+
 def test_soft_limits_of_positions():
     """Case 54 (ros_control's PositionJointSoftLimits): dt 0.1, v_max 2, soft 0.8 with k 20, hard 1."""
     law = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "k_position": 20.0, "dt": 0.1}

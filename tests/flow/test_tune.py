@@ -75,6 +75,14 @@ def test_a_joint_whose_weight_nobody_carries_gets_an_integral_that_can(tmp_path:
     assert one.i_clamp == pytest.approx(1.2 * 0.5 * 9.80665 * 0.2, rel=0.01)
 
 
+@pytest.mark.parametrize("axis", ["0 0 1", "1e-14 0 1"])
+def test_a_joint_without_weight_gets_a_tenth_of_its_effort_also_where_rounding_weighs(
+    tmp_path: Path, axis: str
+) -> None:
+    control = "command_interface: effort, gains: {hinge: {p: 1}}"
+    assert tuned(tmp_path, Wish(3.0, 1.0, 1e-3), axis=axis, control=control).i_clamp == 4.0
+
+
 @pytest.mark.parametrize(
     ("wish", "of", "why"),
     [

@@ -236,3 +236,15 @@ def test_hulls_that_overlap_are_no_overlap_where_the_surfaces_do_not_meet(tmp_pa
         chain += '<joint name="l" type="revolute"><origin xyz="0 0 -1"/><parent link="other"/><child link="last"/>'
         text = one_joint(tip=INERTIAL + mesh, more=chain + LIMIT + "</joint>")
         assert ("URDF333" in codes(tmp_path, text)) is told
+
+
+def test_a_joint_without_an_interface_is_told_that_of_its_actuator(tmp_path: Path) -> None:
+    """Descriptions of early ROS 1 say it at the actuator alone."""
+    for said, meant in (
+        ("<hardwareInterface>EffortJointInterface</hardwareInterface>", "EffortJointInterface"),
+        ("", "PositionJointInterface"),
+    ):
+        motor = MOTOR.replace("</actuator>", said + "</actuator>")
+        found = findings(tmp_path, one_joint(more=transmission('<joint name="j"/>' + motor)))
+        (hint,) = [finding.hint for finding in found if finding.code == "URDF314"]
+        assert hint == f"<hardwareInterface>hardware_interface/{meant}</hardwareInterface>"

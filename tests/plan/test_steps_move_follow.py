@@ -191,6 +191,8 @@ def test_positions_alone_are_followed_on_straight_lines(bench: Make) -> None:
     trajectory = arm.plan("follow", spec).motions[0].trajectory
     for t, q in ((0.25, [0.1, 0.1]), (1.0, [0.4, 0.1]), (1.25, [0.4, 0.2]), (1.5, [0.4, 0.3])):
         np.testing.assert_allclose(trajectory.sample(t)[0], q, atol=1e-9)
+    assert trajectory.velocities is None  # a controller would take those of its end as what is wanted there
+    assert trajectory.sample(1.5)[1].tolist() == [0.0, 0.0]
 
 
 def test_velocities_make_cubics_and_accelerations_quintics(bench: Make) -> None:

@@ -1,6 +1,8 @@
 """Sampling of joint trajectories against closed forms, finite differences and the values of the points themselves."""
 
 import math
+from datetime import timedelta
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -288,3 +290,41 @@ def test_what_cannot_be_followed_is_refused(changes, text):
 def test_points_of_the_wrong_length_are_refused(points, text):
     with pytest.raises(InvalidArgument, match=text):
         JointTrajectory(("a", "b"), points)
+
+
+def test_a_straight_line_ends_at_rest_and_a_curve_as_its_point_says():
+    line = one_joint(at(0, 0), at(1, 1))
+    assert values(line, 1.0) == pytest.approx((1, 0, 0))
+    assert values(line, 1.0 - 1e-9)[1] == pytest.approx(1.0)
+    assert values(one_joint(at(0, 0, 0), at(1, 1, 2.0)), 1.0)[1] == 2.0
+
+
+@pytest.mark.parametrize(
+    "time", [1.5, {"secs": 1, "nsecs": 500000000}, {"sec": 1, "nanosec": 500000000}, timedelta(seconds=1.5)]
+)
+def test_points_may_be_mappings_as_messages_in_yaml_are(time):
+    point = {"positions": [3.0], "velocities": [], "time_from_start": time}
+    assert values(JointTrajectory(["a"], [point], [0.0]), 0.75) == pytest.approx((1.5, 2.0, 0.0))
+
+
+def test_durations_of_both_ros_are_read():
+    for duration in (SimpleNamespace(secs=2, nsecs=5000000), SimpleNamespace(sec=2, nanosec=5000000)):
+        assert one_joint(at(1, duration)).duration == pytest.approx(2.005)
+    assert one_joint({"positions": 1.0, "time_from_start": {"secs": 3}}).duration == 3.0
+
+
+@pytest.mark.parametrize(
+    ("names", "points", "text"),
+    [
+        ("ab", [at([1, 1], 1)], "the names are one text, 'ab'; expected a list"),
+        (["a"], at(1, 1), "the points are TrajectoryPoint; expected a list"),
+        (["a"], [3.0], "point 0 is 3.0; expected a TrajectoryPoint"),
+        (["a"], [{"position": [1]}], "point 0 has an unknown 'position'"),
+        (["a"], [at(1, None)], "point 0 has the time_from_start None; expected seconds"),
+        (["a"], [at(1, {"secs": "3"})], "time_from_start {'secs': '3'}; expected seconds"),
+        (["a"], [{"positions": "x"}], "point 0 has positions that are no numbers: 'x'"),
+    ],
+)
+def test_what_is_no_point_is_told_as_such(names, points, text):
+    with pytest.raises(InvalidArgument, match=text):
+        JointTrajectory(names, points)

@@ -1,0 +1,254 @@
+"""The page about a run: from the log alone, harmless whatever things are called, and it says what it lacks."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import Finding
+from manipcli.core.geometry import frozen
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.pipeline import load_task
+from manipcli.report.facts import JointFacts, Peak, RunFacts, StepFacts, Use
+from manipcli.report.holds import Hold, HoldFacts, Slip, Spread
+from manipcli.report.html import render_page
+from manipcli.report.html_parts import number, of_limit, signed
+from manipcli.report.markup import Markup, element, joined
+from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+
+ROOT = Path(__file__).parents[2]
+HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)> & 'x' \"y\" \x1b[31m {{7*7}}"
+VOID = {"br", "img", "input", "line", "link", "meta", "rect", "polygon"}
+
+
+class _Page(HTMLParser):
+    """Elements in the order in which they open; every one must be closed by its own end."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[str] = []
+        self._open: list[str] = []
+        self.feed(page)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self._open and self._open[-1] not in ("script", "style"):
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return " ".join(" ".join(self.text).split())
+
+    def ids(self) -> list[str]:
+        return [attributes["id"] or "" for _, attributes in self.found if "id" in attributes]
+
+
+def _facts(name: str = "joint_1") -> RunFacts:
+    use = Use(0.97, -2.03, -2.09, 0.6)
+    joint = JointFacts(
+        name, "rad", Peak(0.01, 1.2), 0.004, use, None, Use(1.1, 44.0, 40.0, 1.0), 7.66, 1.0, Peak(15, 0.9), 7
+    )
+    step = StepFacts("a", 0.0, frozen([7.66]), frozen([1.0]), frozen([15.0]), Peak(15.0, 0.9))
+    hold = HoldFacts(
+        Hold("cup", 1.0, 1.1, 2.0, "lost"), Spread(4.0, 5.5, 6.0), Spread(1, 1.7, 2), ("thumb", name),
+        Slip(0.0042, 1.5, 0.001), Slip(0.1, 2.0, 0.1),
+    )  # fmt: skip
+    return RunFacts(
+        (joint,), (step,), (hold,), (("motor", 3),), frozen([0.5, 1.5]), frozen([[0.01], [0.002]]), 0.001, 0, 2
+    )
+
+
+def _page(name: str = "a name") -> RunPage:
+    """A failed run with one of everything but a replay."""
+    verdict = Verdict(
+        name, "failed", 1, "pybullet", 2.0,
+        (StepOutcome("a", name, "done", 0.0, 1.2, 1.0, name), StepOutcome(name, "wait", "failed", 1.2, None, 1.0, name),
+         StepOutcome("c", "wait", "not_run", None, None, 1.0)),
+        (ExpectationOutcome(name, "failed", -0.016, "m", 1.5, name),
+         ExpectationOutcome("upright", "passed", 0.05, "rad", 2.0),
+         ExpectationOutcome("in", "not_evaluated", None, "m", None)),
+        (), name,
+    )  # fmt: skip
+    places = tuple(Written(f"{name}:{13 + k}", "task.yaml", k + 1) for k in range(3))
+    picture = Picture(1.2, b"RIFF", (4, 3))
+    return RunPage(
+        verdict=verdict, log=name, lost=name, causes=(Cause(name, name, 1.5, places[1], name), Cause("also", "", None)),
+        steps=places, expectations=(Written(""), places[0], places[1]), limits=(0.02, 0.0873, None), facts=_facts(name),
+        pictures={"a": picture}, moment=picture, sources=(Source("task.yaml", f"steps:\n  - {name}\n\n  - b"),),
+        provenance=((name, name),), hashes=((name, "0" * 64),), notes=(name,),
+    )  # fmt: skip
+
+
+def test_names_are_text_and_nothing_else() -> None:
+    calm, hostile = _Page(render_page(_page())), _Page(render_page(_page(HOSTILE)))
+    assert [tag for tag, _ in hostile.found] == [tag for tag, _ in calm.found]
+    assert [sorted(attributes) for _, attributes in hostile.found] == [sorted(a) for _, a in calm.found]
+    assert "alert(1)" in hostile.words and "\x1b" not in hostile.words
+
+
+def test_markup_escapes_what_is_not_markup() -> None:
+    assert element("p", "<b>", class_='"') == '<p class="&quot;">&lt;b&gt;</p>'
+    assert joined(Markup("<b>"), "<b>", None) == "<b>&lt;b&gt;"
+    assert element("rect", x=1.25, hidden=True, gone=None) == '<rect x="1.25" hidden />'
+
+
+def test_the_page_asks_for_nothing() -> None:
+    page = render_page(_page())
+    for tag, attributes in _Page(page).found:
+        for name in ("src", "href", "data", "action", "poster", "srcset"):
+            value = attributes.get(name) or ""
+            assert value == "" or value.startswith(("data:", "#")), (tag, name, value)
+    assert not re.search(r"https?://|@import|url\(|fetch\(|XMLHttpRequest|WebSocket", page)
+    assert any("default-src 'none'" in (attributes.get("content") or "") for _, attributes in _Page(page).found)
+    assert render_page(_page()) == page  # the same bytes every time
+
+
+def test_every_link_leads_somewhere() -> None:
+    page = _Page(render_page(_page()))
+    ids = page.ids()
+    assert len(ids) == len(set(ids))
+    targets = [str(a["href"])[1:] for tag, a in page.found if tag == "a"]
+    assert targets and set(targets) <= set(ids)
+
+
+def test_the_cause_comes_first_and_the_verdict_before_it() -> None:
+    page = replace(_page(), causes=(Cause("step 'b' failed", "it slipped by 82 mm", 1.5),))
+    words = _Page(render_page(page)).words
+    order = ["✗ failed", "✗ step 'b' failed", "it slipped by 82 mm", "show 1.50 s", "−16.0 mm"]
+    found = [words.index(each) for each in order[:3]] if page.playback is None else []
+    assert found == sorted(found)
+    assert words.index("82 mm") < words.index("−16.0 mm") < words.index("Tracking and limits")
+
+
+def test_what_the_log_lacks_is_said() -> None:
+    assert "The log is incomplete: cut" in _Page(render_page(replace(_page(), lost="cut"))).words
+
+
+def test_numbers_are_those_of_the_facts() -> None:
+    words = _Page(render_page(_page())).words
+    for told in ("5.5 N", "4.0 N to 6.0 N", "4.2 mm", "at 1.50 s; 1.0 mm at the end", "7.7 J", "15.0 W", "0.57 deg",
+                 "97 %", "36.0 of 20 mm", "7 ticks", "motor 3 ticks", "110 %", "44.0 of 40 N m",
+                 "+0.20 s"):  # fmt: skip
+        assert told in words, told
+
+
+@pytest.mark.parametrize(
+    ("shown", "text"),
+    [
+        (signed(-0.0161, "m"), "−16.1 mm"), (signed(0.0, "N"), "0 N"), (signed(2.0, "s"), "+2.0 s"),
+        (number(0.0004, "J"), "0 J"), (number(0.05, "J"), "0.05 J"), (number(7.66, "J"), "7.7 J"),
+        (number(123.4, "W"), "123 W"),
+        (of_limit(0.0063, 0.02, "m"), "6.3 of 20 mm"), (of_limit(-0.001, -40.0, "N m"), "0.0 of −40 N m"),
+        (of_limit(14.549, 60.0, "s"), "14.5 of 60 s"), (of_limit(0.0, np.radians(5), "rad"), "0.00 of 5 deg"),
+    ],
+)  # fmt: skip
+def test_how_numbers_are_written(shown: str, text: str) -> None:
+    assert shown == text
+
+
+class Ran(Protocol):
+    """What the fixture `run_cli` gives."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.mark.slow
+def test_a_task_that_was_refused_has_a_page_and_junit(run_cli: Callable[..., Ran], tmp_path: Path) -> None:
+    task = ROOT / "tasks" / "home.yaml"
+    page, junit = tmp_path / "r.html", tmp_path / "j.xml"
+    spec = load_task(task).spec
+    words = [
+        "--set",
+        "steps.0.follow.points.0.positions.3=99",
+        "--report",
+        page,
+        "--junit",
+        junit,
+        "--format",
+        "json",
+    ]
+    ran = run_cli("run", task, *words, cwd=tmp_path)
+    assert ran.code == 1 and json.loads(ran.out)["log"] is None
+    shown = _Page(page.read_text("utf-8"))
+    step = spec.steps[0].id
+    assert f"✗ step '{step}' failed" in shown.words and "cannot be planned" in shown.words
+    assert "nothing: the task was refused" in shown.words
+    assert any("marked" in (a.get("class") or "") for _, a in shown.found)
+    assert "cannot be planned" in junit.read_text("utf-8")
+
+
+@pytest.mark.parametrize("option", ["--report", "--junit"])
+def test_where_nothing_can_be_written_is_told_before_the_run(
+    run_cli: Callable[..., Ran], tmp_path: Path, option: str
+) -> None:
+    task = ROOT / "tasks" / "home.yaml"
+    ran = run_cli("run", task, option, tmp_path / "nowhere" / "file", cwd=tmp_path)
+    assert ran.code == 4 and "there is no folder" in ran.err
+    assert not (tmp_path / "runs").exists()
+    assert "has that file already" in run_cli("run", task, option, task, cwd=tmp_path).err
+
+
+@pytest.fixture(scope="module")
+def failed(run_cli: Callable[..., Ran], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a pick that a slippery block makes fail: its log, its page and its JUnit file."""
+    folder = tmp_path_factory.mktemp("run")
+    task = next((ROOT / "examples" / "02_pick_a_block").glob("task*.yaml"))
+    words = ["--set", "scene.block.friction=0.01", "--log", "run.mcap", "--report", "r.html", "--junit", "r.xml", "-q"]
+    assert run_cli("run", task, *words, cwd=folder).code == 1
+    assert sorted(path.name for path in folder.iterdir()) == ["r.html", "r.xml", "run.mcap"]
+    return folder
+
+
+@pytest.mark.slow
+def test_judge_makes_the_page_that_run_made(run_cli: Callable[..., Ran], failed: Path, tmp_path: Path) -> None:
+    words = ["--report", "j.html", "--junit", "j.xml", "--package-path", ROOT / "robots"]
+    assert run_cli("judge", failed / "run.mcap", *words, cwd=tmp_path).code == 1
+    page = (failed / "r.html").read_bytes()
+    assert page == (tmp_path / "j.html").read_bytes()
+    assert len(page) < 3_000_000
+    assert "Why it failed" in _Page(page.decode()).words
+    assert (failed / "r.xml").read_text("utf-8").count("<failure") == (tmp_path / "j.xml").read_text().count("<failure")
+
+
+@pytest.mark.slow
+def test_what_a_killed_run_left_has_a_page_that_says_so(
+    run_cli: Callable[..., Ran], failed: Path, tmp_path: Path
+) -> None:
+    data = (failed / "run.mcap").read_bytes()
+    (tmp_path / "run.mcap.partial").write_bytes(data[: len(data) * 6 // 10])
+    ran = run_cli("judge", "run.mcap.partial", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    assert ran.code == 3
+    words = _Page((tmp_path / "r.html").read_text("utf-8")).words
+    assert "✗ error" in words and "The log is incomplete" in words and "What went wrong" in words
+    assert "<error" in (tmp_path / "j.xml").read_text("utf-8")
+
+
+def test_an_error_of_a_run_is_told_like_any_cause() -> None:
+    finding = Finding("RUN101", "the run was interrupted")
+    verdict = replace(_page().verdict, verdict="error", errors=(finding,))
+    page = replace(_page(), verdict=verdict, causes=(Cause(finding.message, "", 2.0),))
+    words = _Page(render_page(page)).words
+    assert words.index("✗ error") < words.index("✗ the run was interrupted")

@@ -6,7 +6,7 @@ from typing import Final
 from manipcli.core.errors import Finding
 from manipcli.core.text import did_you_mean
 from manipcli.model.check import Check, Subject
-from manipcli.model.control_tags import transmissions
+from manipcli.model.control_tags import WrittenTransmission, transmissions
 from manipcli.model.samples import MOTOR, one_joint, transmission
 
 KNOWN: Final = (
@@ -28,7 +28,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
             interfaces = joint.all("hardwareInterface")
             if not interfaces:
                 message = f"transmission '{found.name}': joint '{name}' has no <hardwareInterface>"
-                hint = "<hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface>"
+                hint = f"<hardwareInterface>hardware_interface/{_meant(found)}</hardwareInterface>"
                 yield Finding("URDF314", message, joint.place, hint, "warning")
             for interface in interfaces:
                 word = interface.text.strip()
@@ -36,6 +36,12 @@ def _find(subject: Subject) -> Iterator[Finding]:
                     message = f"transmission '{found.name}': joint '{name}' has the unknown hardware interface '{word}'"
                     near = did_you_mean(word.rpartition("/")[2], list(KNOWN))
                     yield Finding("URDF314", message, interface.place, near, "warning")
+
+
+def _meant(found: WrittenTransmission) -> str:
+    """What an actuator of it says, as old descriptions do; else position."""
+    said = (word.text.strip().rpartition("/")[2] for one in found.actuators for word in one.all("hardwareInterface"))
+    return next((word for word in said if word in KNOWN), "PositionJointInterface")
 
 
 CHECK = Check(

@@ -153,7 +153,7 @@ def test_jumbled_names_give_each_joint_its_own_value():
         (lambda: trajectory(point([1, 1], 1.0), names=("joint1", "joint2")), "no values for joint 'joint3'"),
         (lambda: trajectory(point([1, 1, 1], 1.0, [-1, -2, -3])), "joint3' at -3 rad/s, not at rest"),
         (lambda: trajectory(point([1, 9, 1], 1.0)), "joint2' is at 9 rad at point 0; its limits are -5 to 5"),
-        (lambda: trajectory(point([1, 1, 1], 1.0, [0, 4, 0]), point([1, 1, 1], 2.0, [0, 0, 0])), "4 rad/s point 0"),
+        (lambda: trajectory(point([1, 1, 1], 1.0, [0, 4, 0]), point([1, 1, 1], 2.0, [0, 0, 0])), "4 rad/s at point 0"),
         (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 5], 2.0)), "4 rad/s on the way to point 1"),
         (lambda: trajectory(point([1, 1, 1], 1.0), point([1, 1, 1], 2.0, [0, 0, 0])), "point 1 gives other things"),
     ],
@@ -351,3 +351,12 @@ def test_a_double_integrator_under_pd_tracks_and_arrives():
     assert worst < 1.2 * inertia * 5.77 / 400.0
     feedback = handle.feedback()
     assert feedback.error == pytest.approx(feedback.desired - feedback.actual)
+
+
+def test_one_interface_need_not_stand_in_a_list_nor_gains_be_objects():
+    made = JointTrajectoryController(
+        name="arm", joints=["a"], command_interfaces="effort", gains={"a": {"p": 2.0, "ff_velocity_scale": 0.0}}
+    )
+    assert made.interfaces == ("effort",)
+    made.update(0.0, PERIOD, state([0.5]))
+    assert made.update(PERIOD, PERIOD, state([0.0])).commands[0] == pytest.approx([1.0])
