@@ -9,7 +9,8 @@ from manipcli.control.command import may_go_together
 from manipcli.control.controller import Fit
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.feed_forward import ModelFeedForward
-from manipcli.control.manager import ControllerManager, ticks_between
+from manipcli.control.lifecycle import ticks_between
+from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Compat
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Place
 from manipcli.core.text import did_you_mean

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from manipcli.control.claims import Claimant, conflicts
+from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
 from manipcli.plan.step import Strictness, Switch
 
@@ -105,3 +107,37 @@ def _why_not(states: Mapping[str, ControllerState], name: str) -> str:
         return f"it is {states[name]}"
     near = did_you_mean(name, states, kind="controllers")
     return "no such controller is loaded" + (f"; {near}" if near else "")
+
+
+def names_of(given: Collection[str] | str) -> tuple[str, ...]:
+    """Names, or one name."""
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def strictness_of(word: str) -> Strictness:
+    """In any case of letters.
+
+    Raises:
+        InvalidArgument: another word.
+    """
+    known: dict[str, Strictness] = {each: each for each in get_args(Strictness)}
+    found = known.get(str(word).lower())
+    if found is None:
+        message = f"unknown strictness '{word}'; expected {' or '.join(known)}"
+        raise InvalidArgument("CTRL164", message, hint=did_you_mean(str(word), known))
+    return found
+
+
+def ticks_between(update_rate: float, period: float) -> int:
+    """Control ticks of `period` [s] between two updates at `update_rate` [Hz].
+
+    Raises:
+        InvalidArgument: the rate does not divide the control rate, or is not above 0.
+    """
+    if not 0.0 < update_rate < math.inf:
+        raise InvalidArgument("CTRL163", f"an update rate of {update_rate:g} Hz; expected one above 0")
+    every = 1.0 / (update_rate * period)
+    if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6 * every:
+        message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
+        raise InvalidArgument("CTRL163", message, hint=f"say {1.0 / (period * max(1, round(every))):g} Hz")
+    return round(every)

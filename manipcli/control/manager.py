@@ -16,7 +16,7 @@ switch is whole or not at all, and happens between two updates: there is no cloc
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Protocol, get_args
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,15 @@ from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
 from manipcli.control.controller import Controller, ControllerOutput, JointState
 from manipcli.control.feed_forward import FeedForwardLaw, NoDynamics
-from manipcli.control.lifecycle import ControllerInfo, ControllerState, SwitchResult, decided
+from manipcli.control.lifecycle import (
+    ControllerInfo,
+    ControllerState,
+    SwitchResult,
+    decided,
+    names_of,
+    strictness_of,
+    ticks_between,
+)
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
@@ -237,8 +245,8 @@ class ControllerManager:
         Raises:
             InvalidArgument: another strictness.
         """
-        word = _strictness(strictness)
-        lists = Switch(activate=_names(activate), deactivate=_names(deactivate), strictness=word)
+        word = strictness_of(strictness)
+        lists = Switch(activate=names_of(activate), deactivate=names_of(deactivate), strictness=word)
         return self.carry_out(lists, time=time)
 
     def switch_to(
@@ -246,7 +254,7 @@ class ControllerManager:
     ) -> SwitchResult:
         """Has all of `names` active, and nobody else on their joints. Those that are active stay as they are. See
         `switch`."""
-        return self.carry_out(Switch(to=_names(names), strictness=_strictness(strictness)), time=time)
+        return self.carry_out(Switch(to=names_of(names), strictness=strictness_of(strictness)), time=time)
 
     def carry_out(self, switch: Switch, *, time: float) -> SwitchResult:
         """A switch as a step asks for it; see `switch` and `switch_to`."""
@@ -390,31 +398,3 @@ def _cause(error: Exception) -> str:
     if isinstance(error, ManipcliError):
         return "; ".join(finding.message for finding in error.findings)
     return f"{type(error).__name__}: {error}"
-
-
-def _names(given: Collection[str] | str) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(given)
-
-
-def _strictness(word: str) -> Strictness:
-    known: dict[str, Strictness] = {each: each for each in get_args(Strictness)}
-    found = known.get(str(word).lower())
-    if found is None:
-        message = f"unknown strictness '{word}'; expected {' or '.join(known)}"
-        raise InvalidArgument("CTRL164", message, hint=did_you_mean(str(word), known))
-    return found
-
-
-def ticks_between(update_rate: float, period: float) -> int:
-    """Control ticks of `period` [s] between two updates at `update_rate` [Hz].
-
-    Raises:
-        InvalidArgument: the rate does not divide the control rate, or is not above 0.
-    """
-    if not 0.0 < update_rate < np.inf:
-        raise InvalidArgument("CTRL163", f"an update rate of {update_rate:g} Hz; expected one above 0")
-    every = 1.0 / (update_rate * period)
-    if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6 * every:
-        message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
-        raise InvalidArgument("CTRL163", message, hint=f"say {1.0 / (period * max(1, round(every))):g} Hz")
-    return round(every)

@@ -10,7 +10,7 @@ that sampling at ticks returns the planned values themselves.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
-from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, TrajectoryPoint, Waypoint, as_point, read_points, seconds
+from manipcli.plan.waypoints import CUBIC, LINEAR, QUINTIC, Point, TrajectoryPoint, Waypoint, columns_of, read_points
 
 __all__ = ["CUBIC", "LINEAR", "QUINTIC", "JointTrajectory", "Samples", "TrajectoryPoint", "Waypoint"]
 
@@ -79,20 +79,14 @@ class JointTrajectory:
     def __init__(
         self,
         names: Sequence[str],
-        points: Sequence[Waypoint | Mapping[str, object]],
-        start: Waypoint | Mapping[str, object] | Sequence[float] | Array | None = None,
+        points: Sequence[Point],
+        start: Point | Sequence[float] | Array | None = None,
         *,
         interpolation: Interpolation = "splines",
     ) -> None:
         if isinstance(names, str):
             raise InvalidArgument("TRAJ100", f"the names are one text, '{names}'; expected a list of joints")
-        if not isinstance(points, Sequence):
-            raise InvalidArgument("TRAJ101", f"the points are {type(points).__name__}; expected a list of them")
-        given = [as_point(point, f"point {k}") for k, point in enumerate(points)]
-        if isinstance(start, Sequence | np.ndarray):
-            start = TrajectoryPoint(start)
-        begin = None if start is None else as_point(start, "the start state")
-        read = read_points(given, begin, len(names))
+        read = read_points(points, start, len(names))
         highest = int(read.orders.max())
         self._set(
             tuple(names), frozen(read.times), frozen(read.positions),
@@ -101,7 +95,7 @@ class JointTrajectory:
             None if read.efforts is None else frozen(read.efforts),
             None if bool((read.orders == highest).all()) else read.orders,
             interpolation, led_in=read.led_in, integrated=read.integrated,
-            source=tuple(given) if read.relative else None,
+            source=read.source,
         )  # fmt: skip
 
     @classmethod
@@ -229,7 +223,7 @@ class JointTrajectory:
             return None if values is None else values[:, order]
 
         if self.source is not None:
-            points = [_columns(point, order) for point in self.source]
+            points = [columns_of(point, order) for point in self.source]
             return JointTrajectory(names, points, interpolation=self.interpolation)
         made = JointTrajectory.of_arrays(
             names, self.times, self.positions[:, order], columns(self.velocities), columns(self.accelerations),
@@ -356,18 +350,6 @@ class JointTrajectory:
             v0 + tau * (2.0 * c2 + tau * (3.0 * c3 + tau * (4.0 * c4 + tau * 5.0 * c5))),
             2.0 * c2 + tau * (6.0 * c3 + tau * (12.0 * c4 + tau * 20.0 * c5)),
         )
-
-
-def _columns(point: Waypoint, order: Sequence[int]) -> TrajectoryPoint:
-    """The point for these of its joints."""
-
-    def chosen(field: str) -> Array | None:
-        values = getattr(point, field, None)
-        return None if values is None or len(values) == 0 else np.asarray(values, dtype=np.float64)[list(order)]
-
-    return TrajectoryPoint(
-        chosen("positions"), seconds(point), chosen("velocities"), chosen("accelerations"), chosen("effort")
-    )
 
 
 def _validate(trajectory: JointTrajectory) -> None:

@@ -44,6 +44,10 @@ class Waypoint(Protocol):
     def time_from_start(self) -> float | RosDuration: ...
 
 
+Point = Waypoint | Mapping[str, object]
+"""Its fields may also stand in a mapping, as a message in YAML does."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrajectoryPoint:
     """One point: `positions` (n) rad or m, its derivatives where given, `time_from_start` [s].
@@ -68,7 +72,8 @@ class PointArrays:
         orders: (k) what each point gives, as above.
         efforts: (k, n), or None where no point gives any.
         integrated: whether some positions were integrated.
-        relative: whether the first of them was, without a start: positions are displacements from wherever it will be.
+        source: the points, where the first of them was without a start: positions are displacements from wherever it
+            will be. Else None.
         led_in: whether the first row is the start.
     """
 
@@ -79,7 +84,7 @@ class PointArrays:
     efforts: Array | None
     orders: npt.NDArray[np.int8]
     integrated: bool
-    relative: bool
+    source: tuple[Waypoint, ...] | None
     led_in: bool
 
 
@@ -100,22 +105,24 @@ class _Row:
         return CUBIC if self.acceleration is None else QUINTIC
 
 
-def read_points(points: Sequence[Waypoint], start: Waypoint | None, n: int) -> PointArrays:
-    """Points of `n` joints, after `start` if there is one.
+def read_points(given: Sequence[Point], begins: Point | Values | None, n: int) -> PointArrays:
+    """Points of `n` joints, after the one where it `begins` (or its positions, at 0 s), if there is one.
 
-    `start` leads in to a first point that is later. Velocities and accelerations that it lacks and the first point has
+    That one leads in to a first point that is later. Velocities and accelerations that it lacks and the first point has
     count as 0. Missing positions (velocities) are integrated from the point before by the trapezoid rule:
 
         v1 = v0 + T (a0 + a1) / 2,  p1 = p0 + T (v0 + v1) / 2
 
     Raises:
-        InvalidArgument: no point, a point that gives nothing or a wrong number of values, accelerations beside
+        InvalidArgument: no points, a point that gives nothing or a wrong number of values, accelerations beside
             positions but no velocities, efforts at some points and not at others.
     """
+    points = _as_points(given)
+    start = TrajectoryPoint(begins) if isinstance(begins, Sequence | np.ndarray) else begins
     if not points:
         raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")
     rows = [_row(point, n, f"point {k}") for k, point in enumerate(points)]
-    begin = None if start is None else _row(start, n, "the start state")
+    begin = None if start is None else _row(_as_point(start, "the start state"), n, "the start state")
     if begin is not None and begin.position is None:
         raise InvalidArgument("TRAJ102", "the start state has 0 positions; expected " + _one_a_joint(n))
     integrated = any(row.position is None for row in rows)
@@ -147,7 +154,7 @@ def read_points(points: Sequence[Waypoint], start: Waypoint | None, n: int) -> P
         efforts=efforts,
         orders=np.array([row.order for row in rows], dtype=np.int8),
         integrated=integrated,
-        relative=relative,
+        source=tuple(points) if relative else None,
         led_in=led_in,
     )
 
@@ -172,12 +179,13 @@ def _row(point: Waypoint, n: int, what: str) -> _Row:
     return _Row(seconds(point, what), position, velocity, acceleration, effort)
 
 
-def as_point(given: Waypoint | Mapping[str, object], what: str) -> Waypoint:
-    """A point, whose fields may also stand in a mapping, as a message in YAML does.
+def _as_points(given: Sequence[Point]) -> list[Waypoint]:
+    if not isinstance(given, Sequence):
+        raise InvalidArgument("TRAJ101", f"the points are {type(given).__name__}; expected a list of them")
+    return [_as_point(point, f"point {k}") for k, point in enumerate(given)]
 
-    Raises:
-        InvalidArgument: what has no such field, or is no point.
-    """
+
+def _as_point(given: Point, what: str) -> Waypoint:
     if isinstance(given, Mapping):
         known = [field.name for field in fields(TrajectoryPoint)]
         for key in given:
@@ -188,6 +196,18 @@ def as_point(given: Waypoint | Mapping[str, object], what: str) -> Waypoint:
         message = f"{what} is {given!r}; expected a TrajectoryPoint, or what has its fields"
         raise InvalidArgument("TRAJ112", message)
     return given
+
+
+def columns_of(point: Waypoint, order: Sequence[int]) -> TrajectoryPoint:
+    """The point for these of its joints."""
+
+    def chosen(field: str) -> Array | None:
+        values = getattr(point, field, None)
+        return None if values is None or len(values) == 0 else np.asarray(values, dtype=np.float64)[list(order)]
+
+    return TrajectoryPoint(
+        chosen("positions"), seconds(point), chosen("velocities"), chosen("accelerations"), chosen("effort")
+    )
 
 
 def seconds(point: Waypoint, what: str = "a point") -> float:

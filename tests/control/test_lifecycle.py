@@ -9,7 +9,8 @@ import pytest
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.controllers.gripper import GripperController, GripperGoal
-from manipcli.control.manager import ControllerManager, ticks_between
+from manipcli.control.lifecycle import ticks_between
+from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument, InvalidInput
 from manipcli.spec.controllers import GainsSpec
 
