@@ -11,9 +11,13 @@ from pathlib import Path
 from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.flow.load import Task, unusable
-from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, attached, mesh_files, recorded_robot, recorded_scene
+from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
+from manipcli.flow.sample import sampled
+from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.drawn import SAMPLE, Drawn
+from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.build_scene import build_scene
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.simulate.engines import ENGINES
@@ -77,10 +81,30 @@ def recorded_task(
         findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
         places=_places(recording, path, task.spec),
     )
+    drawn = _drawn(recording, path)
+    if drawn is not None:
+        made = sampled(
+            made,
+            bind(task, robot_file, controllers)[0],
+            drawn,
+            robot_of=lambda file: meshes.robot(rebuild_robot(file.spec, attached(recording, path, URDF))),
+            scene_of=lambda file: scene if from_files else build_scene(file.spec),
+        )
     files = mesh_files(made)
     _check_there(files, path, meshes)
     unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))
     return RecordedTask(made, EMBEDDED in recording.metadata, unlike, meshes)
+
+
+def _drawn(recording: Recording, path: Path) -> Drawn | None:
+    """Which sample the run was of, if it was of one."""
+    if SAMPLE not in recording.metadata:
+        return None
+    try:
+        return Drawn.from_metadata(recording.metadata[SAMPLE])
+    except ValueError:
+        message = f"{path.name}: what was drawn for its sample cannot be read"
+        raise InvalidInput([Finding("LOG103", message)]) from None
 
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]:
@@ -98,8 +122,8 @@ def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]
 def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:
     absent = [uri for uri, file in files.items() if not file.is_file()]
     if absent:
-        more = f" (and {len(absent) - 1} more)" if len(absent) > 1 else ""
-        message = f"mesh '{absent[0]}' is not found{more}: nothing can be simulated again without it"
+        more = f", and {len(absent) - 1} more" if len(absent) > 1 else ""
+        message = f"mesh '{absent[0]}'{more} is not found: nothing can be simulated again without it"
         hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
         raise InvalidInput([Finding("LOG400", message, Place(str(path), 0, 0), hint=hint)])
 
