@@ -122,8 +122,8 @@ def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]
 def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:
     absent = [uri for uri, file in files.items() if not file.is_file()]
     if absent:
-        more = f", and {len(absent) - 1} more" if len(absent) > 1 else ""
-        message = f"mesh '{absent[0]}'{more} is not found: nothing can be simulated again without it"
+        more = f" (and {len(absent) - 1} more)" if len(absent) > 1 else ""
+        message = f"mesh '{absent[0]}' is not found{more}: nothing can be simulated again without it"
         hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
         raise InvalidInput([Finding("LOG400", message, Place(str(path), 0, 0), hint=hint)])
 
