@@ -266,8 +266,9 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
                 refused += [(at, p) for p in misfits]
         if step.until is not None:
             found += [(("steps", k, "until"), p) for p in problems(step.until, setting, CONDITIONS)]
-    for k, expected in enumerate(spec.expect):
-        found += [(("expect", k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
+    for key, expectations in (("expect", spec.expect), ("watch", spec.watch)):
+        for k, expected in enumerate(expectations):
+            found += [((key, k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
     findings = [
         task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
         for number, told in ((230, found), (232, uncommanded), (233, refused))

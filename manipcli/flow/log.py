@@ -153,7 +153,7 @@ def judge_recording(recording: Recording, path: Path) -> Verdict:
     """The verdict on a log that is open already; see `judge_log`."""
     task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
     scene = recorded_scene(recording, path)
-    return judge(recording, expect=task.expect, robot=recorded_robot(recording, path), scene=scene)
+    return judge(recording, expect=task.judged, robot=recorded_robot(recording, path), scene=scene)
 
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:

@@ -110,7 +110,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
         ),
         expectations=tuple(
             ExpectationOutcome(name, "not_evaluated", margin=None, unit="", at=None, text=reason)
-            for name in labels(task.spec.expect)
+            for name in labels(task.spec.judged)
         ),
         errors=refusal.findings,
         text=f"{reason}: {refusal}",

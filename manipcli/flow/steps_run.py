@@ -15,11 +15,13 @@ from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
 from manipcli.flow.plan import Plan, PlannedStep, plan_step
 from manipcli.flow.replan import Measured, after
+from manipcli.flow.watching import Watching
 from manipcli.judge.verdict import StepOutcome
+from manipcli.model.state import WorldState
 from manipcli.plan.step import Situation
 from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.executor import DONE, Executor, MotionEnd, Until
+from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
@@ -72,16 +74,19 @@ class StepsRun:
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
-        self._executor = Executor(session, touch=self._physics, told=told)
+        self._watching = Watching(task.spec.watch, task.spec.expect, live)
+        self._executor = Executor(session, touch=self._physics, told=told, alarm=self._alarm)
         replan = task.spec.replan
         self._replans = replan is not False
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
         self._believed = plan.start
         self._failed = False
+        self._over = False
+        self._at: PlannedStep | None = None
 
     def steps(self) -> None:
-        """Every step in order, until one fails that may not."""
+        """Every step in order, until one fails that may not, or a watch is broken."""
         total = len(self._plan.steps)
         planned_start = self._plan.start
         for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
@@ -93,7 +98,11 @@ class StepsRun:
             if outcome.outcome != "done" and not outcome.tolerated:
                 break
             planned_start = planned.plan.end
-        self._executor.hold(AFTERMATH)
+        self._at = None
+        try:
+            self._executor.hold(AFTERMATH)
+        except Alarmed:
+            self._executor.stop()
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
         """All attempts at a step."""
@@ -101,14 +110,16 @@ class StepsRun:
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
         end = DONE
+        self._at = planned
         self._live.step_started(planned.id)
+        self._watching.step_started(planned.id)
         for attempt in range(1, attempts + 1):
             if attempt > 1:
                 step = retried(self._task.file, index)
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
             end = self._attempt(step, planned, planned_start, again=attempt > 1)
             self._event("step_ended", planned, end.outcome, end.text)
-            if end.outcome == "done" or self._session.manager.faults:
+            if end.outcome == "done" or not self._may_go_on:
                 break
             self._failed = True
             if attempt < attempts:
@@ -116,7 +127,8 @@ class StepsRun:
             if attempt < attempts or step.may_fail:
                 self._executor.stop()
         self._live.step_ended(planned.id, end.outcome)
-        tolerated = end.outcome != "done" and step.may_fail and not self._session.manager.faults
+        self._watching.step_ended(planned.id)
+        tolerated = end.outcome != "done" and step.may_fail and self._may_go_on
         if tolerated:
             self._event("step_tolerated", planned, "", "on_fail: continue")
         return StepOutcome(
@@ -129,6 +141,29 @@ class StepsRun:
             text=end.text,
             tolerated=tolerated,
         )
+
+    @property
+    def _may_go_on(self) -> bool:
+        """Whether the task has a say in what follows a failure."""
+        return not self._over and not self._session.manager.faults
+
+    def _alarm(self, _: WorldState) -> str:
+        """What is the first to be broken of what the task watches."""
+        broken = None if self._over else self._watching.broken
+        if broken is None:
+            return ""
+        self._over = True
+        at = self._at
+        self._recorder.event(
+            self._session.ticks,
+            kind="watch_broken",
+            step="" if at is None else at.id,
+            verb="" if at is None else at.verb,
+            outcome="",
+            text=broken.text,
+            place=self._task.log_place("watch", broken.index),
+        )
+        return broken.text
 
     def _nth(self, step: StepSpec, attempt: int, attempts: int) -> str:
         """What an attempt begins with; nothing where there is but one."""
@@ -157,6 +192,9 @@ class StepsRun:
             self._failed = False
         try:
             end = self._motions(step, planned, now)
+        except Alarmed as alarm:
+            self._executor.stop()
+            return MotionEnd("failed", f"stopped: {alarm}")
         except SimulationFailed as failure:
             text = str(failure) + _cut_since(saturated, self._session, ticks)
             self._event("step_ended", planned, "failed", text)

@@ -111,22 +111,24 @@ class Draft:
             trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
         self._add(label, trajectory, None, allowed=allowed)
 
-    def withdraw(self, X_WT: Transform, body: str, *, speed: float = 1.0) -> None:
+    def withdraw(self, X_WT: Transform, body: str, *, speed: float = 1.0, grazing: bool = False) -> None:
         """The tool on a straight line to a pose, away from a `body` that the hand, open now, was closed on.
 
-        Where a finger is nearer to it than the clearance, because it did not sit quite in the middle of the hand, the
-        finger may stay as near as it is, and no nearer.
+        With `grazing` the hand keeps no clearance to that body, and where they overlap it only gets no deeper: for one
+        that does not sit in the middle of the hand.
         """
         with self._told("withdraw"):
             trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
-        near, distance = self._planner.near(self._now, body)
-        if near:
-            query = self._planner.grasping(self._now, body, margin=min(0.0, distance) - GRAZE)
+        allowed = NOTHING
+        if grazing:
+            planner = self._planner
+            allowed = planner.hand_contacts(body)
+            query = planner.grasping(self._now, body, margin=min(0.0, planner.distance(self._now, body)) - GRAZE)
             times, positions = self._swept(trajectory, None)
             hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
             if hit is not None:
-                raise self._planner.refusal(self._now, hit, "would come", f"at t = {hit.time:.2f} s of 'withdraw'")
-        self._add("withdraw", trajectory, None, allowed=near)
+                raise planner.refusal(self._now, hit, "would come", f"at t = {hit.time:.2f} s of 'withdraw'")
+        self._add("withdraw", trajectory, None, allowed=allowed)
 
     def turn(self, label: str, axis: Array, angle: float, *, speed: float = 1.0) -> None:
         """The tool turns in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""

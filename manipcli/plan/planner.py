@@ -231,12 +231,11 @@ class Planner:
         """Touches where the hand, which carries nothing, is nearer than the `margin` [m] to this body."""
         return self.checker.at(situation.bodies, only=body, margin=margin)
 
-    def near(self, situation: Situation, body: str) -> tuple[Pairs, float]:
-        """The parts of the hand, which carries nothing, that are nearer to this body than the clearance, and the least
-        distance [m] among them, negative where they overlap."""
+    def distance(self, situation: Situation, body: str) -> float:
+        """How far [m] the robot, which carries nothing, is from this body, negative where they overlap; `CLEARANCE`
+        where it is further."""
         hits = self.grasping(situation, body, margin=CLEARANCE).every(situation.position)
-        own = [hit for hit in hits if tuple(reversed((hit.a, hit.b))) in self.hand_contacts(body)]
-        return frozenset((hit.a, hit.b) for hit in own), min((hit.distance for hit in own), default=CLEARANCE)
+        return min((hit.distance for hit in hits), default=CLEARANCE)
 
 
 def _within(interior: Interior, X_SP: Transform) -> bool:

@@ -6,6 +6,8 @@ expect:
     during: lift_1
   - eventually: {all: [{at_rest: {object: ball}}, {not: {inside: {object: ball, of: cup}}}]}
     within: 8 s
+watch:
+  - never: {collision: [robot, desk]}
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ QUANTIFIERS = {
 }
 END = "end"
 """The word of `at` for the end of the run."""
+WATCHED = ("never", "always")
+"""The words under which a condition can be watched while the run goes on."""
 
 
 class KeyedSpec(Model):
@@ -123,3 +127,15 @@ class ExpectationSpec(ConditionSpec):
             message = "`within` beside a condition goes with `eventually` alone"
             raise problem("conflict", message, at=("within",), key=True, hint="write `eventually: {...}`")
         return self
+
+
+class WatchSpec(ExpectationSpec):
+    """What ends the run where it is broken: `always` or `never`, over the whole run or `during` steps."""
+
+    at: None = Field(None, description="Nothing: a watch looks at all times.")
+    within: None = Field(None, description="Nothing: a watch looks at all times.")
+
+    @property
+    def label(self) -> str:
+        """Its id; else `watch_` and what an expectation would be called."""
+        return super().label if self.id is not None else f"watch_{super().label}"

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
-from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec
+from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -265,6 +266,15 @@ class TaskSpec(Model):
     baseline: BaselineSpec = Field(BaselineSpec(), description="How much worse than its baseline a run may be.")
     steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
     expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")
+    watch: tuple[WatchSpec, ...] = Field(
+        (),
+        description="What ends the run where it is broken: `never` or `always`, all the time or `during` steps.",
+    )
+
+    @property
+    def judged(self) -> tuple[ExpectationSpec, ...]:
+        """What the recording is asked: what is expected, then what was watched."""
+        return (*self.expect, *self.watch)
 
     @model_validator(mode="after")
     def _recordable(self) -> TaskSpec:
@@ -300,14 +310,15 @@ class TaskSpec(Model):
     @classmethod
     def _labelled(cls, expect: tuple[ExpectationSpec, ...]) -> tuple[ExpectationSpec, ...]:
         """No id twice."""
-        first: dict[str, int] = {}
-        for index, one in enumerate(expect):
-            if one.id in first:
-                message = f"the id '{one.id}' is taken by expect[{first[one.id]}]"
-                raise problem("duplicate", message, at=(index, "id"), hint="ids name expectations: give another")
-            if one.id is not None:
-                first[one.id] = index
+        _refuse_twice(expect, "expect")
         return expect
+
+    @field_validator("watch", mode="after")
+    @classmethod
+    def _labelled_watch(cls, watch: tuple[WatchSpec, ...]) -> tuple[WatchSpec, ...]:
+        """No id twice."""
+        _refuse_twice(watch, "watch")
+        return watch
 
     @field_validator("steps", mode="after")
     @classmethod
@@ -332,3 +343,13 @@ class TaskSpec(Model):
             counts[step.verb] = number
             named.append(step if step.id else step.model_copy(update={"id": f"{step.verb}_{number}"}))
         return tuple(named)
+
+
+def _refuse_twice(expect: Sequence[ExpectationSpec], key: str) -> None:
+    first: dict[str, int] = {}
+    for index, one in enumerate(expect):
+        if one.id in first:
+            message = f"the id '{one.id}' is taken by {key}[{first[one.id]}]"
+            raise problem("duplicate", message, at=(index, "id"), hint="ids name expectations: give another")
+        if one.id is not None:
+            first[one.id] = index

@@ -2,7 +2,7 @@
 
 A step is a mapping with exactly one verb key beside the common keys `id`, `until` and `timeout`; a condition is a
 mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with one under
-it, beside the common keys `id`, `at`, `during` and `within`.
+it, beside the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,15 @@ from typing_extensions import TypeAliasType
 from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean, escape, listed
 from manipcli.spec.base import Model, problem
-from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS, ConditionSpec, ExpectationSpec, KeyedSpec
+from manipcli.spec.condition import (
+    COMBINATIONS,
+    QUANTIFIERS,
+    WATCHED,
+    ConditionSpec,
+    ExpectationSpec,
+    KeyedSpec,
+    WatchSpec,
+)
 from manipcli.spec.task import StepSpec, TaskSpec
 
 
@@ -65,6 +73,7 @@ def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
         __doc__=TaskSpec.__doc__,
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
+        watch=(tuple[_watches(condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
     )
     return cast(type[TaskSpec], model)
 
@@ -87,6 +96,12 @@ def _expectations(members: Members, condition: object) -> object:
     models += [_combined(ExpectationSpec, name, condition) for name in COMBINATIONS]
     models += [_keyed(ExpectationSpec, name, condition, about) for name, about in QUANTIFIERS.items()]
     return _union("expectation", models, common=_EXPECTATION)
+
+
+def _watches(condition: object) -> object:
+    """`never` and `always` of any condition."""
+    models = [_keyed(WatchSpec, name, condition, QUANTIFIERS[name]) for name in WATCHED]
+    return _union("watch", models, common=("id", "during"))
 
 
 _CONDITION = "Condition"

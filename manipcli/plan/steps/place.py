@@ -48,24 +48,28 @@ class PlaceSpec(Model):
 
 
 def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`."""
+    """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
+
+    Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it.
+    """
     planner.held(situation, spec.object)
     planner.free_start(situation)
     X_WG = _goal(spec, planner, situation)
     X_OT = planner.held_in_tool(situation).inverse()
     X_WT = X_WG @ X_OT
 
-    def attempt(candidate: tuple[float, float, float]) -> StepPlan:
-        clearance, retreat, slope = candidate
+    def attempt(candidate: tuple[bool, float, float, float]) -> StepPlan:
+        grazing, clearance, retreat, slope = candidate
         draft = Draft(planner, situation)
         draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
         support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
         draft.open(spec.posture)
-        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed)
+        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
         return draft.plan()
 
-    candidates = itertools.product(spread(spec.clearance), spread(spec.retreat), (slopes()[k] for k in (1, 2, 0)))
+    ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
+    candidates = itertools.product((False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 
