@@ -28,6 +28,7 @@ from manipcli.cli import (
     replay,
     run,
     schema,
+    test,
     tune,
     view,
 )
@@ -50,6 +51,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("run")(run.run)
+app.command("test")(test.test)
 app.command("check")(check.check)
 app.command("check-urdf")(check_urdf.check_urdf)
 app.command("plan")(plan.plan)

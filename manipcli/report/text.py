@@ -64,6 +64,11 @@ def describe_step(step: StepOutcome) -> str:
     return f"{line}: {step.text}" if step.text and step.outcome != "done" else line
 
 
+def describe_expectation(expectation: ExpectationOutcome) -> str:
+    """One expectation as one line."""
+    return f"{expectation.name}: {_margin(expectation)}"
+
+
 def _verdict(verdict: Verdict, speed: str) -> list[str]:
     lines = [*_causes(verdict)]
     if lines:

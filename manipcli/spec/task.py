@@ -201,6 +201,7 @@ class RecordSpec(Model):
         return frozenset() if self.topics is None else frozenset(get_args(ChosenTopic)) - {*self.topics, "joint_states"}
 
 
+TAG: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 
 
@@ -240,6 +241,7 @@ class TaskSpec(Model):
     robot: str = Field(description="Path of the robot file, relative to this file.", min_length=1)
     controllers: str = Field(description="Path of the controllers file, relative to this file.", min_length=1)
     description: str = Field("", description="What it is for, in words.")
+    tags: tuple[str, ...] = Field((), description="Words that choose it among tests: `-k slow`; markers in pytest.")
     params: dict[str, bool | int | float | str] = Field(
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
@@ -296,6 +298,16 @@ class TaskSpec(Model):
                 "conflict", message, at=("record", "rates"), hint="choose rates of which one divides the other"
             )
         return self
+
+    @field_validator("tags", mode="after")
+    @classmethod
+    def _words(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
+        """Each can be a marker of pytest."""
+        for k, tag in enumerate(tags):
+            if not TAG.fullmatch(tag):
+                hint = "a tag is letters, digits and '_', and begins with a letter"
+                raise problem("conflict", f"{tag[:100]!r} cannot be a tag", at=(k,), hint=hint)
+        return tags
 
     @field_validator("task", mode="after")
     @classmethod

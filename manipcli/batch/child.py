@@ -1,0 +1,119 @@
+"""The process of one run: takes a job from its parent, runs it, and sends signs of life and the end back."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, TypeAlias
+
+from manipcli.batch.job import Beat, End, Job, Message
+from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
+from manipcli.judge.verdict import StepOutcome
+
+if TYPE_CHECKING:
+    from manipcli.flow.plan import PlannedStep
+
+BEAT_PERIOD = 0.25
+"""[s] of wall time between two signs of life while ticks go by."""
+
+Parent: TypeAlias = "Connection[Message, Job]"
+
+
+def main(descriptor: int) -> None:
+    """One job, on the socket with this number."""
+    parent: Parent = Connection(descriptor)
+    os.set_inheritable(descriptor, False)
+    os.dup2(2, 1)  # what libraries print is no result
+    # A crash of native code, and the signal of a parent that gives up on this process, leave where it was.
+    faulthandler.enable()
+    faulthandler.register(signal.SIGUSR1)
+    # A terminal's Ctrl-C is for the parent to act upon.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    job = parent.recv()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    parent.send(_end_of(job, _Beats(parent)))
+
+
+def _end_with(parent: Parent) -> None:
+    """Waits for the parent, which says nothing more, to be gone, and goes, too."""
+    parent.poll(None)
+    os._exit(ExitCode.INTERRUPTED)
+
+
+class _Beats:
+    """The progress of a run, as signs of life."""
+
+    def __init__(self, parent: Parent) -> None:
+        self._parent = parent
+        self._doing = ""
+        self._next = 0.0
+
+    def doing(self, what: str) -> None:
+        """Something that has no time of its own."""
+        self._parent.send(Beat(what))
+
+    def warned(self, findings: Sequence[Finding]) -> None:
+        self.doing("planned")
+
+    def told(self, text: str, *, detail: bool) -> None:
+        """The ticks say enough."""
+
+    def step_started(self, step: PlannedStep, index: int, total: int) -> None:
+        self._doing = f"step {index + 1} of {total}, '{step.id}'"
+        self._parent.send(Beat(self._doing))
+        self._next = 0.0
+
+    def tick(self, simulated_time: float, wall: float) -> None:
+        if wall >= self._next:
+            self._next = wall + BEAT_PERIOD
+            self._parent.send(Beat(self._doing or "before the first step", simulated_time))
+
+    def step_ended(self, outcome: StepOutcome) -> None:
+        """The next one begins, or the end is told."""
+
+
+def _end_of(job: Job, beats: _Beats) -> End:
+    """Runs a job; its log, picture and page are written where they are wanted."""
+    from manipcli import pipeline
+    from manipcli.batch.telling import draw, junit, troubles, write_page
+
+    beats.doing("loading and planning")
+    settings = job.settings
+    job.log.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        report = pipeline.run_task(
+            job.path,
+            overrides=settings.overrides,
+            seed=settings.seed,
+            sample=job.case.sample,
+            log=job.log,
+            force=True,
+            package_path=settings.package_path,
+            allow_outside=settings.allow_outside,
+            progress=beats,
+        )
+    except InvalidInput as invalid:
+        return End(None, invalid.findings)
+    found = troubles(job, report.verdict)
+    notes: list[str] = []
+    if found and report.log is not None:
+        beats.doing("drawing a picture")
+        notes += _noted("no picture", lambda: draw(job, found[0].at))
+    if job.page is not None:
+        beats.doing("writing a page")
+        notes += _noted("no page", lambda: write_page(job, report))
+    told = junit(job, report) if settings.junit else b""
+    return End(report, troubles=found, junit=told, notes=tuple(notes))
+
+
+def _noted(what: str, make: Callable[[], None]) -> list[str]:
+    """Makes something without which the verdict stands; a note where that is refused."""
+    try:
+        make()
+    except ManipcliError as error:
+        return [f"{what}: {error}"]
+    return []

@@ -1,0 +1,126 @@
+"""Which tasks there are: YAML files with a text under the top-level key `task`, below the folders that are named."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.report.suite import Case
+
+SUFFIXES = (".yaml", ".yml")
+SNIFFED = 65536
+"""Bytes of a file in which `task:` is looked for: nothing else of foreign files is read."""
+NOT_ENTERED = frozenset({"runs", "build", "dist", "node_modules", "site-packages", "__pycache__"})
+"""Folders that hold results and what others wrote; as well as hidden ones and virtual environments."""
+_TASK = re.compile(rb"""(?:^|\A\s*\{\s*)(["']?)task\1[ \t]*:[ \t]+[^\s#]""", re.MULTILINE)
+
+
+def looks_like_a_task(path: Path) -> bool:
+    """Whether a file begins like a task: by its name and its first bytes, so that any file may be asked about."""
+    if path.suffix not in SUFFIXES or path.name.startswith("."):
+        return False
+    try:
+        with path.open("rb") as file:
+            return _TASK.search(file.read(SNIFFED).removeprefix(b"\xef\xbb\xbf")) is not None
+    except OSError:
+        return False
+
+
+def is_entered(folder: Path) -> bool:
+    """Whether tasks are looked for in a folder that nobody named."""
+    return not (folder.name.startswith(".") or folder.name in NOT_ENTERED or (folder / "pyvenv.cfg").exists())
+
+
+def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """The task files among and below `paths`, each once, folder by folder in the order of names.
+
+    Raises:
+        InvalidInput: a path is not there, or is a file but no task.
+    """
+    found: dict[Path, Path] = {}
+    refused: list[Finding] = []
+    for path in paths:
+        if path.is_dir():
+            below = [file for file in _files(path) if looks_like_a_task(file)]
+        else:
+            below = [path]
+            refused += _no_task(path)
+        for file in below:
+            found.setdefault(file.resolve(), file)
+    if refused:
+        raise InvalidInput(refused)
+    return tuple(found.values())
+
+
+def read_case(path: Path, *, shown: str | None = None) -> Case:
+    """The task in a file; of a file that cannot be read, why.
+
+    Args:
+        path: the file.
+        shown: what it is called; default `path` itself.
+    """
+    from manipcli.spec.load import read_bytes
+    from manipcli.spec.task import TAG, SimulationSpec
+    from manipcli.spec.tree import MappingNode, ScalarNode, SequenceNode
+    from manipcli.spec.yaml import parse
+
+    name = shown if shown is not None else str(path)
+    try:
+        root = parse(read_bytes(path), name)
+    except InvalidInput as invalid:
+        return Case(name, path.stem, findings=invalid.findings)
+    task = root.get("task") if isinstance(root, MappingNode) else None
+    if not isinstance(root, MappingNode) or not isinstance(task, ScalarNode):
+        message = "`task:` is no name; expected a text"
+        return Case(name, path.stem, findings=(Finding("TASK200", message, task.place if task is not None else None),))
+    tags = root.get("tags")
+    words = [one.value for one in tags.items if isinstance(one, ScalarNode)] if isinstance(tags, SequenceNode) else []
+    tagged = tuple(word for word in words if isinstance(word, str) and TAG.fullmatch(word))
+    simulation = root.get("simulation")
+    engine = simulation.get("engine") if isinstance(simulation, MappingNode) else None
+    engine_name = engine.value if isinstance(engine, ScalarNode) else SimulationSpec.model_fields["engine"].default
+    return Case(
+        file=name,
+        task=str(task.value),
+        tags=(*tagged, f"engine_{engine_name}"),
+        varied=root.get("vary") is not None,
+    )
+
+
+def samples_of(case: Case, count: int | None) -> tuple[Case, ...]:
+    """Samples 0 to `count` - 1 of a task that varies; else, and where `count` is None, the task as it is written."""
+    if count is None or not case.varied:
+        return (case,)
+    return tuple(replace(case, sample=sample) for sample in range(count))
+
+
+def shown_path(path: Path) -> str:
+    """Below the working directory relative to it, else as it was given."""
+    try:
+        return str(path.absolute().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for place, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if is_entered(Path(place, name)))
+        yield from (Path(place, name) for name in sorted(names))
+
+
+def _no_task(path: Path) -> tuple[Finding, ...]:
+    """Why a file that was named is not run."""
+    from manipcli.spec.load import read_bytes
+
+    try:
+        read_bytes(path)
+    except InvalidInput as invalid:
+        return invalid.findings
+    if looks_like_a_task(path):
+        return ()
+    message = "this is no task file: a YAML file with a name under the top-level key `task` was expected"
+    return (Finding("USE105", message, Place(str(path), 1, 1)),)

@@ -1,0 +1,123 @@
+"""What the processes of a batch say to each other: a job there, signs of life and an end back."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli.core.errors import Finding
+from manipcli.report.run_report import RunReport
+from manipcli.report.suite import Case, Trouble
+
+FOLDER = Path("runs") / "test"
+"""Where logs of tests go, below the working directory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What holds for all runs of a batch; as the options of `run`, and what is made of each.
+
+    Attributes:
+        pages: the folder that gets a page about each run; None for none.
+        junit: whether each run is told as JUnit XML, too.
+        keep_logs: also those of runs that passed.
+        silence: a run that shows no progress for so long is ended [s].
+        timeout: a run that takes longer is ended [s]; None for no limit.
+    """
+
+    overrides: tuple[str, ...] = ()
+    seed: int | None = None
+    package_path: tuple[Path, ...] = ()
+    allow_outside: bool = False
+    folder: Path = FOLDER
+    pages: Path | None = None
+    junit: bool = False
+    keep_logs: bool = False
+    silence: float = 60.0
+    timeout: float | None = 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A case, the file that it stands in, and where its files go."""
+
+    case: Case
+    path: Path
+    settings: Settings
+
+    @property
+    def log(self) -> Path:
+        """Named by the task file and the sample, so that no two jobs of a batch share it."""
+        return self._beside(".mcap", self.settings.folder)
+
+    @property
+    def partial(self) -> Path:
+        """What the log is called before it is whole."""
+        return self.log.with_name(f"{self.log.name}.partial")
+
+    @property
+    def picture(self) -> Path:
+        return self._beside(".png", self.settings.folder)
+
+    @property
+    def output(self) -> Path:
+        """What the process says that is no result."""
+        return self._beside(".txt", self.settings.folder)
+
+    @property
+    def page(self) -> Path | None:
+        return None if self.settings.pages is None else self._beside(".html", self.settings.pages)
+
+    @property
+    def command(self) -> str:
+        """What does the same again, for a shell."""
+        settings = self.settings
+        words = ["manipcli", "run", self.case.file]
+        words += [] if settings.seed is None else ["--seed", str(settings.seed)]
+        words += [] if self.case.sample is None else ["--sample", str(self.case.sample)]
+        for override in settings.overrides:
+            words += ["--set", override]
+        for place in settings.package_path:
+            words += ["--package-path", str(place)]
+        words += ["--allow-outside"] if settings.allow_outside else []
+        return shlex.join(words)
+
+    def _beside(self, suffix: str, folder: Path) -> Path:
+        shown = Path(self.case.file).with_suffix("")
+        parts = ["__" if part == ".." else part for part in shown.parts if part != shown.anchor]
+        sample = "" if self.case.sample is None else f"-{self.case.sample}"
+        return folder.joinpath(*parts[:-1], f"{parts[-1]}{sample}{suffix}")
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """A sign of life: what is done, and at which time of the run [s]."""
+
+    doing: str
+    at: float | None = None
+
+    def __str__(self) -> str:
+        return self.doing if self.at is None else f"{self.doing} at {self.at:.2f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A run that came to its end.
+
+    Attributes:
+        report: None where nothing was run.
+        findings: why nothing was run.
+        troubles: why it did not pass, with places in the task file.
+        junit: the file about it, where one is wanted.
+        notes: what could not be made of it.
+    """
+
+    report: RunReport | None
+    findings: tuple[Finding, ...] = ()
+    troubles: tuple[Trouble, ...] = ()
+    junit: bytes = b""
+    notes: tuple[str, ...] = ()
+
+
+Message = Beat | End

@@ -1,0 +1,70 @@
+"""Many jobs, a few at a time; each in its process, each watched."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from multiprocessing.connection import wait
+
+from manipcli.batch.job import Job
+from manipcli.batch.process import Process
+from manipcli.report.suite import CaseReport, troubles_of
+
+WATCH_PERIOD = 0.1
+"""[s] between two looks at what is being done, where nothing comes to an end."""
+
+Onlooker = Callable[[Sequence[Process]], None]
+
+
+def run_jobs(
+    jobs: Sequence[Job], *, at_once: int, onlooker: Onlooker | None = None, command: tuple[str, ...] = ()
+) -> Generator[CaseReport, None, None]:
+    """What came of each job, in the order in which they end.
+
+    Whoever stops listening (`close`, an exception) ends what is running, and what that left is removed.
+
+    Args:
+        jobs: started in this order.
+        at_once: how many run at a time.
+        onlooker: shown what is running, some times a second.
+        command: another program instead of `batch/child.py`.
+    """
+    waiting = deque(jobs)
+    running: list[Process] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                job = waiting.popleft()
+                if job.case.findings:
+                    yield unreadable(job)
+                else:
+                    running.append(Process(job, command=command))
+            if not running:
+                continue
+            if onlooker is not None:
+                onlooker(running)
+            patience = max(0.0, min(process.patience for process in running))
+            wait([process.connection for process in running], min(WATCH_PERIOD, patience) if onlooker else patience)
+            for process in [*running]:
+                report = process.hear()
+                if report is None and process.patience <= 0.0:
+                    report = process.give_up()
+                if report is not None:
+                    running.remove(process)
+                    yield report
+    finally:
+        for process in running:
+            process.forget()
+
+
+def unreadable(job: Job) -> CaseReport:
+    """A task file that cannot be read is not run."""
+    return CaseReport(
+        case=job.case,
+        outcome="invalid",
+        duration=0.0,
+        command=job.command,
+        text="the file cannot be read",
+        findings=job.case.findings,
+        troubles=troubles_of(job.case.findings),
+    )

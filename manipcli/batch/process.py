@@ -1,0 +1,159 @@
+"""One run in a process of its own, seen from outside: started, listened to, given up on, and what came of it."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+
+from manipcli.batch.job import Beat, End, Job, Message
+from manipcli.core.errors import ExitCode
+from manipcli.report.run_report import exit_code
+from manipcli.report.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of
+
+CHILD = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from manipcli.batch.child import main
+main(int(sys.argv[2]))
+"""
+"""The child finds what its parent finds, however that was started."""
+LAST_WORDS = 0.5
+"""[s] that a process has to write down where it is, before it is ended."""
+_WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
+
+
+class Process:
+    """A job that is being done.
+
+    Attributes:
+        job: which.
+        connection: readable when the process says something or is gone.
+        doing: the last that is known of it.
+    """
+
+    def __init__(self, job: Job, *, command: tuple[str, ...] = ()) -> None:
+        """Starts it.
+
+        Args:
+            job: what it does.
+            command: another program that speaks with its parent as `batch/child.py` does.
+        """
+        self.job = job
+        self.doing = Beat("starting")
+        self._end: End | None = None
+        self.connection: Connection[Job, Message]
+        self.connection, childs = Pipe()
+        self._began = self._heard = time.monotonic()
+        job.output.parent.mkdir(parents=True, exist_ok=True)
+        for stale in (job.log, job.partial, job.picture):
+            stale.unlink(missing_ok=True)
+        with job.output.open("wb") as output:
+            self._process = subprocess.Popen(
+                [*(command or (sys.executable, "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                pass_fds=(childs.fileno(),),
+                start_new_session=True,  # no signal of a terminal reaches it: its parent decides
+            )
+        childs.close()
+        self.connection.send(job)
+
+    @property
+    def elapsed(self) -> float:
+        """[s] since it was started."""
+        return time.monotonic() - self._began
+
+    @property
+    def patience(self) -> float:
+        """[s] until it will be given up on, as far as is known now."""
+        settings = self.job.settings
+        silence = settings.silence - (time.monotonic() - self._heard)
+        return silence if settings.timeout is None else min(silence, settings.timeout - self.elapsed)
+
+    def hear(self) -> CaseReport | None:
+        """Takes what the process has said; what came of it once it is gone."""
+        try:
+            while self.connection.poll():
+                message = self.connection.recv()
+                self._heard = time.monotonic()
+                if isinstance(message, End):
+                    self._end = message
+                else:
+                    self.doing = message
+        except (EOFError, ConnectionError):
+            return self._gone(self._process.wait())
+        return None
+
+    def give_up(self) -> CaseReport:
+        """Ends the process, which is taking too long or is silent for too long."""
+        settings = self.job.settings
+        over = settings.timeout is not None and self.elapsed >= settings.timeout
+        limit = f"it took longer than {settings.timeout:g} s" if over else f"no progress for {settings.silence:g} s"
+        self._process.send_signal(signal.SIGUSR1)
+        try:
+            self._process.wait(LAST_WORDS)
+        except subprocess.TimeoutExpired:
+            self.end()
+        return self._report("hung", f"hung: {limit}; {self.doing}")
+
+    def end(self) -> None:
+        """Ends the process; nothing is made of it."""
+        self._process.kill()
+        self._process.wait()
+        self.connection.close()
+
+    def forget(self) -> None:
+        """Ends the process, and removes what it left."""
+        self.end()
+        for left in (self.job.partial, self.job.log, self.job.output):
+            left.unlink(missing_ok=True)
+
+    def _gone(self, code: int) -> CaseReport:
+        self.connection.close()
+        end = self._end
+        if end is None:
+            if code < 0:
+                cause = f"crashed by {signal_name(-code)}"
+                hint = "; was there too little memory?" if -code == signal.SIGKILL else ""
+                return self._report("crashed", f"{cause}; {self.doing}{hint}")
+            return self._report("crashed", f"ended with exit code {code} before it was done: {self._last_line()}")
+        if end.report is None:
+            return self._report("invalid", "the task cannot be run", end=end)
+        return self._report(_WORDS.get(exit_code(end.report.verdict), "error"), end.report.verdict.text, end=end)
+
+    def _report(self, outcome: CaseWord, text: str, *, end: End | None = None) -> CaseReport:
+        job = self.job
+        end = end if end is not None else End(None, troubles=(Trouble(text, at=self.doing.at),))
+        if outcome == "passed" and not job.settings.keep_logs:
+            job.log.unlink(missing_ok=True)
+        if outcome not in ("crashed", "hung"):
+            job.output.unlink(missing_ok=True)
+        elif not job.output.stat().st_size:
+            job.output.unlink()
+        kept = {path: str(path) if path.exists() else None for path in (job.log, job.partial, job.picture, job.output)}
+        return CaseReport(
+            case=job.case,
+            outcome=outcome,
+            duration=self.elapsed,
+            command=job.command,
+            text=text,
+            run=end.report,
+            findings=end.findings,
+            troubles=end.troubles or troubles_of(end.findings),
+            log=kept[job.log] or kept[job.partial],
+            picture=kept[job.picture],
+            page=str(job.page) if job.page is not None and job.page.exists() else None,
+            output=kept[job.output],
+            junit=end.junit,
+            notes=end.notes,
+        )
+
+    def _last_line(self) -> str:
+        lines = self.job.output.read_text("utf-8", "replace").splitlines()
+        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")

@@ -1,0 +1,95 @@
+"""What is told of a run besides its verdict: why it did not pass and where that was written, a picture, a page."""
+
+from __future__ import annotations
+
+from manipcli.batch.job import Job
+from manipcli.core.errors import Place
+from manipcli.core.whole_file import write_whole
+from manipcli.flow.replay import open_playback
+from manipcli.flow.report import file_places, log_page, refused_page
+from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.verdict import Verdict
+from manipcli.pipeline import load_task
+from manipcli.replay.image import png_bytes
+from manipcli.replay.shots import Shots
+from manipcli.report.html import render_page
+from manipcli.report.junit import render_junit
+from manipcli.report.run_report import RunReport
+from manipcli.report.suite import Trouble
+from manipcli.report.text import describe_expectation, describe_step
+from manipcli.spec import load
+
+SIZE = (960, 720)
+"""Width and height of the picture [pixel]."""
+
+
+def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
+    """Steps that went wrong, then expectations that are not met, then what neither tells; none of what passed."""
+    if verdict.verdict == "passed":
+        return ()
+    task = load.load_task(job.path, model=task_spec(), overrides=job.settings.overrides, seed=job.settings.seed)
+
+    def place(*key: str | int) -> Place:
+        found = task.place(*key)
+        return Place(job.case.file, found.line, found.column)
+
+    steps = [
+        Trouble(describe_step(step), place("steps", k), step.ended)
+        for k, step in enumerate(verdict.steps)
+        if step.outcome not in ("done", "not_run") and not step.tolerated
+    ]
+    refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
+    unmet = [
+        Trouble(describe_expectation(one), place("expect", k), one.at)
+        for k, one in enumerate(verdict.expectations)
+        if one.outcome != "passed" and not refused
+    ]
+    if verdict.verdict == "error" or not (steps or unmet):
+        told = [Trouble(finding.message, finding.place) for finding in verdict.errors]
+        return (*(told or [Trouble(verdict.text)]), *steps, *unmet)
+    return (*steps, *unmet)
+
+
+def draw(job: Job, at: float | None) -> None:
+    """The picture of a moment of the log, or of its end.
+
+    Raises:
+        ManipcliError: the log shows nothing, or a mesh is not there.
+    """
+    playback = open_playback(job.log, package_path=job.settings.package_path, allow_outside=job.settings.allow_outside)
+    with Shots(playback, size=SIZE) as shots:
+        image = shots.at(playback.end if at is None else min(max(at, playback.start), playback.end))
+    write_whole(job.picture, png_bytes(image))
+
+
+def write_page(job: Job, report: RunReport) -> None:
+    """The page about the run, as `manipcli run --report` makes it.
+
+    Raises:
+        ManipcliError: the log shows nothing.
+    """
+    assert job.page is not None, "a page is wanted"
+    settings = job.settings
+    if report.log is None:
+        task = load_task(
+            job.path,
+            overrides=settings.overrides,
+            seed=settings.seed,
+            sample=job.case.sample,
+            package_path=settings.package_path,
+            allow_outside=settings.allow_outside,
+        )
+        page = refused_page(task, report.verdict)
+    else:
+        page = log_page(
+            job.log, task_file=job.path, package_path=settings.package_path, allow_outside=settings.allow_outside
+        )
+    job.page.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(job.page, render_page(page).encode())
+
+
+def junit(job: Job, report: RunReport) -> bytes:
+    """The run as `manipcli run --junit` tells it."""
+    places = file_places(job.path, job.settings.overrides)
+    log = job.log.name if report.log is not None else ""
+    return render_junit(report.verdict, *places, log=log, file=job.case.file)

@@ -1,0 +1,193 @@
+"""The plugin of pytest: task files are tests, and `run_task` runs one from a test in Python.
+
+It is loaded into every run of pytest, so nothing of manipcli is imported before there is a task to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import pytest
+
+if TYPE_CHECKING:
+    from manipcli.batch.job import Settings
+    from manipcli.report.run_report import RunReport
+    from manipcli.report.suite import Case, CaseReport
+
+SUFFIXES = (".yaml", ".yml")
+"""As `batch/discovery.py` has them, which is not imported for any other file."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("manipcli", "tasks of manipcli")
+    group.addoption(
+        "--manipcli-samples", type=int, metavar="N", help="run samples 0 to N-1 of each task that has a `vary:`"
+    )
+    group.addoption(
+        "--manipcli-timeout", type=float, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    _register(config, "slow", "takes more than a few seconds")
+    _register(config, "engine_NAME", "a task for the engine NAME, as engine_pybullet")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile | None:
+    """The files that `manipcli test` takes, and no others."""
+    if file_path.suffix not in SUFFIXES:
+        return None
+    from manipcli.batch.discovery import looks_like_a_task
+
+    if not looks_like_a_task(file_path) or not _is_looked_for(file_path, parent.session):
+        return None
+    return TaskFile.from_parent(parent, path=file_path)
+
+
+class TaskFile(pytest.File):
+    """A task file: one test, or one a sample."""
+
+    def collect(self) -> Iterator[TaskItem]:
+        from manipcli.batch.discovery import read_case, samples_of, shown_path
+
+        case = read_case(self.path, shown=shown_path(self.path))
+        for one in samples_of(case, self.config.getoption("manipcli_samples")):
+            for tag in one.tags:
+                if tag not in _registered(self.config):
+                    _register(self.config, tag, "a tag of a task")
+            yield TaskItem.from_parent(self, name=one.name, case=one)
+
+
+class TaskItem(pytest.Item):
+    """One run of a task, in a process of its own."""
+
+    def __init__(self, *, case: Case, **others: object) -> None:
+        super().__init__(**others)  # type: ignore[arg-type]
+        self._case = case
+        for tag in case.tags:
+            self.add_marker(tag)
+
+    def runtest(self) -> None:
+        """
+        Raises:
+            TaskFailed: it did not pass.
+        """
+        from manipcli.batch.discovery import shown_path
+        from manipcli.batch.job import FOLDER
+        from manipcli.report.suite_text import judged_lines
+
+        folder = Path(shown_path(self.config.invocation_params.dir / FOLDER))
+        report = _run(self._case, self.path, _settings(self.config, folder))
+        tightest = report.tightest
+        if tightest is not None and tightest.margin is not None:
+            self.user_properties.append(("tightest", f"{tightest.name} {tightest.margin:.6g} {tightest.unit}".rstrip()))
+        if not report.passed:
+            raise TaskFailed(report)
+        self.add_report_section("call", "margins", "\n".join(judged_lines(report)))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None) -> str:
+        """What `manipcli test` tells of it, instead of a traceback."""
+        if isinstance(excinfo.value, TaskFailed):
+            from manipcli.report.suite_text import failure_lines, gist
+
+            report = excinfo.value.report
+            return "\n".join([f"{report.outcome}: {gist(report)}", "", *failure_lines(report)])
+        return str(super().repr_failure(excinfo))
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        return self.path, None, self.name
+
+
+class TaskFailed(Exception):
+    """A task did not pass."""
+
+    def __init__(self, report: CaseReport) -> None:
+        self.report = report
+        super().__init__(report.text)
+
+
+class RunTask(Protocol):
+    """What the fixture `run_task` gives."""
+
+    def __call__(
+        self, path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, sample: int | None = None
+    ) -> RunReport: ...
+
+
+@pytest.fixture
+def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
+    """Runs a task in a process of its own: `report = run_task("pour.yaml", overrides=["scene.cup.mass=80 g"])`.
+
+    A relative path is looked for beside the file of the test, then below the root of pytest. The log is below
+    `tmp_path`, and `report.log` names it. A task that fails fails no test: `report.verdict.verdict` says it. A crash or
+    a hang does, and a file that cannot be used raises `manipcli.InvalidInput`.
+    """
+    count = 0
+
+    def run(
+        path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, sample: int | None = None
+    ) -> RunReport:
+        __tracebackhide__ = True
+        nonlocal count
+        from dataclasses import replace
+
+        from manipcli.batch.discovery import read_case, shown_path
+        from manipcli.core.errors import InvalidInput
+        from manipcli.report.suite_text import render_failure
+
+        beside, below = request.path.parent / path, request.config.rootpath / path
+        found = beside if beside.exists() or not below.exists() else below
+        case = replace(read_case(found, shown=shown_path(found)), sample=sample)
+        settings = replace(
+            _settings(request.config, tmp_path / "runs" / str(count)),
+            overrides=tuple(overrides),
+            seed=seed,
+            keep_logs=True,
+        )
+        count += 1
+        report = _run(case, found, settings)
+        if report.findings:
+            raise InvalidInput(report.findings)
+        if report.run is None:
+            pytest.fail(render_failure(report), pytrace=False)
+        return report.run
+
+    return run
+
+
+def _run(case: Case, path: Path, settings: Settings) -> CaseReport:
+    from manipcli.batch.job import Job
+    from manipcli.batch.pool import run_jobs
+
+    (report,) = run_jobs([Job(case, path, settings)], at_once=1)
+    return report
+
+
+def _settings(config: pytest.Config, folder: Path) -> Settings:
+    from manipcli.batch.job import Settings
+
+    limit: float = config.getoption("manipcli_timeout")
+    return Settings(folder=folder, timeout=limit if limit > 0.0 else None)
+
+
+def _is_looked_for(path: Path, session: pytest.Session) -> bool:
+    """Whether `manipcli test` would enter the folders between this file and what pytest was asked for."""
+    from manipcli.batch.discovery import is_entered
+
+    for place in (path, *path.parents):
+        if session.isinitpath(place) or place == session.config.rootpath:
+            return True
+        if place != path and not is_entered(place):
+            return False
+    return True
+
+
+def _register(config: pytest.Config, name: str, about: str) -> None:
+    if name not in _registered(config):
+        config.addinivalue_line("markers", f"{name}: {about}")
+
+
+def _registered(config: pytest.Config) -> set[str]:
+    return {line.split(":")[0].split("(")[0].strip() for line in config.getini("markers")}

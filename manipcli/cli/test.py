@@ -1,0 +1,218 @@
+"""`manipcli test [PATH...]`: every task file below the paths, run as a test in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from manipcli.batch.job import Job, Settings
+    from manipcli.batch.process import Process
+    from manipcli.report.suite import CaseReport, Suite
+
+
+def test(
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[PATH]...", help="Task files, or folders; this one when absent.", show_default=False),
+    ] = None,
+    *,
+    jobs: Annotated[
+        int | None, typer.Option("-n", metavar="N", min=1, help="Runs at a time; as many as there are cores.")
+    ] = None,
+    keyword: Annotated[
+        str, typer.Option("-k", metavar="EXPR", help="Only those whose id or tags match: 'pour and not slow'.")
+    ] = "",
+    last_failed: Annotated[
+        bool, typer.Option("--last-failed", "--lf", help="Only those that failed last; all if none did.")
+    ] = False,
+    samples: Annotated[
+        int | None, typer.Option("--samples", metavar="N", min=1, help="Samples 0 to N-1 of each task that varies.")
+    ] = None,
+    first: Annotated[bool, typer.Option("--exitfirst", "-x", help="Stop at the first failure.")] = False,
+    timeout: Annotated[
+        str, typer.Option("--timeout", metavar="T", help="End a run that takes longer; 0: never.")
+    ] = "10 min",
+    silence: Annotated[
+        str, typer.Option("--silence", metavar="T", help="End a run that shows no progress for so long.")
+    ] = "60 s",
+    junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML, for CI.")] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="DIR", help="Write a page about each run, and an index.html.")
+    ] = None,
+    github: Annotated[
+        bool, typer.Option("--github", help="Annotate the lines that failed, for GitHub Actions.")
+    ] = False,
+    keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of runs that passed, too.")] = False,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    format_: Format = "text",
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Tell only what fails, and the summary.")] = False,
+) -> ExitCode:
+    """Run tasks as tests, several at a time, each in a process of its own.
+
+    Tests are the YAML files with a name under the top-level key `task`; hidden folders, `runs`, virtual environments
+    and node_modules are not entered. Logs and pictures of what failed go to runs/test.
+    """
+    from manipcli.cli.interrupts import Interrupts
+
+    limit = seconds(timeout)
+    with Interrupts():
+        from manipcli.batch.job import Settings
+
+        settings = Settings(
+            overrides=tuple(overrides or ()),
+            seed=seed,
+            package_path=tuple(package_path or ()),
+            allow_outside=allow_outside,
+            pages=report,
+            junit=junit is not None,
+            keep_logs=keep_logs,
+            silence=max(seconds(silence), 0.1),
+            timeout=limit if limit > 0.0 else None,
+        )
+        _check_outputs(junit, report)
+        chosen = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
+        at_once = min(jobs or _cores(), max(1, len(chosen)))
+        lines = _Lines(chosen, text=format_ == "text", quiet=quiet)
+        suite = _run(chosen, at_once, lines, first=first)
+        lines.clear()
+        _write(suite, junit, report)
+        _tell(suite, format_, github=github)
+        return suite.exit_code
+
+
+def _jobs(
+    paths: Sequence[Path], settings: Settings, *, keyword: str, samples: int | None, last_failed: bool
+) -> tuple[Job, ...]:
+    """What is to be run, in order."""
+    from manipcli.batch.discovery import read_case, samples_of, shown_path, task_files
+    from manipcli.batch.job import Job
+    from manipcli.batch.last_failed import last_failed as known
+    from manipcli.batch.selection import chosen_by
+
+    chosen = chosen_by(keyword) if keyword else None
+    found = [
+        Job(case, file, settings)
+        for file in task_files(paths)
+        for case in samples_of(read_case(file, shown=shown_path(file)), samples)
+        if chosen is None or chosen(case)
+    ]
+    failed = known(settings.folder) if last_failed else frozenset()
+    again = tuple(job for job in found if job.case.id in failed)
+    return again or tuple(found)
+
+
+def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Suite:
+    from manipcli.batch.last_failed import remember
+    from manipcli.batch.pool import run_jobs
+    from manipcli.report.suite import Suite
+
+    began = time.monotonic()
+    reports: list[CaseReport] = []
+    stopped: Literal["", "interrupted", "first failure"] = ""
+    running = run_jobs(jobs, at_once=at_once, onlooker=lines.running)
+    try:
+        for done in running:
+            reports.append(done)
+            lines.ended(done)
+            if first and not done.passed and len(reports) < len(jobs):
+                stopped = "first failure"
+                break
+    except KeyboardInterrupt:
+        stopped = "interrupted"
+    finally:
+        running.close()
+    if reports:
+        remember(jobs[0].settings.folder, reports)
+    order = {job.case.id: k for k, job in enumerate(jobs)}
+    reports.sort(key=lambda one: order[one.case.id])
+    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped)
+
+
+class _Lines:
+    """What is shown while it goes on: a line each case that ends, and on a terminal what is running."""
+
+    def __init__(self, jobs: Sequence[Job], *, text: bool, quiet: bool) -> None:
+        from manipcli.report.suite_text import id_width
+
+        self._total, self._done = len(jobs), 0
+        self._width = id_width([job.case for job in jobs])
+        self._text, self._quiet = text, quiet
+        self._live = console.is_live() and not quiet
+
+    def running(self, processes: Sequence[Process]) -> None:
+        if self._live:
+            told = "   ".join(f"{one.job.case.name}: {one.doing}" for one in processes)
+            console.redraw(f"[{self._done}/{self._total}] {told}")
+
+    def ended(self, report: CaseReport) -> None:
+        from manipcli.report.suite_text import render_line
+
+        self._done += 1
+        self.clear()
+        if self._quiet and report.passed:
+            return
+        show = console.result if self._text else console.talk
+        show(render_line(report, width=self._width))
+
+    def clear(self) -> None:
+        if self._live:
+            console.redraw("")
+
+
+def _tell(suite: Suite, format_: str, *, github: bool) -> None:
+    from manipcli.report import suite_json, suite_text
+    from manipcli.report.github import render_annotations
+
+    if github and not all(report.passed for report in suite.reports):
+        workspace = os.environ.get("GITHUB_WORKSPACE")
+        told = render_annotations(suite.reports, workspace=Path(workspace) if workspace else None)
+        (console.result if format_ == "text" else console.talk)(told)
+    console.result(suite_json.render_suite(suite) if format_ == "json" else suite_text.render_suite(suite))
+
+
+def _write(suite: Suite, junit: Path | None, report: Path | None) -> None:
+    from manipcli.core.whole_file import write_whole
+
+    if junit is not None:
+        from manipcli.report.suite_junit import render_junit
+
+        write_whole(junit, render_junit(suite))
+        console.talk(f"written: {junit}")
+    if report is not None:
+        from manipcli.report.suite_page import render_page
+
+        report.mkdir(parents=True, exist_ok=True)
+        write_whole(report / "index.html", render_page(suite, report).encode())
+        console.talk(f"written: {report / 'index.html'}")
+
+
+def _check_outputs(junit: Path | None, report: Path | None) -> None:
+    """Before anything is run.
+
+    Raises:
+        InvalidInput: a file cannot be written where it should be.
+    """
+    if junit is not None and (junit.is_dir() or not junit.parent.is_dir()):
+        what = "is a folder" if junit.is_dir() else f"there is no folder '{junit.parent}'"
+        raise InvalidInput([Finding("USE086", f"--junit '{junit}': {what}")])
+    if report is not None and report.exists() and not report.is_dir():
+        raise InvalidInput([Finding("USE086", f"--report '{report}': this is a file; a folder was expected")])
+
+
+def _cores() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0))

@@ -1,0 +1,55 @@
+"""Many runs as one JUnit file: the suites that each run has by itself, and one for each that has no verdict."""
+
+from __future__ import annotations
+
+import re
+from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
+
+from manipcli.core.text import escape
+from manipcli.report.suite import CaseReport, Suite
+
+COUNTED = ("tests", "failures", "errors", "skipped")
+_NO_XML = re.compile("[\ufffe\uffff]")
+
+
+def render_junit(suite: Suite) -> bytes:
+    """The file; counts and times of its root are the sums over the suites."""
+    root = Element("testsuites", {"name": "manipcli"})
+    for report in suite.reports:
+        found = fromstring(report.junit).findall("testsuite") if report.junit else [_without_verdict(report)]
+        for one in found:
+            one.set("name", _safe(report.case.id))
+            for case in one.iter("testcase"):
+                if report.case.sample is not None:
+                    case.set("classname", f"{case.get('classname', '')}.sample_{report.case.sample}")
+            if not report.passed:
+                SubElement(one, "system-out").text = _safe(f"again: {report.command}")
+            root.append(one)
+    for count in COUNTED:
+        root.set(count, str(sum(int(one.get(count, "0")) for one in root)))
+    root.set("time", f"{sum(float(one.get('time', '0')) for one in root):.3f}")
+    indent(root)
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def _without_verdict(report: CaseReport) -> Element:
+    """A crash, a hang, a file that cannot be used: a suite with the one case `run`, which is an error."""
+    counts = dict.fromkeys(COUNTED, "0") | {"tests": "1", "errors": "1", "time": "0.000"}
+    one = Element("testsuite", counts)
+    place = report.troubles[0].place if report.troubles else None
+    words = {"classname": _safe(f"{report.case.task}.run"), "name": "run", "time": "0.000"}
+    words |= {"file": _safe(place.file if place is not None else report.case.file)}
+    words |= {"line": str(place.line)} if place is not None and place.line > 0 else {}
+    error = SubElement(SubElement(one, "testcase", words), "error")
+    error.set("type", report.outcome)
+    error.set("message", _safe(report.text))
+    error.text = "\n".join(
+        _safe(f"{one.place}: {one.message}" if one.place else one.message) for one in report.troubles
+    )
+    return one
+
+
+def _safe(text: str) -> str:
+    """Without the characters that XML has no way to write."""
+    return _NO_XML.sub("\ufffd", escape(text))

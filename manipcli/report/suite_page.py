@@ -1,0 +1,74 @@
+"""The page that leads to the pages of many runs: a row each, with verdict, margin, time and cause."""
+
+from __future__ import annotations
+
+import os
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import quote
+
+from manipcli.replay.player import POLICY
+from manipcli.report.html_parts import mark, table
+from manipcli.report.markup import Markup, element, joined
+from manipcli.report.suite import CaseReport, Suite
+from manipcli.report.suite_text import gist, render_summary
+
+COLUMNS = ("verdict", "task", "sample", "margin or cause", "took")
+
+
+def render_page(suite: Suite, folder: Path) -> str:
+    """The file `index.html` of a folder; what did not pass comes first.
+
+    Args:
+        suite: all runs.
+        folder: where the page lies, from which its links lead to the others.
+    """
+    style = Markup(files("manipcli.report").joinpath("page", "report.css").read_text("utf-8"))
+    passed = sum(report.passed for report in suite.reports)
+    good = passed == suite.total > 0
+    word = "passed" if good else "failed"
+    reports = sorted(suite.reports, key=lambda report: report.passed)
+    whole = element(
+        "html",
+        element(
+            "head",
+            element("meta", charset="utf-8"),
+            element("meta", http_equiv="Content-Security-Policy", content=POLICY),
+            element("meta", name_="viewport", content="width=device-width, initial-scale=1"),
+            element("title", f"{'✓' if good else '✗'} {passed} of {suite.total} passed"),
+            element("link", rel="icon", href="data:,"),
+            element("style", style),
+        ),
+        element(
+            "body",
+            element(
+                "header",
+                element(
+                    "div",
+                    element("h1", f"{passed} of {suite.total} passed"),
+                    element("span", f"{'✓' if good else '✗'} {word}", class_=f"verdict {word}"),
+                    class_="title",
+                ),
+                element("p", render_summary(suite), class_="says"),
+            ),
+            element(
+                "main", element("section", table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",)))
+            ),
+        ),
+        lang="en",
+    )
+    return f"<!DOCTYPE html>\n{whole}\n"
+
+
+def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
+    name: str = report.case.file
+    if report.page is not None:
+        name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
+    again = None if report.passed else element("div", element("code", report.command), class_="place")
+    return (
+        mark(report.passed, report.outcome),
+        joined(name, element("div", report.case.task)) if report.case.task else name,
+        "" if report.case.sample is None else str(report.case.sample),
+        joined(gist(report), again),
+        f"{report.duration:.1f} s",
+    )

@@ -1,0 +1,90 @@
+"""Many runs, for people: a line each as they end, why those that did not pass did not, and a summary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manipcli.core.text import shorten
+from manipcli.report.quantity import quantity
+from manipcli.report.suite import Case, CaseReport, Suite
+from manipcli.report.text import FAIL, PASS
+
+LONGEST = 60
+"""Characters of an id that the other columns make room for."""
+
+WIDEST = 110
+"""Characters of a cause in the line of a case; the whole of it is told at the end."""
+
+
+def id_width(cases: Sequence[Case]) -> int:
+    """How wide the column of ids is."""
+    return min(LONGEST, max((len(case.id) for case in cases), default=0))
+
+
+def render_line(report: CaseReport, *, width: int = 0) -> str:
+    """`✓ passed  tasks/pour.yaml::pour  3.5 s  inside: 14 mm to spare`."""
+    mark = PASS if report.passed else FAIL
+    head = f"{mark} {report.outcome:<7}  {report.case.id:<{width}}  {report.duration:6.2f} s"
+    return f"{head}  {shorten(gist(report), width=WIDEST)}".rstrip()
+
+
+def gist(report: CaseReport) -> str:
+    """The smallest margin; of what did not pass, the first cause where that is not the margin."""
+    tightest = report.tightest
+    if report.passed:
+        if tightest is None:
+            return "nothing expected" if report.run is not None and not report.run.verdict.expectations else ""
+        if not tightest.margin:
+            return ""
+        return f"{tightest.name}: {quantity(tightest.margin, tightest.unit)} to spare"
+    cause = report.troubles[0].message if report.troubles else report.text
+    if tightest is not None and tightest.outcome == "failed" and tightest.margin and cause.startswith(tightest.name):
+        return f"{tightest.name}: fails by {quantity(abs(tightest.margin), tightest.unit)}"
+    return cause
+
+
+def render_failure(report: CaseReport) -> str:
+    """A case that did not pass: its id, and what is wrong with it."""
+    return "\n".join([f"{FAIL} {report.case.id} {report.outcome}", *(f"  {line}" for line in failure_lines(report))])
+
+
+def failure_lines(report: CaseReport) -> list[str]:
+    """All that is wrong with a case, what is not, where to look, and how to see it again."""
+    lines = []
+    for trouble in report.troubles:
+        where = f"{trouble.place}: " if trouble.place is not None else ""
+        lines.append(f"{where}{trouble.message}")
+    lines += judged_lines(report)
+    kept = (("log", report.log), ("picture", report.picture), ("report", report.page), ("output", report.output))
+    lines += [f"{name}: {path}" for name, path in kept if path is not None]
+    return [*lines, *report.notes, f"again: {report.command}"]
+
+
+def judged_lines(report: CaseReport) -> list[str]:
+    """What was expected and is met: that, too, says where the fault is not."""
+    if report.run is None:
+        return []
+    return [
+        f"{PASS} {one.name}" + (f": {quantity(one.margin, one.unit)} to spare" if one.margin else "")
+        for one in report.run.verdict.expectations
+        if one.outcome == "passed"
+    ]
+
+
+def render_summary(suite: Suite) -> str:
+    """How many passed, and what became of the others."""
+    words = [report.outcome for report in suite.reports]
+    counts = [(words.count(word), word) for word in ("failed", "error", "crashed", "hung", "invalid", "passed")]
+    undone = suite.total - len(words)
+    told = [f"{count} {word}" for count, word in counts if count] + ([f"{undone} not run"] if undone else [])
+    good = suite.total and all(report.passed for report in suite.reports) and not undone
+    why = {"": "", "interrupted": "; interrupted", "first failure": "; stopped at the first failure"}[suite.stopped]
+    processes = f"{suite.jobs} process{'' if suite.jobs == 1 else 'es'}"
+    text = ", ".join(told) or "nothing to run"
+    return f"{PASS if good else FAIL} {text} in {suite.duration:.1f} s, {processes}{why}"
+
+
+def render_suite(suite: Suite) -> str:
+    """What is left to say when all lines are out."""
+    failures = [render_failure(report) for report in suite.reports if not report.passed]
+    return "\n\n".join([*failures, render_summary(suite)])

@@ -1,0 +1,100 @@
+"""Which files are tests: those with a name under the top-level key `task`, and no others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from manipcli.batch.discovery import looks_like_a_task, read_case, samples_of, task_files
+from manipcli.core.errors import InvalidInput
+
+TASKS = {
+    "a.yaml": "task: a\nrobot: r.yaml\n",
+    "tasks/late.yml": "robot: r.yaml\nsteps: []\ntask: late  # the order is free\n",
+    "tasks/quoted.yaml": '"task": quoted\n',
+    "tasks/flow.yaml": "{task: flow, robot: r.yaml}\n",
+    "tasks/windows.yaml": "\ufeff# a comment\r\ntask: windows\r\n",
+    "tasks/broken.yaml": "task: broken\nsteps: [\n",
+}
+OTHERS = {
+    "robots/r.yaml": "robot: r\ndescription: r.urdf\n",
+    "controllers/c.yaml": "controllers: {}\n",
+    "ci.yaml": "on: push\njobs:\n  task:\n    steps: []\n",
+    "ansible.yaml": "- name: x\n  task: y\n",
+    "taskfile.yml": "version: 3\ntasks:\n  task: no\n",
+    "group.yaml": "task:\n  name: a mapping\n",
+    "comment.yaml": "# task: no\ntask: # nothing\n",
+    "notes.txt": "task: no\n",
+    ".hidden/h.yaml": "task: h\n",
+    "tasks/.hidden.yaml": "task: h\n",
+    "runs/old.yaml": "task: old\n",
+    "node_modules/m.yaml": "task: m\n",
+    "my_env/lib/v.yaml": "task: v\n",
+    "my_env/pyvenv.cfg": "home = /usr/bin\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, text in {**OTHERS, **TASKS}.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text.encode())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_task_files_below_a_folder_and_no_others(folder: Path) -> None:
+    assert {str(path) for path in task_files([Path()])} == set(TASKS)
+
+
+def test_a_folder_that_is_named_is_entered_whatever_it_is_called(folder: Path) -> None:
+    assert [path.name for path in task_files([Path("runs"), Path(".hidden")])] == ["old.yaml", "h.yaml"]
+
+
+def test_a_file_is_run_once_however_it_is_named(folder: Path) -> None:
+    (folder / "link.yaml").symlink_to("a.yaml")
+    named = [Path("a.yaml"), folder / "a.yaml", Path("link.yaml"), Path("./tasks/../a.yaml")]
+    assert task_files(named) == (Path("a.yaml"),)
+
+
+@pytest.mark.parametrize(
+    ("named", "code"), [("robots/r.yaml", "USE105"), ("absent.yaml", "USE101"), ("notes.txt", "USE105")]
+)
+def test_a_file_that_is_named_and_is_no_task_is_refused(folder: Path, named: str, code: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        task_files([Path(named), Path("tasks")])
+    assert [finding.code for finding in refused.value.findings] == [code]
+
+
+def test_only_the_beginning_of_a_foreign_file_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "large.yaml"
+    path.write_text("a: 1\n" * 100_000 + "task: late\n")
+    assert not looks_like_a_task(path)
+    assert not looks_like_a_task(tmp_path / "absent.yaml")
+
+
+def test_a_case_knows_name_tags_and_engine(tmp_path: Path) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text("task: t\ntags: [slow, nightly]\nsimulation: {engine: kinematic}\nvary: {scene.a.mass: 1}\n")
+    case = read_case(path, shown="tasks/t.yaml")
+    assert (case.id, case.tags) == ("tasks/t.yaml::t", ("slow", "nightly", "engine_kinematic"))
+    assert [one.id for one in samples_of(case, 2)] == ["tasks/t.yaml::t[0]", "tasks/t.yaml::t[1]"]
+    assert samples_of(case, None) == (case,)
+
+
+def test_a_task_that_does_not_vary_is_run_once(tmp_path: Path) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text("task: t\n")
+    case = read_case(path)
+    assert case.tags == ("engine_pybullet",)
+    assert samples_of(case, 5) == (case,)
+
+
+def test_a_file_that_cannot_be_read_is_a_case_with_its_findings(folder: Path) -> None:
+    case = read_case(folder / "tasks" / "broken.yaml", shown="tasks/broken.yaml")
+    assert case.id == "tasks/broken.yaml::broken"
+    (finding,) = case.findings
+    assert finding.place is not None
+    assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 3)

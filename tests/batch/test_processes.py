@@ -1,0 +1,197 @@
+"""Each run in a process of its own: whatever it does, the others go on and it is named."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from manipcli.batch.job import Job, Settings
+from manipcli.batch.pool import run_jobs
+from manipcli.batch.process import Process
+from manipcli.core.errors import Finding, Place
+from manipcli.judge.verdict import ExpectationOutcome, Verdict
+from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.suite import Case, CaseReport, Trouble
+
+CHILD = f"""
+import os, signal, sys, time
+sys.path[:] = {sys.path!r}
+from multiprocessing.connection import Connection
+from manipcli.batch.job import Beat, End
+parent = Connection(int(sys.argv[-1]))
+job = parent.recv()
+parent.send(Beat("step 1 of 1, 'lift_1'", 2.5))
+exec(job.case.task)
+"""
+"""Speaks with its parent as the real one does, and does what the name of the task says."""
+END = "parent.send(End(None, (), ()))"
+
+
+def jobs(tmp_path: Path, *codes: str, **settings: float) -> list[Job]:
+    chosen = replace(Settings(folder=tmp_path / "runs"), silence=30.0, **settings)  # type: ignore[arg-type]
+    return [Job(Case(f"t{k}.yaml", code), tmp_path / f"t{k}.yaml", chosen) for k, code in enumerate(codes)]
+
+
+def run(todo: Sequence[Job], at_once: int = 2) -> list[CaseReport]:
+    return list(run_jobs(todo, at_once=at_once, command=(sys.executable, "-c", CHILD)))
+
+
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
+def test_a_crash_costs_one_run_and_names_signal_and_step(tmp_path: Path, number: signal.Signals) -> None:
+    one, other = sorted(run(jobs(tmp_path, f"os.kill(os.getpid(), {int(number)})", END)), key=lambda r: r.case.file)
+    assert one.outcome == "crashed"
+    assert f"crashed by signal {int(number)} ({number.name}); step 1 of 1, 'lift_1' at 2.50 s" in one.text
+    assert other.outcome == "invalid"  # it came to its end, and said that there was nothing to run
+
+
+def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -> None:
+    (report,) = run(jobs(tmp_path, "print('before'); sys.exit('no physics here')"))
+    assert (report.outcome, report.text) == (
+        "crashed",
+        "ended with exit code 1 before it was done: no physics here",
+    )
+    assert report.output is not None
+    assert Path(report.output).read_text().splitlines() == ["before", "no physics here"]
+
+
+@pytest.mark.slow
+def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
+    stuck = (
+        "import faulthandler; faulthandler.register(signal.SIGUSR1)\n"
+        "def stuck_here():\n while True: time.sleep(1)\nstuck_here()"
+    )
+    todo = [replace(job, settings=replace(job.settings, silence=1.0)) for job in jobs(tmp_path, stuck)]
+    (report,) = run(todo)
+    assert report.outcome == "hung"
+    assert report.text == "hung: no progress for 1 s; step 1 of 1, 'lift_1' at 2.50 s"
+    assert report.output is not None
+    assert "stuck_here" in Path(report.output).read_text()
+
+
+@pytest.mark.slow
+def test_signs_of_life_are_no_silence_but_do_not_stop_the_clock(tmp_path: Path) -> None:
+    busy = "while True: time.sleep(0.02); parent.send(Beat('busy'))"
+    todo = [replace(job, settings=replace(job.settings, silence=1.0)) for job in jobs(tmp_path, busy, timeout=2.2)]
+    began = time.monotonic()
+    (report,) = run(todo)
+    assert time.monotonic() - began >= 2.2
+    assert report.text == "hung: it took longer than 2.2 s; busy"
+
+
+@pytest.mark.slow
+def test_a_process_that_takes_no_signal_is_ended_too(tmp_path: Path) -> None:
+    (job,) = jobs(tmp_path, "os.kill(os.getpid(), signal.SIGSTOP)")
+    (report,) = run([replace(job, settings=replace(job.settings, silence=1.0))])
+    assert report.outcome == "hung"
+
+
+def test_no_more_than_asked_run_at_once_and_in_order(tmp_path: Path) -> None:
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    code = f"open('{marks}/' + job.case.file, 'w').close(); n = len(os.listdir('{marks}')); time.sleep(0.1); "
+    code += f"open('{tmp_path}/most', 'a').write(f'{{n}}'); os.remove('{marks}/' + job.case.file); {END}"
+    assert len(run(jobs(tmp_path, *[code] * 4), at_once=2)) == 4
+    assert max(map(int, (tmp_path / "most").read_text())) <= 2
+    assert [r.case.file for r in run(jobs(tmp_path, *[END] * 3), at_once=1)] == ["t0.yaml", "t1.yaml", "t2.yaml"]
+
+
+def test_who_stops_listening_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+    sleeper = "open(job.partial, 'w').close(); time.sleep(100)"
+    seen: list[int] = []
+
+    def watch(processes: Sequence[Process]) -> None:
+        seen.extend(process._process.pid for process in processes)
+
+    running = run_jobs(jobs(tmp_path, END, sleeper), at_once=2, onlooker=watch, command=(sys.executable, "-c", CHILD))
+    next(running)
+    partial = tmp_path / "runs" / "t1.mcap.partial"
+    deadline = time.monotonic() + 20.0
+    while not partial.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    running.close()
+    assert not list((tmp_path / "runs").glob("t1.*"))
+    for pid in set(seen):
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+VERDICT = Verdict(
+    task="t", verdict="passed", seed=1, engine="pybullet", simulated_time=1.0, steps=(),
+    expectations=(ExpectationOutcome("near", "passed", 0.01, "m", 1.0),),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "outcome", "kept"), [("passed", "passed", False), ("failed", "failed", True), ("error", "error", True)]
+)
+def test_the_verdict_arrives_whole_and_only_what_failed_keeps_its_log(
+    tmp_path: Path, verdict: str, outcome: str, kept: bool
+) -> None:
+    sent = RunReport(
+        replace(VERDICT, verdict=verdict),
+        wall_time=1.0,
+        real_time_factor=1.0,
+        log="x",
+        timing=Timing(0, 0, 1, 0),  # type: ignore[arg-type]
+    )
+    code = f"import pickle; open(job.log, 'w').close(); parent.send(pickle.loads({_pickled(sent)!r}))"
+    (report,) = run(jobs(tmp_path, code))
+    assert (report.outcome, report.run) == (outcome, sent)
+    assert (tmp_path / "runs" / "t0.mcap").exists() == kept == (report.log is not None)
+    assert report.output is None
+
+
+def _pickled(report: RunReport) -> bytes:
+    import pickle
+
+    from manipcli.batch.job import End
+
+    return pickle.dumps(End(report, troubles=(Trouble("x", Place("t0.yaml", 1, 1)),)))
+
+
+def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path: Path) -> None:
+    (tmp_path / "runs").mkdir()
+    for suffix in (".mcap", ".png", ".mcap.partial"):
+        (tmp_path / "runs" / f"t0{suffix}").write_text("old")
+    (report,) = run(jobs(tmp_path, "sys.exit(3)"))
+    assert (report.log, report.picture) == (None, None)
+
+
+def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:
+    (job,) = jobs(tmp_path, "never")
+    finding = Finding("YAML100", "quotes", Place("t0.yaml", 3, 4), hint="close them")
+    (report,) = run([replace(job, case=replace(job.case, findings=(finding,)))])
+    assert (report.outcome, report.troubles) == (
+        "invalid",
+        (Trouble("error[YAML100]: quotes (hint: close them)", finding.place),),
+    )
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "sample", "log"),
+    [
+        ("tasks/pour.yaml", None, "tasks/pour.mcap"),
+        ("tasks/pour.yaml", 17, "tasks/pour-17.mcap"),
+        ("../other/pour.yaml", None, "__/other/pour.mcap"),
+        ("/abs/pour.v2.yaml", None, "abs/pour.v2.mcap"),
+    ],
+)
+def test_every_case_has_a_log_of_its_own(file: str, sample: int | None, log: str) -> None:
+    assert Job(Case(file, "pour", sample), Path(file), Settings()).log == Path("runs/test") / log
+
+
+def test_the_command_that_does_it_again_can_be_pasted_into_a_shell() -> None:
+    settings = Settings(overrides=("scene.cup.mass=80 g",), seed=4, package_path=(Path("p q"),), allow_outside=True)
+    assert Job(Case("my tasks/a.yaml", "a", 17), Path("x"), settings).command == (
+        "manipcli run 'my tasks/a.yaml' --seed 4 --sample 17 --set 'scene.cup.mass=80 g' --package-path 'p q' "
+        "--allow-outside"
+    )

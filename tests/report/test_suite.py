@@ -1,0 +1,190 @@
+"""Many runs told: in lines, as annotations, as JUnit, as JSON, as a page."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+from manipcli.core.errors import Finding, Place
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.report import suite_json
+from manipcli.report.github import render_annotations
+from manipcli.report.junit import render_junit as render_run_junit
+from manipcli.report.run_page import Written
+from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, signal_name, troubles_of
+from manipcli.report.suite_junit import render_junit
+from manipcli.report.suite_page import render_page
+from manipcli.report.suite_text import gist, render_failure, render_line, render_suite, render_summary
+
+NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5)
+UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4)
+NEVER = ExpectationOutcome("no_collision", "passed", 0.0, "N", None)
+MISSED = ExpectationOutcome("inside", "failed", -0.003, "m", 14.0, "'ball' is beside 'tray'")
+STEP = StepOutcome("pick_1", "pick", "done", 0.0, 2.0, 2.0)
+
+
+def run(*expectations: ExpectationOutcome) -> RunReport:
+    failed = any(one.outcome != "passed" for one in expectations)
+    verdict = Verdict("pour", "failed" if failed else "passed", 1, "pybullet", 14.5, (STEP,), expectations)
+    return RunReport(verdict, wall_time=3.0, real_time_factor=5.0, log="runs/x.mcap", timing=Timing(0.5, 0.5, 1.5, 0.5))
+
+
+def report(
+    outcome: CaseWord, *expectations: ExpectationOutcome, sample: int | None = None, **more: object
+) -> CaseReport:
+    ran = run(*expectations) if outcome in ("passed", "failed") else None
+    case = Case("tasks/pour.yaml", "pour", sample)
+    return CaseReport(case, outcome, 3.5, "manipcli run tasks/pour.yaml", run=ran, **more)  # type: ignore[arg-type]
+
+
+PASSED = report("passed", NEAR, UPRIGHT, NEVER)
+FAILED = report(
+    "failed", MISSED, NEAR, text="an expectation is not met", log="runs/test/tasks/pour.mcap",
+    troubles=(Trouble("inside: fails by 3.0 mm: a, b: 100%\nso", Place("tasks/pour.yaml", 21, 5), 14.0),),
+)  # fmt: skip
+CRASHED = report(
+    "crashed", text="crashed by signal 11 (SIGSEGV)", troubles=(Trouble("crashed by signal 11 (SIGSEGV)"),)
+)
+
+
+@pytest.mark.parametrize(
+    ("judged", "tightest"),
+    [
+        ((UPRIGHT, NEAR, NEVER), NEAR),  # the smallest SI number, not what never touched
+        ((NEAR, MISSED), MISSED),
+        ((NEVER,), NEVER),
+        ((NEAR, replace(MISSED, margin=None)), NEAR),
+    ],
+)
+def test_the_tightest_expectation(judged: tuple[ExpectationOutcome, ...], tightest: ExpectationOutcome) -> None:
+    assert report("passed", *judged).tightest == tightest
+
+
+def test_a_line_says_verdict_margin_and_time() -> None:
+    assert render_line(PASSED) == "✓ passed   tasks/pour.yaml::pour    3.50 s  near: 15.6 mm to spare"
+    assert render_line(FAILED) == "✗ failed   tasks/pour.yaml::pour    3.50 s  inside: fails by 3.0 mm"
+    assert render_line(CRASHED).endswith("crashed by signal 11 (SIGSEGV)")
+    assert gist(report("passed")) == "nothing expected"
+    long = report("crashed", troubles=(Trouble("x" * 500),))
+    assert len(render_line(long)) < 170
+    assert "x" * 500 in render_failure(long)
+
+
+def test_a_failure_says_where_what_held_and_how_to_see_it_again() -> None:
+    lines = render_failure(FAILED).splitlines()
+    assert lines[0] == "✗ tasks/pour.yaml::pour failed"
+    assert lines[1].startswith("  tasks/pour.yaml:21:5: inside: fails by 3.0 mm")
+    assert "  ✓ near: 15.6 mm to spare" in lines
+    assert lines[-2:] == ["  log: runs/test/tasks/pour.mcap", "  again: manipcli run tasks/pour.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("words", "total", "stopped", "code"),
+    [
+        (["passed", "passed"], 2, "", 0),
+        (["passed", "failed"], 2, "", 1),
+        (["crashed"], 1, "", 1),
+        (["hung", "passed"], 2, "", 1),
+        (["error"], 1, "", 1),
+        (["failed", "invalid"], 2, "", 4),
+        (["failed"], 2, "first failure", 1),
+        (["passed"], 2, "interrupted", 2),
+        ([], 2, "interrupted", 2),
+        ([], 0, "", 5),
+    ],
+)
+def test_the_exit_code_of_many(words: list[CaseWord], total: int, stopped: str, code: int) -> None:
+    reports = tuple(report(word) for word in words)
+    suite = Suite(reports, total, 2, 4.0, stopped)  # type: ignore[arg-type]
+    assert suite.exit_code == code
+    assert render_summary(suite).startswith("✓" if code == 0 else "✗")
+    verdict = json.loads(suite_json.render_suite(suite))["verdict"]
+    assert (verdict == "passed") == (code == 0)
+
+
+def test_a_summary_counts_all() -> None:
+    suite = Suite((PASSED, FAILED, CRASHED), 5, 2, 12.34, "first failure")
+    assert render_summary(suite) == (
+        "✗ 1 failed, 1 crashed, 1 passed, 2 not run in 12.3 s, 2 processes; stopped at the first failure"
+    )
+    assert render_suite(suite).count("again: ") == 2
+
+
+def test_annotations_are_what_github_reads(tmp_path: Path) -> None:
+    told = render_annotations([PASSED, FAILED, CRASHED]).splitlines()
+    assert told == [
+        "::error file=tasks/pour.yaml,line=21,col=5,title=pour failed::inside: fails by 3.0 mm: a, b: 100%25%0Aso",
+        "::error file=tasks/pour.yaml,line=1,col=1,title=pour crashed::crashed by signal 11 (SIGSEGV)",
+    ]
+    odd = replace(CRASHED, case=Case("a,b:c.yaml", "t"))
+    assert "file=a%2Cb%3Ac.yaml," in render_annotations([odd])
+
+
+def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "project").mkdir()
+    monkeypatch.chdir(tmp_path / "project")
+    assert "file=project/tasks/pour.yaml," in render_annotations([FAILED], workspace=tmp_path)
+
+
+def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
+    def with_junit(one: CaseReport) -> CaseReport:
+        assert one.run is not None
+        verdict = one.run.verdict
+        written = [Written("pour.yaml:3")] * 3
+        xml = render_run_junit(verdict, written[:1], written[: len(verdict.expectations)], file=one.case.file)
+        return replace(one, junit=xml)
+
+    sampled = replace(PASSED, case=replace(PASSED.case, sample=7))
+    root = fromstring(render_junit(Suite((with_junit(sampled), with_junit(FAILED), CRASHED), 3, 1, 1.0)))
+    suites = root.findall("testsuite")
+    assert [one.get("name") for one in suites] == [
+        "tasks/pour.yaml::pour[7]", "tasks/pour.yaml::pour", "tasks/pour.yaml::pour",
+    ]  # fmt: skip
+    for counted in ("tests", "failures", "errors", "skipped"):
+        assert int(root.get(counted, "")) == sum(int(one.get(counted, "")) for one in suites)
+    assert len(root.findall(".//testcase")) == int(root.get("tests", ""))
+    assert len(root.findall(".//failure")) == int(root.get("failures", "")) == 1
+    assert len(root.findall(".//error")) == int(root.get("errors", "")) == 1
+    assert suites[0].find("testcase[@name='near']").get("classname") == "pour.expect.sample_7"  # type: ignore[union-attr]
+    error = suites[2].find("testcase/error")
+    assert error is not None
+    assert (error.get("type"), error.get("message")) == ("crashed", "crashed by signal 11 (SIGSEGV)")
+    assert "again: manipcli run tasks/pour.yaml" in [one.text for one in suites[2].findall("system-out")]
+
+
+def test_json_tells_of_each_case_what_a_run_tells() -> None:
+    answer = json.loads(suite_json.render_suite(Suite((PASSED, FAILED, CRASHED), 3, 2, 9.0)))
+    assert (answer["verdict"], answer["total"], answer["passed"]) == ("failed", 3, 1)
+    passed, failed, crashed = answer["cases"]
+    assert passed["tightest"] == {"name": "near", "margin": 0.0156, "unit": "m"}
+    assert passed["run"]["verdict"] == "passed"
+    assert (failed["troubles"][0]["line"], failed["troubles"][0]["column"], failed["troubles"][0]["at"]) == (21, 5, 14)
+    assert (crashed["run"], crashed["outcome"]) == (None, "crashed")
+
+
+def test_the_page_leads_to_the_others_and_escapes_what_it_shows(tmp_path: Path) -> None:
+    odd = replace(FAILED, case=Case("a<b>.yaml", "x&y"), page=str(tmp_path / "sub" / "a b.html"))
+    page = render_page(Suite((PASSED, odd), 2, 2, 9.0), tmp_path)
+    assert 'href="sub/a%20b.html"' in page
+    assert "a&lt;b&gt;.yaml" in page
+    assert "x&amp;y" in page
+    assert page.index("a&lt;b") < page.index("tasks/pour.yaml")  # what failed comes first
+    assert not re.findall(r'(?:src|href)="(?!data:|sub/|#)', page)
+
+
+def test_findings_become_troubles_with_places_and_hints() -> None:
+    place = Place("a.yaml", 2, 3)
+    assert troubles_of([Finding("TASK203", "no joint 'x'", place, hint="did you mean 'y'?")]) == (
+        Trouble("error[TASK203]: no joint 'x' (hint: did you mean 'y'?)", place),
+    )
+
+
+def test_signals_have_names() -> None:
+    assert signal_name(11) == "signal 11 (SIGSEGV)"
+    assert signal_name(200) == "signal 200"
