@@ -1,0 +1,163 @@
+"""The plugin as a project meets it that has manipcli installed: pytest in a folder of tasks, in one of none."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+from xml.etree.ElementTree import parse
+
+import pytest
+
+# Loaded here once: what pytest loads while it runs inside a test, it forgets.
+import manipcli.batch.discovery
+import manipcli.spec.load
+import manipcli.spec.task  # noqa: F401
+
+pytest_plugins = ["pytester"]
+
+ROOT = Path(__file__).parents[2]
+PLUGIN = "manipcli.cli.pytest_plugin"
+INSTALLED = any(point.value == PLUGIN for point in entry_points(group="pytest11"))
+LOADED = () if INSTALLED else ("-p", PLUGIN)
+"""Where manipcli runs from its source, and is not installed, the plugin is named."""
+ALONE = ("-p", "no:hypothesispytest", "-p", "no:xdist")
+"""Without the plugins of others, whose loading takes longer than these tests."""
+
+TASK = f"""\
+task: {{name}}
+tags: [{{tags}}]
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+simulation: {{{{engine: kinematic}}}}
+steps:
+  - wait: 0.2 s
+expect:
+  - duration: {{{{below: {{below}}}}}}
+  - tracking: {{{{group: arm, within: 0.05 rad}}}}
+"""
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester) -> pytest.Pytester:
+    """Tasks that pass, fail and are broken, and files that are none."""
+    files = {
+        "tasks/good.yaml": TASK.format(name="good", tags="slow, nightly", below="10 s"),
+        "tasks/late.yaml": TASK.format(name="late", tags="", below="0.1 s"),
+        "tasks/broken.yaml": "task: broken\nsteps: [\n",
+        "tasks/robot.yaml": "robot: r\ndescription: r.urdf\n",
+        "tasks/.hidden.yaml": "task: hidden\n",
+        "runs/old.yaml": "task: old\n",
+        "ci.yaml": "on: push\n",
+    }
+    for name, text in files.items():
+        path = pytester.path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    return pytester
+
+
+def collected(project: pytest.Pytester, *words: str) -> list[str]:
+    result = project.runpytest_inprocess(*LOADED, *ALONE, "--collect-only", "-q", "--strict-markers", *words)
+    return [line for line in result.outlines if "::" in line]
+
+
+def test_task_files_and_no_others_are_tests(project: pytest.Pytester) -> None:
+    everything = ["tasks/broken.yaml::broken", "tasks/good.yaml::good", "tasks/late.yaml::late"]
+    assert collected(project) == everything
+    assert collected(project, "tasks") == everything
+    assert collected(project, "tasks/good.yaml::good") == ["tasks/good.yaml::good"]
+    assert collected(project, "runs") == ["runs/old.yaml::old"]  # it was named
+
+
+def test_the_files_are_those_of_the_command(project: pytest.Pytester) -> None:
+    from manipcli.batch.discovery import read_case, shown_path, task_files
+
+    ids = [read_case(path, shown=shown_path(path)).id for path in task_files([Path()])]
+    assert collected(project) == ids
+
+
+def test_tags_and_engine_are_markers_that_need_no_registration(project: pytest.Pytester) -> None:
+    assert collected(project, "-m", "nightly and engine_kinematic") == ["tasks/good.yaml::good"]
+    assert "tasks/good.yaml::good" not in collected(project, "-m", "not slow")
+    assert collected(project, "-k", "late") == ["tasks/late.yaml::late"]
+
+
+def test_samples_are_tests_of_their_own(project: pytest.Pytester) -> None:
+    path = project.path / "tasks" / "good.yaml"
+    path.write_text(path.read_text() + "vary: {simulation.settle: {uniform: [0.1 s, 0.2 s]}}\n")
+    ids = collected(project, "--manipcli-samples", "2", "tasks/good.yaml", "tasks/late.yaml")
+    assert ids == ["tasks/good.yaml::good[0]", "tasks/good.yaml::good[1]", "tasks/late.yaml::late"]
+
+
+def test_the_plugin_loads_nothing_but_itself() -> None:
+    script = f"import sys, {PLUGIN}; print(*(name for name in sys.modules if name.startswith('manipcli')))"
+    environment = {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
+    assert set(done.stdout.split()) == {"manipcli", "manipcli.cli", PLUGIN}
+
+
+def test_foreign_yaml_loads_nothing_but_the_first_look(pytester: pytest.Pytester) -> None:
+    pytester.makefile(".yaml", ci="on: push\n", tasks="tasks: {a: 1}\n")
+    pytester.makepyfile("import sys\ndef test_it(): print('loaded', *[m for m in sys.modules if 'pydantic' in m])")
+    result = pytester.runpytest_subprocess(*LOADED, *ALONE, "-s")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["*loaded"])
+
+
+@pytest.mark.slow
+def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pytest.Pytester) -> None:
+    result = project.runpytest_subprocess(*LOADED, "-v", "-rP", "--junit-xml=out.xml", "--strict-markers")
+    result.assert_outcomes(passed=1, failed=2)
+    told = result.stdout.str()
+    assert re.search(r"failed: duration: fails by \d+ ms|failed: duration: fails by 0\.\d+ s", told)
+    assert "tasks/late.yaml:9:5: duration: fails by" in told
+    assert "✓ tracking: 2.9 deg to spare" in told
+    assert "again: manipcli run tasks/late.yaml" in told
+    assert "tasks/broken.yaml:3:1: error[YAML100]" in told
+    assert "Traceback" not in told
+    assert "pytest_plugin.py" not in told
+    assert (project.path / "runs" / "test" / "tasks" / "late.mcap").is_file()
+    assert not (project.path / "runs" / "test" / "tasks" / "good.mcap").exists()
+    cases = {case.get("name"): case for case in parse(project.path / "out.xml").getroot().iter("testcase")}
+    assert set(cases) == {"broken", "good", "late"}
+    assert "duration: fails by" in str(cases["late"].findtext("failure"))
+    assert cases["good"].find("properties/property[@name='tightest']") is not None
+
+
+@pytest.mark.slow
+def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytester) -> None:
+    project.makepyfile(
+        """
+        from pathlib import Path
+        import manipcli
+        import pytest
+
+        def test_report(run_task):
+            report = run_task("tasks/good.yaml", overrides=["steps.0.wait=0.4 s"], seed=7)
+            again = run_task(Path("tasks") / "good.yaml")
+            assert (report.verdict.verdict, report.verdict.seed) == ("passed", 7)
+            assert report.verdict.simulated_time > again.verdict.simulated_time
+            assert manipcli.read_recording(Path(report.log)).states.time[-1] > 0.4
+
+        def test_failure_is_no_exception(run_task):
+            assert run_task("tasks/late.yaml").verdict.verdict == "failed"
+
+        def test_refusal_is_one(run_task):
+            with pytest.raises(manipcli.InvalidInput, match="broken.yaml:3:1"):
+                run_task("tasks/broken.yaml")
+        """
+    )
+    project.runpytest_subprocess(*LOADED, "test_a_python_test_runs_a_task_and_looks_at_its_report.py").assert_outcomes(
+        passed=3
+    )
+
+
+@pytest.mark.slow
+def test_two_workers_share_the_tasks(project: pytest.Pytester) -> None:
+    pytest.importorskip("xdist")
+    result = project.runpytest_subprocess(*LOADED, "-n", "2", "-v")
+    result.assert_outcomes(passed=1, failed=2)
+    assert "again: manipcli run tasks/late.yaml" in result.stdout.str()

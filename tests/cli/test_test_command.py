@@ -1,0 +1,225 @@
+"""`manipcli test` as a user and as CI meet it: verdicts, exit codes, files, signals."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import parse
+
+import pytest
+
+from manipcli.cli.app import main
+
+ROOT = Path(__file__).parents[2]
+TASK = f"""\
+task: {{name}}
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+simulation: {{{{engine: kinematic}}}}
+steps:
+  - wait: {{wait}}
+expect:
+  - duration: {{{{below: {{below}}}}}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(folder: Path, name: str, *, wait: str = "0.2 s", below: str = "10 s") -> None:
+    (folder / f"{name}.yaml").write_text(TASK.format(name=name, wait=wait, below=below))
+
+
+def test_nothing_to_run_is_5(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "robot.yaml").write_text("robot: r\n")
+    assert main(["test"]) == 5
+    assert capsys.readouterr().out == "✗ nothing to run in 0.0 s, 1 process\n"
+    write(folder, "a")
+    assert main(["test", "-k", "nothing_like_it"]) == 5
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["absent"],
+        ["-k", "a and"],
+        ["-n", "0"],
+        ["--samples", "0"],
+        ["--timeout", "soon"],
+        ["--junit", "absent/x.xml"],
+        ["--report", "a.yaml"],
+    ],
+)
+def test_wrong_usage_is_4_and_runs_nothing(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    write(folder, "a")
+    assert main(["test", *words]) == 4
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.count("error[USE") == 1
+    assert not (folder / "runs").exists()
+
+
+def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    assert main(["test", "--github"]) == 4
+    out = capsys.readouterr().out
+    assert "b.yaml:3:1: error[YAML100]" in out
+    assert "::error file=b.yaml,line=3,col=1,title=b invalid::" in out
+    assert main(["test", "--format", "json"]) == 4
+    told = capsys.readouterr()
+    assert json.loads(told.out)["cases"][0]["outcome"] == "invalid"
+    assert "b.yaml::b" in told.err
+
+
+@pytest.mark.slow
+def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) -> None:
+    write(folder, "good")
+    write(folder, "late", below="0.1 s")
+    words = ["--junit", "out.xml", "--report", "pages", "--github", "-n", "2"]
+    ran = run_cli("test", *words, cwd=folder)
+    assert ran.code == 1, ran
+    assert re.search(r"✓ passed   good.yaml::good +\d+\.\d\d s  duration: \d+\.\d s to spare", ran.out)
+    assert re.search(r"✗ failed   late.yaml::late +\d+\.\d\d s  duration: fails by", ran.out)
+    assert "::error file=late.yaml,line=8,col=5,title=late failed::duration: fails by" in ran.out
+    assert "again: manipcli run late.yaml" in ran.out
+    assert re.search(r"✗ 1 failed, 1 passed in \d+\.\d s, 2 processes", ran.out)
+    kept = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert kept == {
+        "good.yaml", "late.yaml", "out.xml", "pages/index.html", "pages/good.html", "pages/late.html",
+        "runs/test/late.mcap", "runs/test/late.png", "runs/test/last_failed.json",
+    }  # fmt: skip
+    assert (folder / "runs" / "test" / "late.png").read_bytes().startswith(b"\x89PNG")
+    links = re.findall(r'href="([^"]+\.html)"', (folder / "pages" / "index.html").read_text())
+    assert links == ["late.html", "good.html"]
+    root = parse(folder / "out.xml").getroot()
+    assert (root.get("failures"), root.get("errors")) == ("1", "0")
+
+    again = run_cli("test", "--last-failed", "--format", "json", cwd=folder)
+    answer = json.loads(again.out)
+    assert again.code == 1
+    assert [case["id"] for case in answer["cases"]] == ["late.yaml::late"]
+    assert answer["cases"][0]["troubles"][0]["line"] == 8
+    mended = run_cli("test", "--last-failed", "-q", "--set", "expect.0.duration.below=9 s", cwd=folder)
+    assert mended.code == 0, mended
+    assert mended.out.startswith("✓ 1 passed")
+    assert not (folder / "runs" / "test" / "late.mcap").exists()
+
+
+@pytest.mark.slow
+def test_a_step_that_cannot_be_planned_is_told_at_its_line(folder: Path, run_cli: Any) -> None:
+    write(folder, "far")
+    path = folder / "far.yaml"
+    path.write_text(path.read_text().replace("  - wait: 0.2 s", "  - move: {pose: {xyz: [9, 0, 0]}}"))
+    ran = run_cli("test", "--github", cwd=folder)
+    assert ran.code == 1, ran
+    assert "::error file=far.yaml,line=6,col=5,title=far failed::move_1: failed: cannot be planned" in ran.out
+    assert "log:" not in ran.out
+
+
+@pytest.mark.slow
+def test_the_first_failure_stops_where_that_is_asked(folder: Path, run_cli: Any) -> None:
+    write(folder, "a", below="0.1 s")
+    write(folder, "b", wait="500 s")
+    ran = run_cli("test", "-x", "-n", "2", cwd=folder)
+    assert ran.code == 1
+    assert "1 not run" in ran.out
+    assert "stopped at the first failure" in ran.out
+    assert not list((folder / "runs").rglob("b.*"))
+
+
+class Started:
+    """The command in the background, and the processes that it has started."""
+
+    def __init__(self, folder: Path, *words: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "manipcli", "test", *words], cwd=folder, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        self.folder = folder
+
+    def child(self) -> int:
+        """The process of the run, once it simulates."""
+        deadline = time.monotonic() + 60.0
+        while not [path for path in self.folder.rglob("*.mcap.partial") if path.stat().st_size > 300_000]:
+            assert time.monotonic() < deadline
+            assert self.process.poll() is None
+            time.sleep(0.02)
+        pid = self.process.pid
+        (child,) = map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+        return child
+
+    def end(self) -> tuple[int, str]:
+        out, err = self.process.communicate(timeout=60.0)
+        assert "Traceback" not in out + err
+        return self.process.returncode, out
+
+
+@pytest.mark.slow
+def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
+    write(folder, "a", wait="500 s")
+    write(folder, "b")
+    started = Started(folder, "-n", "1", "--junit", "out.xml")
+    os.kill(started.child(), signal.SIGSEGV)
+    code, out = started.end()
+    assert code == 1
+    assert re.search(r"✗ crashed  a.yaml::a .* crashed by signal 11 \(SIGSEGV\); step 1 of 1, 'wait_1' at \d+\.", out)
+    assert "✓ passed   b.yaml::b" in out
+    assert "log: runs/test/a.mcap.partial" in out
+    assert "output: runs/test/a.txt" in out
+    assert "Segmentation fault" in (folder / "runs" / "test" / "a.txt").read_text()
+    assert parse(folder / "out.xml").getroot().find(".//error[@type='crashed']") is not None
+
+
+@pytest.mark.slow
+def test_a_hang_is_ended_and_named(folder: Path) -> None:
+    write(folder, "a", wait="500 s")
+    started = Started(folder, "--silence", "3 s")
+    os.kill(started.child(), signal.SIGSTOP)
+    code, out = started.end()
+    assert code == 1
+    assert re.search(r"✗ hung     a.yaml::a .* hung: no progress for 3 s; step 1 of 1, 'wait_1' at \d+\.", out)
+
+
+@pytest.mark.slow
+def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, run_cli: Any) -> None:
+    write(folder, "a", wait="5000 s")
+    ran = run_cli("test", "--timeout", "4 s", cwd=folder)
+    assert ran.code == 1
+    assert "hung: it took longer than 4 s; " in ran.out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_ends_the_runs_and_still_sums_up(folder: Path, number: signal.Signals) -> None:
+    write(folder, "a", wait="500 s")
+    started = Started(folder)
+    child = started.child()
+    started.process.send_signal(number)
+    code, out = started.end()
+    assert code == 2
+    assert re.search(r"✗ 1 not run in \d+\.\d s, 1 process; interrupted", out)
+    assert not Path(f"/proc/{child}").exists()
+    assert not list((folder / "runs").rglob("a.*"))
+
+
+@pytest.mark.slow
+def test_a_run_ends_when_whoever_started_it_is_gone(folder: Path) -> None:
+    write(folder, "a", wait="500 s")
+    started = Started(folder)
+    child = started.child()
+    started.process.kill()
+    started.process.communicate()
+    deadline = time.monotonic() + 20.0
+    while Path(f"/proc/{child}").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
