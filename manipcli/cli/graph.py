@@ -27,26 +27,12 @@ def graph(
     Of a log with how many messages each topic has.
     """
     from manipcli.flow.graph import log_graph, task_graph
+    from manipcli.record.container import begins_as_log
     from manipcli.report.graph import render
 
-    if _is_log(file):
+    if file.suffix in (".mcap", ".partial") or begins_as_log(file):
         made = log_graph(file)
     else:
         made = task_graph(file, package_path=tuple(package_path or ()), allow_outside=allow_outside)
     console.result(render(made, format_))
     return ExitCode.PASSED
-
-
-def _is_log(file: Path) -> bool:
-    """By its first bytes, whatever it is called."""
-    from manipcli.record.container import MAGIC
-
-    if file.suffix in (".mcap", ".partial"):
-        return True
-    try:
-        if not file.is_file():
-            return False
-        with file.open("rb") as stream:
-            return stream.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
