@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import control, inside, processes, recording
+from benchmarks import batch, control, inside, processes, recording
 from benchmarks.table import markdown
 
 
@@ -26,6 +26,7 @@ def main() -> None:
     if not options.quick:
         rows += processes.command_rows(rounds)
         rows.append(processes.help_row(rounds))
+        rows += [batch.throughput_row(rounds), batch.plugin_row(rounds)]
     if options.long:
         rows += processes.long_rows()
     print(markdown(rows))

@@ -3,36 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from manipcli.batch.first_look import is_entered, looks_like_a_task
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
-
-SUFFIXES = (".yaml", ".yml")
-SNIFFED = 65536
-"""Bytes of a file in which `task:` is looked for: nothing else of foreign files is read."""
-NOT_ENTERED = frozenset({"runs", "build", "dist", "node_modules", "site-packages", "__pycache__"})
-"""Folders that hold results and what others wrote; as well as hidden ones and virtual environments."""
-_TASK = re.compile(rb"""(?:^|\A\s*\{\s*)(["']?)task\1[ \t]*:[ \t]+[^\s#]""", re.MULTILINE)
-
-
-def looks_like_a_task(path: Path) -> bool:
-    """Whether a file begins like a task: by its name and its first bytes, so that any file may be asked about."""
-    if path.suffix not in SUFFIXES or path.name.startswith("."):
-        return False
-    try:
-        with path.open("rb") as file:
-            return _TASK.search(file.read(SNIFFED).removeprefix(b"\xef\xbb\xbf")) is not None
-    except OSError:
-        return False
-
-
-def is_entered(folder: Path) -> bool:
-    """Whether tasks are looked for in a folder that nobody named."""
-    return not (folder.name.startswith(".") or folder.name in NOT_ENTERED or (folder / "pyvenv.cfg").exists())
 
 
 def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from manipcli.report.suite import Case, CaseReport
 
 SUFFIXES = (".yaml", ".yml")
-"""As `batch/discovery.py` has them, which is not imported for any other file."""
+"""As `batch/first_look.py` has them, which is not imported for any other file."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -39,7 +39,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
     """The files that `manipcli test` takes, and no others."""
     if file_path.suffix not in SUFFIXES:
         return None
-    from manipcli.batch.discovery import looks_like_a_task
+    from manipcli.batch.first_look import looks_like_a_task
 
     if not looks_like_a_task(file_path) or not _is_looked_for(file_path, parent.session):
         return None
@@ -174,7 +174,7 @@ def _settings(config: pytest.Config, folder: Path) -> Settings:
 
 def _is_looked_for(path: Path, session: pytest.Session) -> bool:
     """Whether `manipcli test` would enter the folders between this file and what pytest was asked for."""
-    from manipcli.batch.discovery import is_entered
+    from manipcli.batch.first_look import is_entered
 
     for place in (path, *path.parents):
         if session.isinitpath(place) or place == session.config.rootpath:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.batch.discovery import looks_like_a_task, read_case, samples_of, task_files
+from manipcli.batch.discovery import read_case, samples_of, task_files
+from manipcli.batch.first_look import looks_like_a_task
 from manipcli.core.errors import InvalidInput
 
 TASKS = {
