@@ -180,14 +180,16 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
         causes = [Cause(finding.message, "", end, hint=finding.hint or "") for finding in verdict.errors]
         hint = ""
     for step, written in zip(verdict.steps, places[0], strict=False):
-        if step.outcome not in ("done", "not_run"):
+        if step.outcome not in ("done", "not_run") and not step.tolerated:
             at = None if end is None else step.ended if step.ended is not None else end
-            causes.append(Cause(f"step '{step.id}' {_STEP_WORDS[step.outcome]}", step.text, at, written, hint))
+            tries = f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
+            title = f"step '{step.id}' {_STEP_WORDS[step.outcome]}{tries}"
+            causes.append(Cause(title, step.text, at, written, hint))
             hint = ""
     for one, written in zip(verdict.expectations, places[1], strict=False):
         if one.outcome != "passed" and end is not None:
             causes.append(Cause(f"expectation '{one.name}' {_missed(one)}", one.text, one.at, written))
-    failing = [step for step in verdict.steps if step.outcome not in ("done", "not_run")]
+    failing = [step for step in verdict.steps if step.outcome not in ("done", "not_run") and not step.tolerated]
     if verdict.verdict == "failed" and not failing and _before_or_after(verdict):
         causes.insert(0, Cause(verdict.text, "", end))
     return tuple(causes)

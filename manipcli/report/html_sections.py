@@ -120,10 +120,7 @@ def steps(page: RunPage) -> Markup | None:
         return None
     parts: list[Markup | None] = []
     if facts is None:
-        rows = [
-            (mark(step.outcome == "done", step.outcome), _step_name(page, step, written), step.text)
-            for step, written in page.located_steps
-        ]
+        rows = [(_outcome(step), _step_name(page, step, written), step.text) for step, written in page.located_steps]
         parts.append(table(("outcome", "step", ""), rows))
     else:
         end = max(facts.end, 1e-9)
@@ -134,7 +131,7 @@ def steps(page: RunPage) -> Markup | None:
             mine = by_id.get(step.id)
             timed.append(
                 (
-                    mark(step.outcome == "done", step.outcome),
+                    _outcome(step),
                     _step_name(page, step, written),
                     _gantt(page, step, end),
                     f"{step.planned_duration:.2f} s",
@@ -153,6 +150,13 @@ def steps(page: RunPage) -> Markup | None:
     return element("section", heading("steps", "Steps", about), *parts)
 
 
+def _outcome(step: StepOutcome) -> Markup:
+    """With the number of attempts, and whether it may fail."""
+    shown = element("span", f"– {step.outcome}, may fail", class_="idle") if step.tolerated else None
+    tries = element("small", f"at attempt {len(step.attempts)}") if len(step.attempts) > 1 else None
+    return joined(shown or mark(step.outcome == "done", step.outcome), tries)
+
+
 def _late(seconds: float) -> str:
     return f"{'+' if seconds > 0.0 else '−'}{abs(seconds):.2f} s" if abs(seconds) >= 0.005 else "0.00 s"
 
@@ -162,11 +166,12 @@ def _step_name(page: RunPage, step: StepOutcome, written: Written) -> Markup:
     shown = next((one for one in run.steps if one.id == step.id), None) if run is not None else None
     phases = " · ".join(phase.name for phase in shown.phases) if shown is not None and len(shown.phases) > 1 else ""
     label = step.id if step.id.startswith(step.verb) else f"{step.id} ({step.verb})"
-    told = None
+    told: Markup | None = None
     if step.text and page.facts is not None:
         folded = element("details", element("summary", "what it told"), element("small", step.text))
         told = folded if step.outcome == "done" else element("small", step.text)
-    return joined(element("b", label), line_link(written), element("small", phases) if phases else None, told)
+    again = [element("small", f"planned again: {why}") for why in step.replanned]
+    return joined(element("b", label), line_link(written), element("small", phases) if phases else None, *again, told)
 
 
 def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
@@ -185,7 +190,7 @@ def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
         element("rect", class_="planned", x=step.started * scale, y="3.5", width=max(planned * scale, 2.0), height="8"),
         element(
             "rect",
-            class_="measured" if step.outcome == "done" else "measured no",
+            class_="measured" if step.outcome == "done" or step.tolerated else "measured no",
             x=step.started * scale,
             y="14",
             width=max((last - step.started) * scale, 2.0),

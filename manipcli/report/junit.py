@@ -77,10 +77,13 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     case = _case(verdict, "steps", step.id, took, attributes)
     if step.outcome == "not_run":
         _add(case, "skipped", "not run: the run ended before", "", [])
+    elif step.tolerated:
+        SubElement(case, "system-out").text = _safe(f"{step.outcome}, and the task says that it may: {step.text}")
     elif step.outcome != "done":
         word = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}[step.outcome]
         when = "" if step.ended is None else f"at {step.ended:.3f} s"
-        message = f"step '{step.id}' {word}" + (f": {step.text}" if step.text else "")
+        tries = f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
+        message = f"step '{step.id}' {word}{tries}" + (f": {step.text}" if step.text else "")
         hints = [f"hint: {one.hint}" for one in verdict.errors if one.hint and verdict.verdict == "failed"]
         _add(case, "failure", message, step.outcome, [when, *hints])
     return case
@@ -103,7 +106,7 @@ def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str
 
 
 def _steps_failed(verdict: Verdict) -> bool:
-    return any(step.outcome not in ("done", "not_run") for step in verdict.steps)
+    return any(step.outcome not in ("done", "not_run") and not step.tolerated for step in verdict.steps)
 
 
 def _undone(verdict: Verdict) -> bool:

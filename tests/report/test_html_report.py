@@ -15,7 +15,7 @@ import pytest
 
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import frozen
-from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
 from manipcli.report.facts import JointFacts, Peak, RunFacts, StepFacts, Use
 from manipcli.report.holds import Hold, HoldFacts, Slip, Spread
@@ -244,6 +244,16 @@ def test_what_a_killed_run_left_has_a_page_that_says_so(
     words = _Page((tmp_path / "r.html").read_text("utf-8")).words
     assert "✗ error" in words and "The log is incomplete" in words and "What went wrong" in words
     assert "<error" in (tmp_path / "j.xml").read_text("utf-8")
+
+
+def test_attempts_and_what_may_fail_are_told() -> None:
+    page = _page()
+    attempt = Attempt("failed", 0.0, 1.0)
+    first = replace(page.verdict.steps[0], attempts=(attempt, attempt), replanned=("the cup had moved",))
+    second = replace(page.verdict.steps[1], tolerated=True)
+    verdict = replace(page.verdict, steps=(first, second, page.verdict.steps[2]))
+    words = _Page(render_page(replace(page, verdict=verdict))).words
+    assert "at attempt 2" in words and "planned again: the cup had moved" in words and "– failed, may fail" in words
 
 
 def test_an_error_of_a_run_is_told_like_any_cause() -> None:

@@ -111,6 +111,13 @@ def test_a_run_that_did_not_pass_never_looks_as_if_it_had(undone: bool) -> None:
     assert failure is not None and failure.get("message") == "the cup fell through the desk"
 
 
+def test_a_step_that_may_fail_does_not_fail_the_suite() -> None:
+    tried = replace(PASSED.steps[1], outcome="failed", text="too far", tolerated=True)
+    suite = _read(replace(PASSED, steps=(PASSED.steps[0], tried)))
+    assert suite.get("failures") == "0"
+    assert "too far" in str(_case(suite, "b").findtext("system-out"))
+
+
 def test_an_interruption_is_an_error() -> None:
     finding = Finding("RUN101", "the run was interrupted", hint="run it again")
     suite = _read(replace(FAILED, verdict="error", errors=(finding,), text="the run was interrupted"))
