@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
 from manipcli.judge.verdict import StepOutcome
+from manipcli.report.suite import troubles_of
 
 if TYPE_CHECKING:
     from manipcli.flow.plan import PlannedStep
@@ -79,7 +80,7 @@ class _Beats:
 def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; its log, picture and page are written where they are wanted."""
     from manipcli import pipeline
-    from manipcli.batch.telling import draw, junit, troubles, write_page
+    from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
 
     beats.doing("loading and planning")
     settings = job.settings
@@ -100,6 +101,13 @@ def _end_of(job: Job, beats: _Beats) -> End:
         return End(None, invalid.findings)
     found = troubles(job, report.verdict)
     notes: list[str] = []
+    if report.verdict.verdict == "passed" and job.nominal and settings.baseline:
+        beats.doing("comparing with the baseline")
+        try:
+            found, better = against_baseline(job, report.verdict)
+        except InvalidInput as invalid:
+            return End(report, invalid.findings, troubles_of(invalid.findings))
+        notes += better
     if found and report.log is not None:
         beats.doing("drawing a picture")
         notes += _noted("no picture", lambda: draw(job, found[0].at))

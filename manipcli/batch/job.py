@@ -22,6 +22,7 @@ class Settings:
         pages: the folder that gets a page about each run; None for none.
         junit: whether each run is told as JUnit XML, too.
         keep_logs: also those of runs that passed.
+        baseline: a run of a task as it is written may not be worse than its baseline.
         silence: a run that shows no progress for so long is ended [s].
         timeout: a run that takes longer is ended [s]; None for no limit.
     """
@@ -34,6 +35,7 @@ class Settings:
     pages: Path | None = None
     junit: bool = False
     keep_logs: bool = False
+    baseline: bool = True
     silence: float = 60.0
     timeout: float | None = 600.0
 
@@ -68,6 +70,11 @@ class Job:
     @property
     def page(self) -> Path | None:
         return None if self.settings.pages is None else self._beside(".html", self.settings.pages)
+
+    @property
+    def nominal(self) -> bool:
+        """Whether the task is run as it is written."""
+        return self.case.sample is None and not self.settings.overrides and self.settings.seed is None
 
     @property
     def command(self) -> str:

@@ -125,7 +125,10 @@ class Process:
             return self._report("crashed", f"ended with exit code {code} before it was done: {self._last_line()}")
         if end.report is None:
             return self._report("invalid", "the task cannot be run", end=end)
-        return self._report(_WORDS.get(exit_code(end.report.verdict), "error"), end.report.verdict.text, end=end)
+        word = _WORDS.get(exit_code(end.report.verdict), "error")
+        if word == "passed" and end.troubles:  # it is worse than it was
+            return self._report("failed", end.troubles[0].message, end=end)
+        return self._report(word, end.report.verdict.text, end=end)
 
     def _report(self, outcome: CaseWord, text: str, *, end: End | None = None) -> CaseReport:
         job = self.job

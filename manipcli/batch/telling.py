@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from manipcli.batch.baseline import Change, Key, baseline_path, compared, measured, read_baseline
 from manipcli.batch.job import Job
 from manipcli.core.errors import Place
 from manipcli.core.whole_file import write_whole
@@ -48,6 +49,28 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
         told = [Trouble(finding.message, finding.place) for finding in verdict.errors]
         return (*(told or [Trouble(verdict.text)]), *steps, *unmet)
     return (*steps, *unmet)
+
+
+def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], list[str]]:
+    """What is worse than the baseline of the task, and notes of what is better; nothing where it has none.
+
+    Raises:
+        InvalidInput: its baseline cannot be read.
+    """
+    old = read_baseline(baseline_path(job.path))
+    if old is None:
+        return (), []
+    task = load.load_task(job.path, model=task_spec())
+    changes = compared(old, measured(verdict, job.log), task.spec.baseline.tolerance)
+    loc: dict[Key, tuple[str | int, ...]] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
+    loc |= {("margins", one.name): ("expect", k) for k, one in enumerate(verdict.expectations)}
+
+    def place(change: Change) -> Place:
+        found = task.place(*loc.get(change.key, ("task",)))
+        return Place(job.case.file, found.line, found.column)
+
+    worse = tuple(Trouble(f"worse than the baseline: {one}", place(one)) for one in changes if one.worse)
+    return worse, [f"better than the baseline: {one}" for one in changes if not one.worse]
 
 
 def draw(job: Job, at: float | None) -> None:

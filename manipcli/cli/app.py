@@ -15,6 +15,7 @@ from typer.exceptions import TyperException
 from manipcli import __version__
 from manipcli.cli import (
     at,
+    bless,
     check,
     check_urdf,
     console,
@@ -52,6 +53,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("test")(test.test)
+app.command("bless")(bless.bless)
 app.command("check")(check.check)
 app.command("check-urdf")(check_urdf.check_urdf)
 app.command("plan")(plan.plan)

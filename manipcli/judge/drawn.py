@@ -10,6 +10,9 @@ from dataclasses import dataclass
 SAMPLE = "sample"
 """Metadata of the log of a sample: `number`, and `values` as JSON by their paths, in SI."""
 
+MOST_SHOWN = 8
+"""Values that are told in a line of text."""
+
 Number = float | tuple[float, ...]
 
 
@@ -22,7 +25,9 @@ class Drawn:
 
     def __str__(self) -> str:
         """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`."""
-        return f"sample {self.number}: {', '.join(f'{path}={_shown(value)}' for path, value in self.values)}"
+        first = [f"{path}={_shown(value)}" for path, value in self.values[:MOST_SHOWN]]
+        rest = len(self.values) - len(first)
+        return f"sample {self.number}: {', '.join(first)}" + (f", and {rest} more" if rest else "")
 
     def to_metadata(self) -> dict[str, str]:
         """What `from_metadata` reads."""

@@ -25,7 +25,8 @@ def render_line(report: CaseReport, *, width: int = 0) -> str:
     """`✓ passed  tasks/pour.yaml::pour  3.5 s  inside: 14 mm to spare`."""
     mark = PASS if report.passed else FAIL
     head = f"{mark} {report.outcome:<7}  {report.case.id:<{width}}  {report.duration:6.2f} s"
-    return f"{head}  {shorten(gist(report), width=WIDEST)}".rstrip()
+    line = f"{head}  {shorten(gist(report), width=WIDEST)}".rstrip()
+    return "\n".join([line, *(f"    {note}" for note in report.notes)]) if report.passed else line
 
 
 def gist(report: CaseReport) -> str:

@@ -1,0 +1,98 @@
+"""`manipcli bless [PATH...]`: what tasks take and by what margins they pass, kept beside them to compare with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manipcli.cli import console
+from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.core.errors import ExitCode
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from manipcli.batch.job import Job
+    from manipcli.report.suite import CaseReport
+
+
+def bless(
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[PATH]...", help="Task files, or folders; this one when absent.", show_default=False),
+    ] = None,
+    *,
+    jobs: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs at a time.")] = 1,
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
+) -> ExitCode:
+    """Run tasks, and keep what they take and their margins as their baselines.
+
+    TASK.baseline.json, beside each task, is what `manipcli test` compares with: it fails where something is worse by
+    more than `baseline: {tolerance: ...}` of the task. A task that fails keeps the baseline that it has.
+    """
+    from manipcli.cli.interrupts import Interrupts
+
+    with Interrupts():
+        from manipcli.batch.discovery import read_case, shown_path, task_files
+        from manipcli.batch.job import Job, Settings
+        from manipcli.batch.pool import run_jobs
+        from manipcli.report.suite_text import render_failure
+
+        settings = Settings(
+            folder=Path("runs") / "bless",
+            keep_logs=True,
+            baseline=False,
+            package_path=tuple(package_path or ()),
+            allow_outside=allow_outside,
+        )
+        chosen = [
+            Job(read_case(file, shown=shown_path(file)), file, settings) for file in task_files(paths or [Path()])
+        ]
+        if not chosen:
+            console.result("nothing to bless: there is no task file")
+            return ExitCode.NOTHING_TO_RUN
+        code = ExitCode.PASSED
+        for done in run_jobs(chosen, at_once=jobs):
+            job = next(job for job in chosen if job.case.id == done.case.id)
+            if done.passed:
+                console.result("\n".join(_blessed(job, done)))
+            else:
+                console.result(f"{render_failure(done)}\n  nothing is blessed")
+                code = ExitCode.USAGE if ExitCode.USAGE in (code, _code(done)) else ExitCode.FAILED
+        return code
+
+
+def _code(done: CaseReport) -> ExitCode:
+    return ExitCode.USAGE if done.outcome == "invalid" else ExitCode.FAILED
+
+
+def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
+    """Writes the baseline; what to say about it."""
+    from manipcli.batch.baseline import FLOORS, baseline_path, compared, measured, read_baseline, write_baseline
+    from manipcli.batch.discovery import shown_path
+    from manipcli.core.errors import InvalidInput
+    from manipcli.report.quantity import quantity
+    from manipcli.report.text import PASS
+    from manipcli.spec.baseline import ToleranceSpec
+
+    assert done.run is not None, "a task that passed was run"
+    path = baseline_path(job.path)
+    new = measured(done.run.verdict, job.log)
+    job.log.unlink(missing_ok=True)
+    try:
+        old = read_baseline(path)
+    except InvalidInput:
+        old = None  # it is replaced
+    write_baseline(path, new)
+    told = [str(new[key]) for key in (("duration",), ("energy",)) if key in new]
+    margins = sum(key[0] == "margins" for key in new)
+    told.append(f"{margins} margin{'' if margins == 1 else 's'}")
+    lines = [f"{PASS} {done.case.id} blessed: {', '.join(told)}; written: {shown_path(path)}"]
+    exact = ToleranceSpec(duration=0.0, energy=0.0, margin=0.0)
+    changes = compared(old, new, exact) if old is not None else ()
+    if old is not None and not changes:
+        return [*lines, f"  as before, within {', '.join(quantity(one, unit) for unit, one in FLOORS.items())}"]
+    return [*lines, *(f"  {'worse' if one.worse else 'better'} than before: {one}" for one in changes)]
