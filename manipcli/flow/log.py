@@ -25,6 +25,7 @@ from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
@@ -57,9 +58,17 @@ def open_log(
     task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool = False
 ) -> Recorder:
     """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
-    meshes, too, so that the log is shown without any package."""
+    meshes, too, so that the log is shown without any package.
+
+    Raises:
+        RecordingRefused: nothing can or may be written there; above all not over a file that the task is made from.
+    """
     engine = ENGINES[task.spec.simulation.engine]
     meshes = mesh_files(task)
+    files = (task.file, task.robot_file, task.controllers_file)
+    for read in (*(Path(file.source.name) for file in files), *meshes.values()):
+        if path.exists() and read.exists() and path.samefile(read):
+            raise RecordingRefused(path, "the task is made from this file", hint="choose another name")
     embedded = embeddable(meshes) if embed_meshes else ()
     return Recorder(
         path,

@@ -269,10 +269,7 @@ def test_nothing_is_overwritten_unasked(small: Path, tmp_path: Path) -> None:
     other.write_text("mine")
     with pytest.raises(RecordingRefused, match="the file exists"):
         repair(small, other)
-    with pytest.raises(RecordingRefused, match="is no log"):
-        repair(small, other, overwrite=True)
     assert other.read_text() == "mine"
-    other.write_bytes(small.read_bytes()[:100])
     repair(small, other, overwrite=True)
     assert read_by_mcap(other) == read_by_mcap(small)
     assert small.read_bytes() == before

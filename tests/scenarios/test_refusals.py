@@ -217,6 +217,16 @@ def test_a_log_is_not_overwritten_without_being_told(call: Call, tmp_path: Path)
     assert log.read_bytes().startswith(b"\x89MCAP0\r\n")
 
 
+def test_a_log_never_replaces_a_file_of_its_task(call: Call, tmp_path: Path) -> None:
+    task = written(tmp_path, HEAD + "start: home\n" + HOME)
+    before = task.read_bytes()
+    link = tmp_path / "link.mcap"
+    link.hardlink_to(task)
+    for log in (task, link):
+        assert "the task is made from this file" in refused(call("run", task, "--log", log, "--force", "-q"), 4)
+    assert task.read_bytes() == before
+
+
 def test_a_log_that_cannot_be_written_is_told_before_the_simulation(call: Call, tmp_path: Path) -> None:
     task = written(tmp_path, HEAD + HOME)
     (tmp_path / "folder.mcap").mkdir()
