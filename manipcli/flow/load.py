@@ -34,6 +34,7 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
+from manipcli.spec.retry import retried
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 
@@ -269,10 +270,23 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     for key, expectations in (("expect", spec.expect), ("watch", spec.watch)):
         for k, expected in enumerate(expectations):
             found += [((key, k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
+    again: list[Finding] = []
+    for k, step in enumerate(spec.steps if ids is not None else ()):
+        try:
+            tried = retried(task, k)
+        except InvalidInput as invalid:
+            again += [replace(one, message=f"{one.message}, when it is tried again") for one in invalid.findings]
+            continue
+        if tried is not step:
+            loc: Loc = ("steps", k, "on_fail", "with")
+            found += [(loc, replace(p, loc=())) for p in STEPS[tried.verb].check(tried.body, robot, scene)]
     findings = [
-        task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
-        for number, told in ((230, found), (232, uncommanded), (233, refused))
-        for loc, p in told
+        *again,
+        *(
+            task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
+            for number, told in ((230, found), (232, uncommanded), (233, refused))
+            for loc, p in told
+        ),
     ]
     known = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in known:

@@ -34,6 +34,7 @@ from manipcli.record.selection import Selection
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
+from manipcli.spec.retry import expressions
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 
@@ -77,7 +78,7 @@ def open_log(
         controllers=[recorded(controller) for controller in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
-            (TASK, YAML, resolved(_portable_task(task.spec)).encode()),
+            (TASK, YAML, resolved(_portable_task(task.spec), expressions(task.file)).encode()),
             (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
             (CONTROLLERS, YAML, resolved(task.controllers).encode()),
             (URDF, XML, task.robot.urdf.encode()),

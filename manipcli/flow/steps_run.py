@@ -106,7 +106,7 @@ class StepsRun:
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
         """All attempts at a step."""
-        began = self._session.time
+        began = ended = self._session.time
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
         end = DONE
@@ -118,6 +118,7 @@ class StepsRun:
                 step = retried(self._task.file, index)
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
             end = self._attempt(step, planned, planned_start, again=attempt > 1)
+            ended = self._session.time
             self._event("step_ended", planned, end.outcome, end.text)
             if end.outcome == "done" or not self._may_go_on:
                 break
@@ -136,7 +137,7 @@ class StepsRun:
             verb=planned.verb,
             outcome=end.outcome,
             started=began,
-            ended=self._session.time,
+            ended=ended,
             planned_duration=planned.plan.duration,
             text=end.text,
             tolerated=tolerated,

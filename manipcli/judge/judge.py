@@ -113,7 +113,7 @@ def _verdict(
     done = f"all {len(steps)} steps done" if len(steps) > 1 else "its one step done"
     failed = [step.id for step in steps if step.tolerated]
     if failed:
-        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, and {listed(failed)} may fail"
+        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, the task tolerates that {listed(failed)} failed"
     if not expectations:
         return "passed", f"{done}; the task states no expectations"
     met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "its one expectation met"

@@ -207,8 +207,8 @@ class Draft:
         self._motions.append(Motion("close", trajectory=None, grip=grip, duration=duration))
         self._now = replace(self._now, position=closed, carried=carried, closed=True)
 
-    def open(self, posture: str) -> None:
-        """The hand to a pose; what it held stays where it is.
+    def open(self, posture: str, *, around: str | None = None) -> None:
+        """The hand to a pose; what it held stays where it is. It may touch that, or the body that it is `around`.
 
         Raises:
             NotPlannable: no gripper controller moves the hand, or something else than the object is in its way.
@@ -218,7 +218,9 @@ class Draft:
             raise _no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
-            allowed = self._planner.hand_contacts(self._now.carried.body)
+            allowed |= self._planner.hand_contacts(self._now.carried.body)
+        if around is not None:
+            allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, grip, allowed=allowed)
 

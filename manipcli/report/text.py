@@ -108,7 +108,7 @@ def _causes(verdict: Verdict) -> list[str]:
 
 
 def _word(step: StepOutcome) -> str:
-    return f"{step.outcome.replace('_', ' ')}{' (may fail)' if step.tolerated else ''}"
+    return f"{step.outcome.replace('_', ' ')}{', tolerated' if step.tolerated else ''}"
 
 
 def _tries(step: StepOutcome) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 
 from pydantic import BaseModel
 
 from manipcli.spec.expression import escaped
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Plain
+from manipcli.spec.tree import Path, Plain
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 # The second line only means something to readers of YAML 1.1, which a log may well meet.
@@ -18,9 +19,16 @@ _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _WIDTH = 100
 
 
-def resolved(spec: BaseModel) -> str:
-    """The YAML text, keys in the order of the model and of the file."""
+def resolved(spec: BaseModel, expressions: Mapping[Path, str] | None = None) -> str:
+    """The YAML text, keys in the order of the model and of the file.
+
+    Args:
+        spec: what is written out.
+        expressions: texts with `$name` that stay, by the path of what they are the value of.
+    """
     data = _data(spec, escape=isinstance(spec, TaskSpec))
+    for path, text in (expressions or {}).items():
+        data = _with(data, path, text)
     assert isinstance(data, dict)
     return "".join(f"{line}\n" for line in _lines(data))
 
@@ -52,6 +60,18 @@ def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
     if value is None or isinstance(value, bool | int | float):
         return value
     raise TypeError(f"a spec cannot hold {type(value).__name__}")
+
+
+def _with(data: Plain, path: Path, text: str) -> Plain:
+    """The data with `text` in the place of what stands at `path`, or of the block that it is short for."""
+    if not path:
+        return text
+    first, rest = path[0], path[1:]
+    if isinstance(data, dict):
+        return {key: _with(value, rest, text) if key == first else value for key, value in data.items()}
+    if isinstance(data, list):
+        return [_with(value, rest, text) if k == first else value for k, value in enumerate(data)]
+    return data
 
 
 def _lines(data: dict[str, Plain]) -> list[str]:

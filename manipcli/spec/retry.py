@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from manipcli.spec.expression import escaped, substitute
 from manipcli.spec.located import Located, Source, validate
 from manipcli.spec.task import StepSpec, TaskSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at
+from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, node_at
 
 
 def retried(file: Located[TaskSpec], index: int) -> StepSpec:
@@ -33,6 +35,30 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     again, findings = substitute(MappingNode({"params": block, **root.without("params").entries}, root.place), "TASK")
     tree = Source(source.name, again, source.area, source.kept)
     return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
+
+
+def expressions(file: Located[TaskSpec]) -> dict[Path, str]:
+    """What was written, by its path, where a step that is tried again with other parameters needs it."""
+    steps = [k for k, step in enumerate(file.spec.steps) if step.retry is not None and step.retry.with_]
+    if not steps:
+        return {}
+    root = file.source.root
+    found = dict(_expressions(child(root, "params"), ("params",)))
+    for k in steps:
+        at: Path = ("steps", k)
+        found.update((path, text) for path, text in _expressions(node_at(root, at), at) if path[2] != "on_fail")
+    return found
+
+
+def _expressions(node: Node | None, path: Path) -> Iterator[tuple[Path, str]]:
+    if isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            yield from _expressions(entry.node, (*path, key))
+    elif isinstance(node, SequenceNode):
+        for k, item in enumerate(node.items):
+            yield from _expressions(item, (*path, k))
+    elif node is not None and node.written is not None:
+        yield path, node.written
 
 
 def _written(node: Node) -> Node:

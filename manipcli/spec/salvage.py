@@ -12,7 +12,7 @@ from manipcli.spec.located import Located, Source
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, plain
 
-LISTS = ("steps", "expect")
+LISTS = ("steps", "expect", "watch")
 """Their faulty items are left out one by one."""
 NAMED = ("scene", "frames")
 """Their faulty entries are replaced by a stand-in, since others may speak of them by name."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_pose
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
@@ -72,6 +73,8 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         NotPlannable: the hand holds something already, or no candidate is possible.
     """
     planner.free_hand(situation, spec.object)
+    before = _clear(spec, planner, situation)
+    situation = before.end
     planner.free_start(situation)
     X_WO = planner.body_pose(situation, spec.object)
     body = planner.scene.body(spec.object)
@@ -98,11 +101,28 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
             must_hold=spec.grasp.until == "contact",
             body=spec.object,
         )
-        return draft.plan()
+        planned = draft.plan()
+        return replace(planned, motions=(*before.motions, *planned.motions))
 
     turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
     candidates = itertools.product(enumerate(turns), spread(spec.approach.distance), slopes())
     return first_feasible(attempt, candidates, what=f"no way to pick '{spec.object}'")
+
+
+def _clear(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
+    """Away from the object, if the hand is around it or at it, after a grasp that failed; else nothing."""
+    if planner.distance(situation, spec.object) >= CLEARANCE:
+        return StepPlan((), situation)
+
+    def attempt(candidate: tuple[float, float]) -> StepPlan:
+        draft = Draft(planner, situation)
+        draft.open(spec.open, around=spec.object)
+        X_WT = backed_off(planner.tool_pose(situation), *candidate)
+        draft.withdraw(X_WT, spec.object, speed=spec.speed / 2, grazing=True)
+        return draft.plan()
+
+    ways = itertools.product(spread(spec.approach.distance), slopes())
+    return first_feasible(attempt, ways, what=f"no way back from '{spec.object}'")
 
 
 def backed_off(X_WG: Transform, distance: float, slope: float) -> Transform:
