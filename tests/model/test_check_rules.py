@@ -97,7 +97,8 @@ QUIET = {
         '<joint name="j" role="joint1"><mechanical_reduction>50</mechanical_reduction></joint></transmission>'
     ),
     "mimic with states only": control(
-        '<joint name="k"><state_interface name="position"/></joint>', SECOND + '<mimic joint="j"/></joint>'
+        '<joint name="j"/><joint name="k"><state_interface name="position"/></joint>',
+        SECOND + '<mimic joint="j"/></joint>',
     ),
     "mimic within its limits": one_joint(more=SECOND + '<mimic joint="j" multiplier="-1"/></joint>'),
     "dash and dot": one_joint().replace('"tip"', '"tip-1.a"'),

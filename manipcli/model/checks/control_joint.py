@@ -19,6 +19,15 @@ def _find(subject: Subject) -> Iterator[Finding]:
         elif written[joint.name].attributes.get("type") == "fixed":
             message = f"ros2_control '{joint.component}': joint '{joint.name}' is fixed"
             yield Finding("URDF320", message, joint.element.place, "take it out, or make the joint move")
+    for component in subject.description.root.all("ros2_control"):
+        own = [joint.attributes.get("name", "").strip() for joint in component.all("joint")]
+        for transmission in component.all("transmission"):
+            for element in transmission.all("joint"):
+                name = element.attributes.get("name", "").strip()
+                if name not in own:
+                    what = f"ros2_control '{component.attributes.get('name', '')}': joint '{name}' of transmission "
+                    message = f"{what}'{transmission.attributes.get('name', '')}' is not one of its joints"
+                    yield Finding("URDF320", message, element.place, did_you_mean(name, own))
 
 
 CHECK = Check(
@@ -26,7 +35,7 @@ CHECK = Check(
     name="control-joint",
     tier="readiness",
     severity="error",
-    summary="A <ros2_control> names a joint that is unknown or fixed",
+    summary="A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have",
     reason="The controller manager refuses the whole description at start-up.",
     bad=one_joint(
         more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'

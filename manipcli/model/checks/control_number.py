@@ -10,10 +10,21 @@ from manipcli.model.urdf_numbers import finite
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
+    for component in subject.description.root.all("ros2_control"):
+        rate = component.attributes.get("rw_rate", "1").strip()
+        if not _whole(rate):
+            message = (
+                f"ros2_control '{component.attributes.get('name', '')}': rw_rate is '{rate}'; expected a whole number"
+            )
+            yield Finding("URDF324", message, component.place, None)
     limits = {joint.name: joint.limits for joint in subject.parts.joints}
     for joint in controlled_joints(subject):
         for interface in (*joint.commands, *joint.element.all("state_interface")):
             values: dict[str, float] = {}
+            size = interface.attributes.get("size", "1").strip()
+            if not _whole(size):
+                message = f"joint '{joint.name}': the size of an interface is '{size}'; expected a whole number"
+                yield Finding("URDF324", message, interface.place, None)
             for parameter in interface.all("param"):
                 key = parameter.attributes.get("name", "")
                 value = finite(parameter.text.strip())
@@ -41,6 +52,11 @@ def _find(subject: Subject) -> Iterator[Finding]:
                     else None
                 )
                 yield Finding("URDF324", message, interface.place, hint, "warning")
+
+
+def _whole(text: str) -> bool:
+    """Of digits alone and above 0, whatever the locale."""
+    return text.isascii() and text.isdigit() and int(text) > 0
 
 
 CHECK = Check(
