@@ -166,7 +166,7 @@ def test_a_name_on_both_lists_restarts():  # [57]
     assert states(manager) == {"one": "active"}
 
 
-def test_a_switch_takes_effect_whole_at_the_next_update():
+def test_a_switch_takes_effect_whole_at_the_next_update():  # [59]: without a clock that could run out
     one, two = Spring("one", JOINTS, "effort", value=1.0), Spring("two", JOINTS, "position", value=0.2)
     manager = manager_of(one, two, active=["one"])
     command = manager.update(0.0, World())

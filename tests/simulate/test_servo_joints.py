@@ -12,8 +12,9 @@ import pytest
 from manipcli.control.command import JointCommand, Mode
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, RobotModel
+from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, Mimic, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.engine import Engine, EngineSettings
@@ -71,7 +72,8 @@ def run(engine: Engine, command: JointCommand, ticks: int) -> tuple[np.ndarray, 
 
 @pytest.mark.parametrize("step", [5e-4, 1e-3, 2e-3])
 def test_a_position_is_approached_with_one_time_constant_whatever_the_physics_step(step: float) -> None:
-    """1 - exp(-t / tau); one step of lag is Bullet's, which solves for the velocity at the end of a step."""
+    """Conformance 60, where the lag is a gain a cycle: 1 - exp(-t / tau). One step of lag is Bullet's, which solves for
+    the velocity at the end of a step."""
     engine = opened(step=step)
     position, _, _ = run(engine, commanded("position", 0.01), round(0.1 / step))
     engine.close()
@@ -94,6 +96,7 @@ def test_nothing_jumps(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", ["position", "velocity"])
 def test_a_drive_that_is_too_weak_cannot_hold_the_link(mode: Mode) -> None:
+    """Conformance 62: gravity acts on a joint that obeys positions, too."""
     weak, strong = opened(replace(FREE, effort=4.0)), opened(replace(FREE, effort=8.0))
     fallen, _, effort = run(weak, commanded(mode, 0.0), 500)
     held, _, holding = run(strong, commanded(mode, 0.0), 500)
@@ -125,8 +128,8 @@ def test_a_link_that_is_pressed_on_an_obstacle_does_not_pass(mode: Mode, value: 
 
 @pytest.mark.parametrize("interface", ["position", "velocity"])
 def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: str) -> None:
-    """A quintic over half a second, updated at 1000, 500 and 250 Hz on the same physics: the same rest, and the same
-    way but for the time that a slower one learns of it."""
+    """Conformance 60. A quintic over half a second, updated at 1000, 500 and 250 Hz on the same physics: the same rest,
+    and the same way but for the time that a slower one learns of it."""
     ways = {}
     for rate in (1000.0, 500.0, 250.0):
         model = robot()
@@ -153,3 +156,33 @@ def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: s
     for rate, position in ways.items():
         assert position[-1] == pytest.approx(0.3, abs=1e-4), rate
         assert np.abs(position - ways[1000.0]).max() < peak * (1.0 / rate + 1e-3)
+
+
+def test_a_follower_settles_where_its_driver_says_also_under_gravity() -> None:
+    """Conformance 61: multiplier times the driver plus offset, and the same for velocities."""
+    base, driver = robot().links, robot().joints[0]
+    follower = replace(driver, name="follower", child="other", mimic=Mimic("hinge", -0.5, 0.2))
+    pair = replace(robot(), links=(*base, replace(base[1], name="other")), joints=(driver, follower))
+    pair = replace(pair, links=tuple(replace(link, collisions=()) for link in pair.links))
+    engine = ENGINES["pybullet"].open(
+        pair, Scene((), (), frozen((0.0, 0.0, -9.81))), EngineSettings(1e-3, 1, np.array([0.0, 0.2]))
+    )
+    command = JointCommand(2)
+    command.obey(["position", "free"])
+    command.position[0] = 0.6
+    for _ in range(1000):
+        engine.write(command)
+        engine.advance()
+        state = engine.read()
+        assert state.position[1] == pytest.approx(-0.5 * state.position[0] + 0.2, abs=1e-9)
+        assert state.velocity[1] == pytest.approx(-0.5 * state.velocity[0], abs=1e-6)
+    engine.close()
+    assert state.position[0] == pytest.approx(0.6, abs=1e-3)
+
+
+def test_nobody_commands_a_follower() -> None:
+    """Conformance 61."""
+    arm = JointTrajectoryController(name="arm", joints=["follower"], command_interfaces=["position"])
+    manager = ControllerManager(joints=["hinge", "follower"], period=1e-3, following=["follower"])
+    with pytest.raises(InvalidInput, match="follower"):
+        manager.load(arm)
