@@ -169,15 +169,16 @@ def test_a_follower_settles_where_its_driver_says_also_under_gravity() -> None:
     )
     command = JointCommand(2)
     command.obey(["position", "free"])
-    command.position[0] = 0.6
-    for _ in range(1000):
+    for tick in range(1000):
+        command.position[0] = min(0.6, tick * 1e-3)
         engine.write(command)
         engine.advance()
         state = engine.read()
-        assert state.position[1] == pytest.approx(-0.5 * state.position[0] + 0.2, abs=1e-9)
-        assert state.velocity[1] == pytest.approx(-0.5 * state.velocity[0], abs=1e-6)
+        assert state.position[1] == pytest.approx(-0.5 * state.position[0] + 0.2, abs=5e-4)
+        if tick == 500:
+            assert state.velocity.tolist() == pytest.approx([1.0, -0.5], abs=5e-3)
     engine.close()
-    assert state.position[0] == pytest.approx(0.6, abs=1e-3)
+    assert state.position.tolist() == pytest.approx([0.6, -0.1], abs=1e-4)
 
 
 def test_nobody_commands_a_follower() -> None:
