@@ -10,6 +10,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
+from manipcli.cli.outputs import check_outputs, check_picture
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ def check_urdf(
         raise InvalidInput([Finding("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
     if in_place and not fix:
         raise InvalidInput([Finding("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
+    check_picture(picture)
+    check_outputs(("--picture", picture), reads=(file,))
     codes = describe.wanted_codes(_words(select), _words(ignore))
     given = xacro_arguments(arguments or [])
 

@@ -41,6 +41,11 @@ AllowOutside = Annotated[
     bool, typer.Option("--allow-outside", help="Let a file lie outside the folders of its packages.")
 ]
 
+PagePort = Annotated[
+    int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
+]
+OpenPage = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
+
 
 def seconds(word: str) -> float:
     """A time as it is written on a command line: a number of seconds, or a number and a unit of time.

@@ -1,7 +1,8 @@
-"""Files about a run that `run` and `judge` write besides what they print: `--report`, `--junit`."""
+"""Files that commands write besides what they print: where they may be, and `--report` and `--junit` of a run."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +26,37 @@ JunitFile = Annotated[
 ]
 
 
+def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None] = ()) -> None:
+    """Before anything is run: each file that is to be written has a place of its own.
+
+    Args:
+        outputs: the option that names it, and where it goes; None: it is not asked for.
+        reads: what the same command reads, or writes under rules of its own.
+
+    Raises:
+        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder.
+    """
+    taken = [os.path.realpath(path) for path in reads if path is not None]
+    for option, path in outputs:
+        if path is None:
+            continue
+        if os.path.realpath(path) in taken:
+            raise InvalidInput([Finding("USE081", f"{option} '{path}': the same command has that file already")])
+        if path.is_dir() or not path.parent.is_dir():
+            what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
+            raise InvalidInput([Finding("USE082", f"{option} '{path}': {what}")])
+        taken.append(os.path.realpath(path))
+
+
+def check_picture(path: Path | None) -> None:
+    """
+    Raises:
+        InvalidInput: its name is not that of a PNG file.
+    """
+    if path is not None and path.suffix.lower() != ".png":
+        raise InvalidInput([Finding("USE063", f"'{path}': a picture is a .png")])
+
+
 class Outputs:
     """What is asked for; looked at before anything is run.
 
@@ -41,16 +73,7 @@ class Outputs:
         self, report: Path | None, junit: Path | None, *, others: Sequence[Path | None] = (), quiet: bool = False
     ) -> None:
         self._report, self._junit, self._quiet = report, junit, quiet
-        taken = [other.resolve() for other in others if other is not None]
-        for option, path in (("--report", report), ("--junit", junit)):
-            if path is None:
-                continue
-            if path.resolve() in taken:
-                raise InvalidInput([Finding("USE081", f"{option} '{path}': the same command has that file already")])
-            if path.is_dir() or not path.parent.is_dir():
-                what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
-                raise InvalidInput([Finding("USE082", f"{option} '{path}': {what}")])
-            taken.append(path.resolve())
+        check_outputs(("--report", report), ("--junit", junit), reads=others)
 
     @property
     def wanted(self) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from manipcli.cli import console
+from manipcli.cli.outputs import check_picture
 from manipcli.core.errors import Finding, InvalidInput
 
 if TYPE_CHECKING:
@@ -51,9 +52,8 @@ class Pictures:
             raise InvalidInput(
                 [Finding("USE062", "--at says which moment --picture draws", hint="give --picture, too")]
             )
-        for path in (picture, sheet):
-            if path is not None and path.suffix.lower() != ".png":
-                raise InvalidInput([Finding("USE063", f"'{path}': a picture is a .png")])
+        check_picture(picture)
+        check_picture(sheet)
         if self.wanted:
             from manipcli.replay.camera import direction
             from manipcli.replay.film import check_pace, kind_of

@@ -9,6 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
+from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode
 
 
@@ -32,6 +33,7 @@ def plan(
     from manipcli import pipeline
     from manipcli.report.plan import render_json, render_text, write_csv
 
+    check_outputs(("--csv", csv), reads=(task,))
     loaded = pipeline.load_task(
         task,
         overrides=tuple(overrides or ()),
@@ -42,7 +44,9 @@ def plan(
     )
     motions = pipeline.plan_task(loaded).motions
     if csv is not None:
-        with csv.open("w", encoding="utf-8", newline="") as stream:
+        from manipcli.core.whole_file import whole_file
+
+        with whole_file(csv) as partial, partial.open("w", encoding="utf-8", newline="") as stream:
             write_csv(motions, stream)
     render = render_json if format_ == "json" else render_text
     console.result(render(loaded.spec.task, motions, loaded.robot))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 if TYPE_CHECKING:
@@ -55,14 +56,12 @@ def plot(
     if fields:
         _list_fields(logs)
         return ExitCode.PASSED
+    check_outputs(("--output", output), ("--csv", Path(csv) if csv not in (None, "-") else None), reads=logs)
     kind = None
     if output is not None:
-        from manipcli.replay.figure import KINDS
+        from manipcli.replay.figure import kind_of
 
-        kind = next((known for known in KINDS if output.suffix.lower() == f".{known}"), None)
-        if kind is None:
-            message = f"'{output}': a figure is one of {', '.join(f'.{known}' for known in KINDS)}"
-            raise InvalidInput([Finding("USE061", message)])
+        kind = kind_of(output)
     from manipcli.flow.chart import open_chart
 
     chart = open_chart(logs, asked, start=start, end=end)

@@ -9,7 +9,8 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.cli.options import AllowOutside, Format, PackagePath
+from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, PagePort
+from manipcli.cli.serving import stay
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 
@@ -47,10 +48,8 @@ def replay(
     speed: Annotated[
         float, typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film.")
     ] = 1.0,
-    port: Annotated[
-        int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
-    ] = None,
-    open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+    port: PagePort = None,
+    open_: OpenPage = False,
     verify: Annotated[
         bool,
         typer.Option("--verify", help="Show nothing: simulate the run again from the log, and compare every message."),
@@ -85,8 +84,11 @@ def replay(
                 format_=format_,
                 interrupts=interrupts,
             )
+        from manipcli.cli.outputs import check_outputs
         from manipcli.cli.pictures import Pictures
         from manipcli.flow.replay import open_playback
+
+        check_outputs(("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video), reads=(log,))
 
         pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
         playback = open_playback(
@@ -97,9 +99,10 @@ def replay(
         for note in playback.notes:
             console.talk(f"note: {note}")
         if html is not None:
+            from manipcli.core.whole_file import write_whole
             from manipcli.replay.player import player_page
 
-            html.write_text(player_page(playback), "utf-8")
+            write_whole(html, player_page(playback).encode())
             console.result(str(html))
         pictures.make(playback)
         if html is not None or pictures.wanted:
@@ -107,14 +110,5 @@ def replay(
         from manipcli.replay.replay import Replay
 
         with Replay(playback, port=port) as page:
-            console.result(page.url)
-            console.talk("Ctrl-C ends it")
-            if open_:
-                import webbrowser
-
-                webbrowser.open(page.url)
-            try:
-                page.wait()
-            except KeyboardInterrupt:
-                console.talk("")
+            stay(page, open_=open_)
     return ExitCode.PASSED

@@ -9,6 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, PackagePath, hertz, seconds
+from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 
@@ -61,14 +62,12 @@ def tune(
     if write is not None and write.exists() and not force:
         message = f"'{write}' exists"
         raise InvalidInput([Finding("USE070", message, hint="--force replaces it; or say another name")])
+    check_outputs(("--write", write), ("--output", output), reads=(robot,))
     kind = None
     if output is not None:
-        from manipcli.replay.figure import KINDS
+        from manipcli.replay.figure import kind_of
 
-        kind = next((known for known in KINDS if output.suffix.lower() == f".{known}"), None)
-        if kind is None:
-            message = f"'{output}': a figure is one of {', '.join(f'.{known}' for known in KINDS)}"
-            raise InvalidInput([Finding("USE061", message)])
+        kind = kind_of(output)
     control_period = seconds(period)
     if not 1e-6 <= control_period <= 1.0:
         raise InvalidInput([Finding("USE071", f"a control period of {period}; expected 1 us to 1 s")])

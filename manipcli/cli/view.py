@@ -9,7 +9,8 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
+from manipcli.cli.options import AllowOutside, OpenPage, PackagePath, PagePort, xacro_arguments
+from manipcli.cli.serving import stay
 from manipcli.core.errors import ExitCode
 
 
@@ -20,10 +21,8 @@ def view(
         typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
     ] = None,
     *,
-    port: Annotated[
-        int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
-    ] = None,
-    open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+    port: PagePort = None,
+    open_: OpenPage = False,
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
@@ -43,14 +42,5 @@ def view(
         with View(sight.robot, sight.scene, q=sight.q, port=port) as page:
             for line in page.missing:
                 console.talk(f"not drawn: {line}")
-            console.result(page.url)
-            console.talk("Ctrl-C ends it")
-            if open_:
-                import webbrowser
-
-                webbrowser.open(page.url)
-            try:
-                page.wait()
-            except KeyboardInterrupt:
-                console.talk("")
+            stay(page, open_=open_)
     return ExitCode.PASSED

@@ -18,16 +18,21 @@ def write_whole(path: Path, data: bytes) -> None:
 def whole_file(path: Path) -> Iterator[Path]:
     """A name beside that of a file, to write to; the file gets its own name when the block ends well.
 
-    What was there before is replaced then, and stays as it is where the block does not end well.
+    What was there before is replaced then, and stays as it is where the block does not end well. A link is followed; a
+    device or a pipe (`/dev/stdout`) is itself what is written to.
 
     Raises:
         OSError: nothing can be written there.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    whole = Path(os.path.realpath(path))
+    partial = whole.with_name(f".{whole.name}.{os.getpid()}.partial")
     try:
         partial.touch()  # what cannot be written is told before the work
         yield partial
-        partial.replace(path)
+        partial.replace(whole)
     except OSError as error:
         if error.filename is not None and os.fspath(error.filename) == str(partial):
             error.filename = str(path)  # the user knows of this one only

@@ -39,7 +39,7 @@ class RemoteFile(NotFound):
 
 def own_root(description: Path) -> Path:
     """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder."""
-    folder = description.resolve().parent
+    folder = Path(os.path.realpath(description)).parent
     for ancestor in (folder, *list(folder.parents)[:LEVELS_ABOVE]):
         if (ancestor / "package.xml").is_file():
             return ancestor
@@ -63,9 +63,9 @@ class Packages:
     def __init__(
         self, description: Path | None, *, package_path: Sequence[Path] = (), allow_outside: bool = False
     ) -> None:
-        self._package_path = tuple(Path(folder).resolve() for folder in package_path)
+        self._package_path = tuple(Path(os.path.realpath(folder)) for folder in package_path)
         self._allow_outside = allow_outside
-        self._folder = description.resolve().parent if description is not None else None
+        self._folder = Path(os.path.realpath(description)).parent if description is not None else None
         self._own = own_root(description) if description is not None else None
         self._found: dict[str, Path] = {}
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
 
+from manipcli.core.errors import InvalidArgument
 from manipcli.replay.curves import Chart, Interval, Panel, thinned
 
 if TYPE_CHECKING:
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Kind = Literal["svg", "png", "pdf"]
-KINDS: tuple[Kind, ...] = ("svg", "png", "pdf")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 WIDTH = 10.0
 """[inch] of a figure."""
@@ -33,6 +35,18 @@ COLOURS = (
 DASHES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
 MOST_NAMED = 24
 """Curves in one legend: beyond, it would be higher than its panel."""
+
+
+def kind_of(path: Path) -> Kind:
+    """The kind of figure that a file name asks for.
+
+    Raises:
+        InvalidArgument: it is none.
+    """
+    for kind in KINDS:
+        if path.suffix.lower() == f".{kind}":
+            return kind
+    raise InvalidArgument("USE061", f"'{path}': a figure is one of {', '.join(f'.{kind}' for kind in KINDS)}")
 
 
 def render(chart: Chart, kind: Kind) -> bytes:

@@ -174,7 +174,9 @@ def test_run_hands_every_option_on(pipeline: SimpleNamespace, capsys: pytest.Cap
         return _report(PASSED)
 
     pipeline.run_task = run_task
-    words = "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p"
+    words = (
+        "run t.yaml --log a.mcap --force --embed-meshes --seed 3 --sample 7 --set a.b=1 --set c=x=y --package-path p"
+    )
     assert main([*words.split(), "--allow-outside", "-q"]) == 0
     del given["progress"]
     assert given == {
@@ -226,7 +228,9 @@ def _robot() -> RobotModel:
 def _motion() -> SimpleNamespace:
     times = np.array([0.0, 1.0, 2.0])
     velocities = np.array([[0.0], [1.5], [0.0]])
-    trajectory = JointTrajectory.of_arrays(("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1)))
+    trajectory = JointTrajectory.of_arrays(
+        ("j1",), times, np.array([[0.0], [0.5], [1.0]]), velocities, np.zeros((3, 1))
+    )
     return SimpleNamespace(step_id="move_1", verb="move", label="move", trajectory=trajectory, duration=2.0)
 
 
@@ -255,7 +259,7 @@ def test_plan_that_cannot_write_its_csv_says_so(
     pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
     pipeline.plan_task = lambda _: SimpleNamespace(motions=())
     assert main(["plan", "t.yaml", "--csv", str(tmp_path / "absent" / "plan.csv")]) == 4
-    assert "No such file or directory" in capsys.readouterr().err
+    assert "there is no folder" in capsys.readouterr().err
 
 
 def test_a_reader_that_goes_away_is_no_error() -> None:

@@ -99,7 +99,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["--from", "0.3", "--to", "0.2"], "PLOT003", "nothing lies between"),
         (["joint_states.position", "--from", "500"], "PLOT004", "no value"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
-        (["-o", "absent/a.svg"], "USE003", "'absent/a.svg': No such file or directory"),
+        (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
         (["gone.mcap"], "LOG300", "No such file"),
     ],
 )

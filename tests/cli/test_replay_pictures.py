@@ -61,7 +61,7 @@ def test_a_log_without_its_end_is_drawn_too(
         (["--picture", "a.png", "--at", "900"], "REPLAY012", "outside of the run"),
         (["--picture", "a.png", "--size", "big"], "REPLAY013", "WIDTHxHEIGHT"),
         (["--picture", "a.png", "--view", "below"], "REPLAY010", "iso, front"),
-        (["--picture", "absent/a.png"], "USE003", "'absent/a.png': No such file or directory"),
+        (["--picture", "absent/a.png"], "USE082", "--picture 'absent/a.png': there is no folder 'absent'"),
         (["--video", "a.avi"], "REPLAY015", ".mp4, .webp, .gif"),
         (["--video", "a.gif", "--fps", "0"], "REPLAY014", "frames a second"),
         (["--video", "a.gif", "--speed", "0.0001"], "REPLAY014", "fewer frames"),
