@@ -64,7 +64,7 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     name: str = report.case.file
     if report.page is not None:
         name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
-    again = None if report.passed else element("div", element("code", report.command), class_="place")
+    again = None if report.passed else element("div", element("code", report.command))
     return (
         mark(report.passed, report.outcome),
         joined(name, element("div", report.case.task)) if report.case.task else name,
