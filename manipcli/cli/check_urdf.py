@@ -94,7 +94,8 @@ def check_urdf(
         if inspection.examination.errors:
             console.talk(f"not drawn: {file} has errors")
         else:
-            describe.draw(inspection, picture)
+            for line in describe.draw(inspection, picture):
+                console.talk(f"not drawn: {line}")
             console.talk(f"drawn: {picture}")
     return ExitCode.PASSED if passed else ExitCode.FAILED
 

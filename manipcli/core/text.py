@@ -62,6 +62,11 @@ def listed(names: Iterable[str], *, most: int = 12) -> str:
     return ", ".join(every[:most]) + (f", and {rest} more" if rest > 0 else "")
 
 
+def number_of(number: int, noun: str) -> str:
+    """`1 file`, `2 files`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def escape(text: str) -> str:
     r"""`text` on one line, with control characters, direction marks and lone surrogates written as `\x1b`, `\u202e`."""
     return _CONTROL.sub(lambda match: _escaped(match.group()), text)

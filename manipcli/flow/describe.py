@@ -137,8 +137,8 @@ def mend(inspection: Inspection, *, in_place: bool) -> tuple[Path, tuple[Change,
     return target, changes
 
 
-def draw(inspection: Inspection, path: Path) -> None:
-    """A picture of a sound description.
+def draw(inspection: Inspection, path: Path) -> tuple[str, ...]:
+    """A picture of a sound description; what of it could not be drawn, a line each.
 
     Raises:
         InvalidInput: it has errors.
@@ -148,4 +148,4 @@ def draw(inspection: Inspection, path: Path) -> None:
     parts = inspection.examination.parts
     if parts is None or inspection.examination.errors:
         raise InvalidInput([Finding("USE041", f"'{inspection.path}' has errors and is not drawn")])
-    draw_robot(bare_robot(parts), path)
+    return draw_robot(bare_robot(parts), path)

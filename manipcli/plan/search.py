@@ -9,6 +9,7 @@ from typing import Annotated, TypeVar
 from pydantic import BeforeValidator
 
 from manipcli.core.errors import NotPlannable
+from manipcli.core.text import number_of
 from manipcli.plan.step import StepPlan
 from manipcli.spec.quantity import Length
 
@@ -54,5 +55,5 @@ def first_feasible(attempt: Callable[[C], StepPlan], candidates: Iterable[C], *,
         raise NotPlannable(f"{what}: {first.cause}", hint=first.hint)
     told = "; ".join(f"{refusals[0].cause} ({len(refusals)} of {tried})" for refusals in commonest[:REASONS])
     more = len(commonest) - REASONS
-    others = f"; and {more} other reason{'s' if more > 1 else ''}" if more > 0 else ""
+    others = f"; and {number_of(more, 'other reason')}" if more > 0 else ""
     raise NotPlannable(f"{what}, {tried} ways tried: {told}{others}", hint=first.hint)

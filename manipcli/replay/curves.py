@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.replay.playback import PlotTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,19 +90,6 @@ class Chart:
     start: float
     end: float
     notes: tuple[str, ...] = ()
-
-
-def table_panels(table: PlotTable) -> tuple[Panel, ...]:
-    """A table as panels, one a unit."""
-    panels = []
-    for unit in dict.fromkeys(table.units):
-        curves = tuple(
-            Curve(f"{table.name}[{name}]", name, "", table.times, table.values[:, k])
-            for k, (name, its) in enumerate(zip(table.columns, table.units, strict=True))
-            if its == unit
-        )
-        panels.append(Panel(table.name, table.name, unit, curves))
-    return tuple(panels)
 
 
 def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array, Array]:

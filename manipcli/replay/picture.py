@@ -15,15 +15,12 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.model.state import WorldState
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, Layer, draw
 from manipcli.replay.image import Image, sky, write_png
 from manipcli.replay.placing import Placing, Poses
-from manipcli.replay.posture import following, posture
+from manipcli.replay.posture import posture
 from manipcli.replay.surface import Surface, surface
 
 SIZE = (960, 720)
@@ -240,75 +237,13 @@ def _parts(whole: Surface) -> list[Surface]:
     return parts
 
 
-def draw_robot(
-    robot: RobotModel,
-    path: Path,
-    *,
-    pose: str | None = None,
-    layers: tuple[Layer, ...] = ("visual",),
-    size: tuple[int, int] = SIZE,
-    camera: Camera | None = None,
-) -> tuple[str, ...]:
-    """A picture of a robot as a PNG file.
-
-    Args:
-        robot: the robot.
-        path: of the file; replaced.
-        pose: a named pose; `home` or else zero where None.
-        layers: visual, collision, inertia.
-        size: width and height [pixel].
-        camera: None frames the robot.
+def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
+    """A picture of a robot at `home`, or else at zero, as a PNG file; what is at `path` is replaced.
 
     Returns:
         What could not be drawn, a line each.
     """
-    drawing = draw(robot)
-    return _draw(drawing, Placing(robot).start(posture(robot, pose)), path, layers, size, camera, frozenset())
-
-
-def draw_scene(
-    robot: RobotModel | None,
-    scene: Scene,
-    state: WorldState | Array | None,
-    path: Path,
-    *,
-    layers: tuple[Layer, ...] = ("visual",),
-    size: tuple[int, int] = SIZE,
-    camera: Camera | None = None,
-) -> tuple[str, ...]:
-    """A picture of a scene with its robot as a PNG file.
-
-    Args:
-        robot: the robot, or None.
-        scene: the scene.
-        state: one instant; or joint positions (n,), with the bodies where they start; None: `home`, or else zero.
-        path: of the file; replaced.
-        layers, size, camera: as for `draw_robot`; the floor need not be in view.
-
-    Returns:
-        What could not be drawn, a line each.
-    """
-    placing = Placing(robot, scene)
-    if isinstance(state, WorldState):
-        poses = placing.at(state.position, state.body_position, state.body_quat_xyzw)
-    elif robot is None:
-        poses = placing.start()
-    else:
-        poses = placing.start(posture(robot) if state is None else following(robot, state))
-    floors = frozenset(body.name for body in scene.bodies if body.kind == FLOOR)
-    return _draw(draw(robot, scene), poses, path, layers, size, camera, floors)
-
-
-def _draw(
-    drawing: Drawing,
-    poses: Poses,
-    path: Path,
-    layers: tuple[Layer, ...],
-    size: tuple[int, int],
-    camera: Camera | None,
-    leave_out: frozenset[str],
-) -> tuple[str, ...]:
-    chosen = camera or framing(drawing, poses, aspect=size[0] / size[1], leave_out=leave_out)
-    with Studio(drawing, layers=layers, size=size) as studio:
-        write_png(path, studio.picture(poses, chosen))
+    drawing, poses = draw(robot), Placing(robot).start(posture(robot))
+    with Studio(drawing) as studio:
+        write_png(path, studio.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1])))
     return drawing.missing

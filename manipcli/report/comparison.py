@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from manipcli.core.text import shorten
+from manipcli.core.text import number_of, shorten
 from manipcli.record.compare import Comparison, Difference, TopicComparison
 from manipcli.record.compare_entries import EntryDifference
 from manipcli.report.json import Json, number
@@ -56,12 +56,7 @@ def counted(found: Comparison) -> str:
     if not topics:
         return "the messages are the same, what is beside them is not"
     messages = sum(topic.different + sum(topic.only) for topic in topics)
-    return f"{count(messages, 'message')} of {count(len(topics), 'topic')}"
-
-
-def count(number: int, noun: str) -> str:
-    """`1 message`, `2 messages`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{number_of(messages, 'message')} of {number_of(len(topics), 'topic')}"
 
 
 def entries_lines(entries: Sequence[EntryDifference], names: Names) -> list[str]:

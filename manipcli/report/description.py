@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import listed, shorten
+from manipcli.core.text import listed, number_of, shorten
 from manipcli.model.check import Check
 from manipcli.model.guess_groups import GuessedGroup
 from manipcli.model.summary import Summary
@@ -36,7 +36,7 @@ def render_text(
         lines += [*tree, ""]
     mark, word = (PASS, "passed") if passed else (FAIL, "failed")
     counts = [
-        _many(sum(finding.severity == severity for finding in findings), severity)
+        number_of(sum(finding.severity == severity for finding in findings), severity)
         for severity in ("error", "warning", "note")
     ]
     more = f", {sum(number for _, number in left_out)} more not shown" if left_out else ""
@@ -82,11 +82,11 @@ def _summary(summary: Summary) -> list[str]:
         "robot": summary.name + (f", root link '{summary.root}'" if summary.root else ""),
         "links": str(summary.links),
         "joints": f"{summary.joints}" + (f" ({types})" if types else ""),
-        "moving": f"{summary.moving}: {_many(summary.dof, 'degree')} of freedom"
-        + (f", {_many(summary.mimics, 'mimic joint')}" if summary.mimics else ""),
+        "moving": f"{summary.moving}: {number_of(summary.dof, 'degree')} of freedom"
+        + (f", {number_of(summary.mimics, 'mimic joint')}" if summary.mimics else ""),
         "transmissions": str(summary.transmissions),
         "mass": f"{summary.mass:.4g} kg"
-        + (f"; {_many(summary.massless, 'moving link')} without mass" if summary.massless else ""),
+        + (f"; {number_of(summary.massless, 'moving link')} without mass" if summary.massless else ""),
     }
     if summary.reach:
         rows["reach"] = f"about {summary.reach:.3g} m from the first joint of the longest chain to its tip"
@@ -105,10 +105,6 @@ def _group(group: GuessedGroup) -> str:
     own = listed(group.joints, most=8) or "no joint of its own"
     follow = f"; follow: {listed(group.mimics, most=8)}" if group.mimics else ""
     return f"{group.kind} of {len(group.joints)}, {where}: {own}{follow}"
-
-
-def _many(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def render_json(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from manipcli.core.text import number_of
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
 from manipcli.record.compare import Comparison
 from manipcli.record.compare_entries import EntryDifference
 from manipcli.report.comparison import (
     Names,
-    count,
     counted,
     entries_lines,
     entry_object,
@@ -121,7 +121,7 @@ def _answer(made: LogDiff) -> str:
         return f"{FAIL} different{more}: {counted(made.messages)}"
     within = f" within {made.tolerance:g}" if made.tolerance else ""
     if made.same:
-        return f"{PASS} no difference{within}: {count(made.messages.messages, 'message')}, and the verdict on them"
+        return f"{PASS} no difference{within}: {number_of(made.messages.messages, 'message')}, and the verdict on them"
     return f"{FAIL} different: the messages are the same{within}, the verdict on them is not"
 
 

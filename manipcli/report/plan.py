@@ -10,6 +10,7 @@ from typing import Protocol, TextIO
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.core.text import number_of
 from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.report.json import Json, dumps
@@ -81,7 +82,7 @@ def render_text(task: str, motions: Sequence[PlannedMotion], robot: RobotModel) 
         previous = motion.step_id
     headers = ("step", "verb", "motion", "duration", "nearest limit", "used")
     total = sum(motion.duration for motion in motions)
-    summary = f"✓ {task} planned: {len(motions)} motion{'' if len(motions) == 1 else 's'}, {total:.2f} s"
+    summary = f"✓ {task} planned: {number_of(len(motions), 'motion')}, {total:.2f} s"
     return f"{table(headers, rows, right=('duration', 'used'))}\n\n{summary}"
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
+from manipcli.core.text import number_of
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport
@@ -45,9 +46,9 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = sum(finding.severity == "warning" for finding in findings)
     mark, word = (FAIL, "failed") if errors else (PASS, "passed")
-    summary = f"{mark} {word}: {_count(len(files), 'file')} checked, {_count(errors, 'error')}"
+    summary = f"{mark} {word}: {number_of(len(files), 'file')} checked, {number_of(errors, 'error')}"
     if warnings:
-        summary += f", {_count(warnings, 'warning')}"
+        summary += f", {number_of(warnings, 'warning')}"
     return "\n".join([*map(describe, findings), summary])
 
 
@@ -121,11 +122,11 @@ _STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": 
 
 def _summary(verdict: Verdict) -> str:
     done = sum(step.outcome == "done" for step in verdict.steps)
-    text = f"{done} of {_count(len(verdict.steps), 'step')} done"
+    text = f"{done} of {number_of(len(verdict.steps), 'step')} done"
     if not verdict.expectations:
         return f"{text}, nothing expected beyond that"
     met = sum(expectation.outcome == "passed" for expectation in verdict.expectations)
-    return f"{text}, {met} of {_count(len(verdict.expectations), 'expectation')} met"
+    return f"{text}, {met} of {number_of(len(verdict.expectations), 'expectation')} met"
 
 
 def steps_table(steps: Sequence[StepOutcome]) -> str:
@@ -170,7 +171,3 @@ def _margin(expectation: ExpectationOutcome) -> str:
 
 def _seconds(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f} s"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

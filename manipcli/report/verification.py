@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.errors import Finding
+from manipcli.core.text import number_of
 from manipcli.record.compare import Comparison
 from manipcli.record.compare_entries import EntryDifference
 from manipcli.report.comparison import (
     Names,
-    count,
     counted,
     entries_lines,
     entry_object,
@@ -66,7 +66,7 @@ def render_text(made: Verification) -> str:
     if made.cut:
         lines.append(f"the log does not go to the end of its run, and is compared as far as it goes: {made.cut}")
     topics = sum(1 for topic in made.messages.topics if topic.messages[0])
-    held = f"{count(made.messages.messages, 'message')} of {count(topics, 'topic')}, {made.messages.end:.2f} s"
+    held = f"{number_of(made.messages.messages, 'message')} of {number_of(topics, 'topic')}, {made.messages.end:.2f} s"
     if made.identical:
         lines.append(f"{PASS} identical: {held}{'' if made.cut else ', and all metadata and attachments'}")
     else:

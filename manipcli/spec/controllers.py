@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Force, Frequency, JointAcceleration, JointEffort, JointValue, JointVelocity, Time
+from manipcli.spec.quantity import Frequency, JointAcceleration, JointEffort, JointValue, JointVelocity, Time
 
 Interface = Literal["position", "velocity", "acceleration", "effort"]
 Role = Literal["follower", "hand", "other"]
@@ -208,7 +208,6 @@ class GripperSpec(ControllerSpec):
     goal_tolerance: Annotated[JointValue, Field(gt=0)] | None = Field(
         None, description="Distance that counts as arrived, above 0. Default 0.05 rad or 2 mm."
     )
-    default_force: Annotated[Force, Field(gt=0, description="Of a finger where no step says one. Default 5 N.")] = 5.0
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:

@@ -13,8 +13,7 @@ from PIL import Image
 
 from manipcli.replay import figure, terminal_plot
 from manipcli.replay.curve_table import write_table
-from manipcli.replay.curves import Chart, Curve, Interval, Panel, table_panels, thinned, ticks
-from manipcli.replay.playback import PlotTable
+from manipcli.replay.curves import Chart, Curve, Interval, Panel, thinned, ticks
 
 TIMES = np.arange(10_001) / 1000.0
 SINE = Curve("a.b[one]", "one", "", TIMES, np.sin(TIMES))
@@ -58,13 +57,6 @@ def test_ticks_are_few_and_round(low: float, high: float) -> None:
         apart = np.diff(found)
         assert apart == pytest.approx(apart[0])
         assert float(f"{apart[0]:.3g}") / 10.0 ** np.floor(np.log10(apart[0])) in (1.0, 2.0, 5.0)
-
-
-def test_a_table_is_one_panel_a_unit() -> None:
-    table = PlotTable("joint position", ("a", "b", "c"), ("rad", "m", "rad"), TIMES[:3], np.arange(9.0).reshape(3, 3))
-    first, second = table_panels(table)
-    assert (first.axis, first.labels) == ("joint position [rad]", ("a", "c"))
-    assert (second.axis, second.curves[0].values.tolist()) == ("joint position [m]", [1.0, 4.0, 7.0])
 
 
 def _lines(chart: Chart, *, columns: int = 91, colours: bool = True) -> list[str]:
