@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
 from manipcli.control.command import may_go_together
@@ -13,7 +13,7 @@ from manipcli.control.lifecycle import ticks_between
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Compat
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Place
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, listed
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import ControllerSpec, Interface
@@ -72,13 +72,15 @@ def controller_findings(
     spec: ControllersSpec, robot: RobotModel, period: float, place: Where = _nowhere
 ) -> tuple[Finding, ...]:
     """Errors: unknown, fixed, mimic or repeated joints; what two active controllers both claim; an update rate that
-    does not divide the control rate; what the types object to. A warning: joints that nobody commands."""
+    does not divide the control rate; what the types object to. Warnings: joints that nobody commands, and joints that
+    follow two."""
     return tuple(_findings(spec, robot, period, place))
 
 
 def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Where) -> Iterator[Finding]:
     owners: dict[str, dict[Interface, str]] = {}
     commanded: set[str] = set()
+    together: set[tuple[str, str, str]] = set()
     for name, one in spec.controllers.items():
         at = ("controllers", name)
         if not one.joints and one.interfaces:
@@ -90,7 +92,9 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
                 continue
             yield from _joint_findings(name, one, joint, robot, where)
             if one.active:
+                before = set(owners.get(joint, {}).values())
                 yield from _claim_findings(name, one, joint, owners, where)
+                together |= {(other, name, joint) for other in before if name in owners[joint].values()}
         commanded.update(one.joints if one.interfaces else ())
         if one.update_rate is not None:
             try:
@@ -102,6 +106,7 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
         for problem in CONTROLLERS[one.type].check(one, robot):
             message = f"controller '{name}': {problem.message}"
             yield Finding(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
+    yield from _rivals(spec, together, place)
     idle = [joint.name for joint in robot.moving_joints if joint.independent and joint.name not in commanded]
     if idle:
         yield Finding(
@@ -132,6 +137,23 @@ def _claim_findings(
         yield Finding("CTRL148", message + "each other: a joint obeys one of them", place, hint=hint)
         return
     claimed.update(dict.fromkeys(spec.interfaces, name))
+
+
+def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], place: Where) -> Iterator[Finding]:
+    """Two that follow trajectories with the same joints, at its positions and its efforts; `together`: both, joint."""
+    rivals: dict[tuple[str, str], list[str]] = {}
+    for one, other, joint in sorted(together):
+        if spec.controllers[one].role == spec.controllers[other].role == "follower":
+            rivals.setdefault((one, other), []).append(joint)
+    for (one, other), joints in rivals.items():
+        message = f"controllers '{one}' and '{other}' are both active on {listed(joints)}: a joint obeys the positions "
+        yield Finding(
+            "CTRL149",
+            message + "of one and adds the efforts of the other",
+            place(("controllers", other)),
+            hint="say `active: false` of one of them; a step `switch_controllers` changes who is active",
+            severity="warning",
+        )
 
 
 def _joint_findings(

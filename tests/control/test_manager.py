@@ -188,6 +188,23 @@ def test_two_controllers_on_one_joint_are_refused_with_both_names():
         ControllerManager([controller("one", "effort")], joints=["a"], period=0.001, following=["a"])
 
 
+def test_two_that_follow_with_one_joint_are_a_warning_and_a_feed_forward_is_none():
+    both = ["shoulder", "elbow"]
+    arm = {"type": "joint_trajectory", "joints": both, "command_interface": "position"}
+    push = {"type": "joint_trajectory", "joints": both, "command_interface": "effort", "gains": gains(both)}
+    add = {"type": "forward_command", "joints": both, "command_interface": "effort"}
+
+    def warned(**controllers):
+        found = controller_findings(ControllersSpec.model_validate({"controllers": controllers}), robot(), 0.001)
+        return [f.message for f in found if f.code == "CTRL149"]
+
+    (text,) = warned(arm=arm, push=push)
+    assert text.startswith(
+        "controllers 'arm' and 'push' are both active on elbow, shoulder: a joint obeys the positions"
+    )
+    assert warned(arm=arm, push=push | {"active": False}) == warned(arm=arm, add=add) == []
+
+
 def test_all_findings_of_a_file_come_at_once_each_with_its_place():
     asked = []
 

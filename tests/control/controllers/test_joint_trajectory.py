@@ -360,3 +360,14 @@ def test_one_interface_need_not_stand_in_a_list_nor_gains_be_objects():
     assert made.interfaces == ("effort",)
     made.update(0.0, PERIOD, state([0.5]))
     assert made.update(PERIOD, PERIOD, state([0.0])).commands[0] == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize(("goal_time", "told"), [(0.0, "goal_time 0 s: no grace; `compat: ros2`"), (0.001, "0.001 s)")])
+def test_who_gives_no_grace_is_told_so(goal_time, told):
+    made = make(goal=0.1, goal_time=goal_time)
+    made.update(0.0, PERIOD, state(START))
+    handle = made.send_goal(JointTrajectory(JOINTS, [point(START + 1.0, 0.002)]))
+    for tick in range(1, 8):
+        made.update(tick * PERIOD, PERIOD, state(START))
+    assert handle.result.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert told in handle.result.text
