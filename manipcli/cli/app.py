@@ -22,6 +22,7 @@ from manipcli.cli import (
     diff,
     graph,
     info,
+    init,
     judge,
     plan,
     plot,
@@ -51,6 +52,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+app.command("init")(init.init)
 app.command("run")(run.run)
 app.command("test")(test.test)
 app.command("bless")(bless.bless)

@@ -1,0 +1,69 @@
+"""`manipcli init [DIR]`: a small project that works: a robot, its controllers, a task, and how CI runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shlex import quote
+from typing import Annotated, Final
+
+import typer
+
+from manipcli.cli import console
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.text import listed
+
+TEMPLATES: Final = Path(__file__).parent / "project"
+FILES: Final = {
+    "README.md": "README.md",
+    ".gitignore": "gitignore",
+    ".github/workflows/manipcli.yml": "github/workflows/manipcli.yml",
+    "tasks/pick_place.yaml": "tasks/pick_place.yaml",
+    "robots/panda.yaml": "robots/panda.yaml",
+    "controllers/panda.yaml": "controllers/panda.yaml",
+}
+"""What is written, and from which template."""
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where; this folder when absent.")] = Path(),
+    *,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+) -> ExitCode:
+    """Write a small project that works.
+
+    A robot whose description comes with PyBullet, its controllers, a task with expectations, JSON schemas for editors
+    and a workflow for GitHub Actions. Nothing is written where one of the files is there already.
+    """
+    files = _files(folder)
+    there = [str(path) for path in files if path.exists() or path.is_symlink()]
+    if there and not force:
+        are = "is" if len(there) == 1 else "are"
+        message = f"{listed(there)} {are} there already; nothing was written"
+        raise InvalidInput(
+            [Finding("USE088", message, hint="give another folder, or --force to replace what is there")]
+        )
+    from manipcli.core.whole_file import write_whole
+
+    for path, data in files.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data)
+        console.result(f"written: {path}")
+    enter = "" if folder.resolve() == Path.cwd() else f"cd {quote(str(folder))} && "
+    console.talk(f"next: {enter}manipcli test")
+    return ExitCode.PASSED
+
+
+def _files(folder: Path) -> dict[Path, bytes]:
+    """Every file of the project, by its path."""
+    from manipcli import pipeline
+    from manipcli.report.json import dumps
+
+    name = (folder.resolve().name or "tasks").encode()
+    files = {
+        folder / path: (TEMPLATES / template).read_bytes().replace(b"PROJECT", name) for path, template in FILES.items()
+    }
+    schemas = {
+        folder / "schemas" / f"{kind}.json": f"{dumps(pipeline.schema(kind))}\n".encode()
+        for kind in ("task", "robot", "controllers")
+    }
+    return files | schemas

@@ -1,0 +1,102 @@
+"""`manipcli init`: a project that works at once, and never one over another."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+import yaml
+
+from manipcli.cli.app import main
+from manipcli.cli.init import FILES, TEMPLATES
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
+    """A new project, as the working directory."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "my demo"]) == 0
+    told = capsys.readouterr()
+    assert [line.removeprefix("written: my demo/") for line in told.out.splitlines()][: len(FILES)] == [*FILES]
+    assert told.err == "next: cd 'my demo' && manipcli test\n"
+    monkeypatch.chdir(tmp_path / "my demo")
+    return tmp_path / "my demo"
+
+
+def test_its_files_are_sound(project: Path) -> None:
+    files = sorted(str(path) for kind in ("tasks", "robots", "controllers") for path in (project / kind).iterdir())
+    assert main(["check", *files]) == 0
+    assert (project / "README.md").read_text().startswith("# my demo\n")
+
+
+def test_every_yaml_file_names_a_schema_that_is_there(project: Path) -> None:
+    for kind in ("task", "robot", "controllers"):
+        (path,) = (project / f"{kind.removesuffix('s')}s").iterdir()
+        first = path.read_text().splitlines()[0]
+        match = re.fullmatch(r"# yaml-language-server: \$schema=(\S+)", first)
+        assert match is not None
+        schema = json.loads((path.parent / match.group(1)).read_text())
+        assert schema["title"] == f"manipcli {kind}"
+        # Every key of the file is one of the schema.
+        assert {*yaml.safe_load(path.read_text())} <= {*schema["properties"]}
+
+
+def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own, gone = project / "tasks" / "pick_place.yaml", project / "README.md"
+    own.write_text("mine")
+    gone.unlink()
+    assert main(["init"]) == 4
+    assert "tasks/pick_place.yaml" in capsys.readouterr().err
+    assert own.read_text() == "mine"
+    assert not gone.exists()
+    assert main(["init", "--force"]) == 0
+    assert own.read_text() != "mine"
+    assert capsys.readouterr().err == "next: manipcli test\n"
+
+
+def test_every_template_is_written_somewhere() -> None:
+    templates = {str(path.relative_to(TEMPLATES)) for path in TEMPLATES.rglob("*") if path.is_file()}
+    assert templates == {*FILES.values()}
+
+
+def test_the_workflow_calls_options_that_there_are() -> None:
+    workflow = yaml.safe_load((TEMPLATES / "github/workflows/manipcli.yml").read_text())
+    (called,) = [step["run"] for step in workflow["jobs"]["tasks"]["steps"] if "manipcli test" in step.get("run", "")]
+    done = subprocess.run(
+        [sys.executable, "-m", "manipcli", "test", "--help"], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    options = re.findall(r"--\w+", called)
+    assert len(options) == 3
+    assert [option for option in options if option not in done.stdout] == []
+
+
+def test_the_robot_is_that_of_the_repository() -> None:
+    for template, original in (("robots/panda.yaml", "robots/panda/robot.yaml"), ("controllers/panda.yaml",) * 2):
+        schema, _, rest = (TEMPLATES / template).read_text().partition("\n")
+        assert schema.startswith("# yaml-language-server: ")
+        assert rest == (ROOT / original).read_text()
+
+
+def test_the_example_shows_the_same_workflow() -> None:
+    shown = ROOT / "examples" / "09_continuous_integration" / "manipcli.yml"
+    assert shown.read_text() == (TEMPLATES / "github/workflows/manipcli.yml").read_text()
+
+
+@pytest.mark.slow
+def test_its_tests_pass(project: Path) -> None:
+    assert main(["test"]) == 0
+    plugin = "manipcli.cli.pytest_plugin"
+    installed = any(one.value == plugin for one in entry_points(group="pytest11"))
+    known = [] if installed else ["-p", plugin]
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", *known], capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 passed" in done.stdout
