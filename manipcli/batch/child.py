@@ -110,7 +110,16 @@ def _end_of(job: Job, beats: _Beats) -> End:
         notes += better
     if found and report.log is not None:
         beats.doing("drawing a picture")
-        notes += _noted("no picture", lambda: draw(job, found[0].at))
+        notes += _noted(
+            "no picture",
+            lambda: draw(
+                job.log,
+                job.picture,
+                at=found[0].at,
+                package_path=settings.package_path,
+                allow_outside=settings.allow_outside,
+            ),
+        )
     if job.page is not None:
         beats.doing("writing a page")
         notes += _noted("no page", lambda: write_page(job, report))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 
@@ -22,6 +24,18 @@ from manipcli.batch.child import main
 main(int(sys.argv[2]))
 """
 """The child finds what its parent finds, however that was started."""
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+"""Where nothing else is said: as many runs as there are cores leave none for threads of libraries."""
+DRAWING = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from pathlib import Path
+from manipcli.batch.telling import draw
+draw(Path(sys.argv[2]), Path(sys.argv[3]))
+"""
+"""The picture of what a run left that did not come to its end."""
+DRAWING_TIME = 30.0
+"""[s] that drawing may take."""
 LAST_WORDS = 0.5
 """[s] that a process has to write down where it is, before it is ended."""
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
@@ -60,6 +74,7 @@ class Process:
                 stderr=output,
                 pass_fds=(childs.fileno(),),
                 start_new_session=True,  # no signal of a terminal reaches it: its parent decides
+                env={**ONE_THREAD, **os.environ},
             )
         childs.close()
         self.connection.send(job)
@@ -137,8 +152,10 @@ class Process:
             job.log.unlink(missing_ok=True)
         if outcome not in ("crashed", "hung"):
             job.output.unlink(missing_ok=True)
-        elif not job.output.stat().st_size:
-            job.output.unlink()
+        else:
+            self._draw_what_is_left()
+            if not job.output.stat().st_size:
+                job.output.unlink()
         kept = {path: str(path) if path.exists() else None for path in (job.log, job.partial, job.picture, job.output)}
         return CaseReport(
             case=job.case,
@@ -156,6 +173,18 @@ class Process:
             junit=end.junit,
             notes=end.notes,
         )
+
+    def _draw_what_is_left(self) -> None:
+        """The end of the log as far as it got, drawn where whatever went wrong cannot do so once more."""
+        if not self.job.partial.exists():
+            return
+        words = [json.dumps(sys.path), str(self.job.partial), str(self.job.picture)]
+        with suppress(subprocess.TimeoutExpired):
+            subprocess.run(
+                [sys.executable, "-c", DRAWING, *words],
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                timeout=DRAWING_TIME, check=False, start_new_session=True,
+            )  # fmt: skip
 
     def _last_line(self) -> str:
         lines = self.job.output.read_text("utf-8", "replace").splitlines()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from manipcli.batch.baseline import Change, Key, baseline_path, compared, measured, read_baseline
 from manipcli.batch.job import Job
 from manipcli.core.errors import Place
@@ -73,16 +76,23 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
     return worse, [f"better than the baseline: {one}" for one in changes if not one.worse]
 
 
-def draw(job: Job, at: float | None) -> None:
-    """The picture of a moment of the log, or of its end.
+def draw(
+    log: Path,
+    picture: Path,
+    *,
+    at: float | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> None:
+    """The picture of a moment of a log, `at` [s], or of its end.
 
     Raises:
         ManipcliError: the log shows nothing, or a mesh is not there.
     """
-    playback = open_playback(job.log, package_path=job.settings.package_path, allow_outside=job.settings.allow_outside)
+    playback = open_playback(log, package_path=package_path, allow_outside=allow_outside)
     with Shots(playback, size=SIZE) as shots:
         image = shots.at(playback.end if at is None else min(max(at, playback.start), playback.end))
-    write_whole(job.picture, png_bytes(image))
+    write_whole(picture, png_bytes(image))
 
 
 def write_page(job: Job, report: RunReport) -> None:

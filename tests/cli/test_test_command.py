@@ -175,6 +175,8 @@ def test_a_crash_of_native_code_costs_one_test(folder: Path) -> None:
     assert re.search(r"✗ crashed  a.yaml::a .* crashed by signal 11 \(SIGSEGV\); step 1 of 1, 'wait_1' at \d+\.", out)
     assert "✓ passed   b.yaml::b" in out
     assert "log: runs/test/a.mcap.partial" in out
+    assert "picture: runs/test/a.png" in out
+    assert (folder / "runs" / "test" / "a.png").read_bytes().startswith(b"\x89PNG")
     assert "output: runs/test/a.txt" in out
     assert "Segmentation fault" in (folder / "runs" / "test" / "a.txt").read_text()
     assert parse(folder / "out.xml").getroot().find(".//error[@type='crashed']") is not None
