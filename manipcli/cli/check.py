@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import Format
+from manipcli.cli.options import AllowOutside, Format, PackagePath
 from manipcli.core.errors import ExitCode
 
 
@@ -18,6 +18,8 @@ def check(
     ],
     *,
     format_: Format = "text",
+    package_path: PackagePath = None,
+    allow_outside: AllowOutside = False,
 ) -> ExitCode:
     """Check files: all findings, nothing simulated.
 
@@ -26,7 +28,7 @@ def check(
     from manipcli import pipeline
     from manipcli.report import json, text
 
-    findings = pipeline.check_files(tuple(files))
+    findings = pipeline.check_files(tuple(files), package_path=tuple(package_path or ()), allow_outside=allow_outside)
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
     console.result(render(findings, names))

@@ -24,23 +24,36 @@ from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.tree import Plain
 
 
-def check_files(paths: Sequence[Path]) -> tuple[Finding, ...]:
-    """Every finding of every file; a task is checked with the robot and controllers files that it names."""
-    return tuple(finding for path in paths for finding in _findings(path))
+def check_files(
+    paths: Sequence[Path], *, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> tuple[Finding, ...]:
+    """Every finding of every file; a task is checked with the robot and controllers files that it names.
+
+    Args:
+        paths: task, robot and controllers files, URDF and xacro.
+        package_path, allow_outside: where packages are, and whether a file may lie outside of them.
+    """
+    return tuple(finding for path in paths for finding in _findings(path, package_path, allow_outside))
 
 
-def _findings(path: Path) -> tuple[Finding, ...]:
+def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> tuple[Finding, ...]:
     if path.suffix.lower() in DESCRIPTIONS:
-        return inspect(path).examination.findings
+        return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings
     try:
         kind = load.kind_of(path)
         if kind == "task":
-            task = load_task(path)
+            task = load_task(path, package_path=package_path, allow_outside=allow_outside)
             return (*task.findings, *gain_findings(task))
         if kind == "controllers":
             return load.load_controllers(path).findings
         file = load.load_robot(path)
-        robot, notes = build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))
+        robot, notes = build_robot(
+            file.spec,
+            file=path,
+            package_path=package_path,
+            allow_outside=allow_outside,
+            place=lambda loc: file.place(*loc),
+        )
         return (*file.findings, *notes, *posture_findings(file, robot))
     except InvalidInput as invalid:
         return invalid.findings

@@ -212,7 +212,7 @@ def test_a_run_tells_one_line_a_step_where_there_is_no_terminal(
 def test_check_fails_on_errors_only(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], severity: str, code: int
 ) -> None:
-    pipeline.check_files = lambda _: (Finding("TASK1", "x", severity=severity),)
+    pipeline.check_files = lambda _, **__: (Finding("TASK1", "x", severity=severity),)
     assert main(["check", "a.yaml", "b.yaml"]) == code
     assert "2 files checked" in capsys.readouterr().out
     assert main(["check", "a.yaml", "--format", "json"]) == code
