@@ -159,7 +159,6 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
 
 @pytest.mark.slow
 def test_two_workers_share_the_tasks(project: pytest.Pytester) -> None:
-    pytest.importorskip("xdist")
     result = project.runpytest_subprocess(*LOADED, "-n", "2", "-v")
     result.assert_outcomes(passed=1, failed=2)
     assert "again: manipcli run tasks/late.yaml" in result.stdout.str()
