@@ -122,6 +122,8 @@ def check_goal(goal: TrajectoryGoal, facts: JointFacts, accepted: Acceptance, no
         GoalRejected: see `JointTrajectoryController.send_goal`.
     """
     trajectory = goal.trajectory
+    if not isinstance(trajectory, JointTrajectory):
+        raise GoalRejected("CTRL129", f"a goal of {type(trajectory).__name__}; expected a JointTrajectory")
     names = _check_joints(trajectory, facts, accepted)
     if trajectory.orders is not None:
         k = int(np.flatnonzero(trajectory.orders != trajectory.orders[0])[0])

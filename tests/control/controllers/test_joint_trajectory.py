@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from manipcli.control.action import ErrorCode
+from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
@@ -371,3 +371,8 @@ def test_who_gives_no_grace_is_told_so(goal_time, told):
         made.update(tick * PERIOD, PERIOD, state(START))
     assert handle.result.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
     assert told in handle.result.text
+
+
+def test_what_is_no_trajectory_is_no_goal():
+    with pytest.raises(GoalRejected, match="a goal of list; expected a JointTrajectory"):
+        make().send_goal([1.0, 2.0, 3.0])
