@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -139,6 +140,25 @@ def test_spans_of_any_length_give_the_same(cuts: tuple[int, ...]) -> None:
     expect = expectations(*(one for one, _, _ in SCOPES), *more)
     one, many = (judge(recording(WALK, c), expect=expect, robot=ROBOT, scene=SCENE) for c in ((), cuts))
     assert one == many
+
+
+def test_memory_does_not_grow_with_the_length_of_a_recording() -> None:
+    """Spans of half a second are made when they are asked for; every scope is asked."""
+    expect = expectations(*(one for one, _, _ in SCOPES))
+
+    def peak(spans: int) -> int:
+        (first,) = recording().spans
+        late = (
+            replace(first, states=replace(first.states, time=TIMES + k * T * PERIOD).map(np.copy)) for k in range(spans)
+        )
+        tracemalloc.start()
+        judge(recording(spans=late), expect=expect, robot=ROBOT, scene=SCENE)
+        _, most = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return most
+
+    peak(2)
+    assert peak(24) < 1.3 * peak(6)
 
 
 def test_what_counts_from_a_start_counts_from_that_of_the_step() -> None:
