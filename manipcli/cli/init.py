@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Final
@@ -48,7 +49,7 @@ def init(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
         console.result(f"written: {path}")
-    enter = "" if folder.resolve() == Path.cwd() else f"cd {quote(str(folder))} && "
+    enter = "" if Path(os.path.realpath(folder)) == Path.cwd() else f"cd {quote(str(folder))} && "
     console.talk(f"next: {enter}manipcli test")
     return ExitCode.PASSED
 
@@ -58,7 +59,7 @@ def _files(folder: Path) -> dict[Path, bytes]:
     from manipcli import pipeline
     from manipcli.report.json import dumps
 
-    name = (folder.resolve().name or "tasks").encode()
+    name = (Path(os.path.realpath(folder)).name or "tasks").encode()
     files = {
         folder / path: (TEMPLATES / template).read_bytes().replace(b"PROJECT", name) for path, template in FILES.items()
     }

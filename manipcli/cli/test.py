@@ -11,6 +11,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
+from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 if TYPE_CHECKING:
@@ -83,7 +84,8 @@ def test(
             silence=max(seconds(silence), 0.1),
             timeout=limit if limit > 0.0 else None,
         )
-        _check_outputs(junit, report)
+        check_outputs(("--junit", junit), reads=paths or ())
+        _check_folder(report)
         chosen = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
         at_once = min(jobs or _cores(), max(1, len(chosen)))
         lines = _Lines(chosen, text=format_ == "text", quiet=quiet)
@@ -200,15 +202,12 @@ def _write(suite: Suite, junit: Path | None, report: Path | None) -> None:
         console.talk(f"written: {report / 'index.html'}")
 
 
-def _check_outputs(junit: Path | None, report: Path | None) -> None:
+def _check_folder(report: Path | None) -> None:
     """Before anything is run.
 
     Raises:
-        InvalidInput: a file cannot be written where it should be.
+        InvalidInput: a file is where the folder should be.
     """
-    if junit is not None and (junit.is_dir() or not junit.parent.is_dir()):
-        what = "is a folder" if junit.is_dir() else f"there is no folder '{junit.parent}'"
-        raise InvalidInput([Finding("USE086", f"--junit '{junit}': {what}")])
     if report is not None and report.exists() and not report.is_dir():
         raise InvalidInput([Finding("USE086", f"--report '{report}': this is a file; a folder was expected")])
 
