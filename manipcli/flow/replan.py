@@ -108,7 +108,7 @@ class Measured:
                 k = int(np.argmax(off))
                 here, there = now.position[columns][k], planned.position[columns][k]
                 unit = "m" if robot.joint(names[k]).type == "prismatic" else "rad"
-                yield f"joint '{names[k]}' is at {here:.4g} {unit} and not at {there:.4g} {unit}"
+                yield f"joint '{names[k]}' is at {round(here, 4):g} {unit} and not at {round(there, 4) + 0.0:g} {unit}"
 
     def _held(self, planned: Situation, now: Situation) -> Iterator[str]:
         before, after = planned.carried, now.carried
@@ -134,7 +134,7 @@ class Measured:
             name = body.name
             if name in held or (name not in named and name in where and where[name] == planned_where.get(name)):
                 continue
-            away, turn = _between(self._pose(planned, name), self._pose(now, name))
+            away, turn = _between(self._pose(planned, name), self._pose(now, name), round_as=body.kind)
             if away > self._limits.position or turn > self._limits.rotation:
                 yield f"'{name}' is {_mm(away)} and {_deg(turn)} from where it was to be"
 
@@ -171,10 +171,15 @@ def _bounds(robot: RobotModel) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _between(a: Transform, b: Transform) -> tuple[float, float]:
-    """Distance [m] of two poses, and the angle [rad] between them."""
+def _between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, float]:
+    """Distance [m] of two poses, and the angle [rad] between them, but for turns that do not show on a round body."""
+    away = float(np.linalg.norm(a.p - b.p))
+    if round_as == "sphere":
+        return away, 0.0
     x, y, z, w = quat_from_matrix(a.R.T @ b.R)
-    return float(np.linalg.norm(a.p - b.p)), 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
+    if round_as in ("cup", "cylinder"):
+        return away, 2.0 * math.asin(min(1.0, math.hypot(x, y)))  # between the two axes
+    return away, 2.0 * math.atan2(math.hypot(x, y, z), abs(w))
 
 
 def _texts(value: Plain | tuple[object, ...] | object) -> set[str]:

@@ -41,6 +41,7 @@ class Watching:
             if live.absent(watch.condition) is None
         ]
         self._probes: dict[int, Probe] = {}
+        self._ended: set[str] = set()
         self.broken: Broken | None = None
         """The first that was broken."""
         for k, watch, name in self._watches:
@@ -55,8 +56,9 @@ class Watching:
 
     def step_ended(self, step: str) -> None:
         """The last tick was the last of a step."""
+        self._ended.add(step)
         for k, watch, _ in self._watches:
-            if watch.steps and step == watch.steps[-1] and k in self._probes:
+            if watch.steps and self._ended.issuperset(watch.steps) and k in self._probes:
                 self._live.close(self._probes.pop(k))
 
     def _open(self, k: int, watch: WatchSpec, name: str) -> None:

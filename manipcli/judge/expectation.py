@@ -21,7 +21,7 @@ from manipcli.model.condition import Condition, Problem, Setting, World
 from manipcli.model.formula import absent, opened, problems, scopes
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, opposite
-from manipcli.spec.condition import END, ExpectationSpec
+from manipcli.spec.condition import END, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
@@ -56,10 +56,13 @@ def when(spec: ExpectationSpec, steps: Sequence[StepOutcome], seam: Seams) -> Wh
 
 def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | NotEvaluated:
     known = {step.id: step for step in steps}
+    ran = {step.id for step in steps if step.started is not None}
     intervals = []
     for name in spec.steps or (spec.at or "",):
         step = known.get(name)
         if step is None or step.started is None:
+            if isinstance(spec, WatchSpec) and any(one in ran for one in spec.steps):
+                continue  # it may be this that ended the run
             return NotEvaluated(f"step '{name}' never ran")
         if spec.at is not None and step.ended is None:
             return NotEvaluated(f"step '{name}' never ended")

@@ -13,7 +13,7 @@ from manipcli.model.state import Contact
 from manipcli.plan.step import Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate import executor as executor_module
-from manipcli.simulate.executor import UNTIL_TICKS, Executor
+from manipcli.simulate.executor import REST, UNTIL_TICKS, Alarmed, Executor
 from manipcli.simulate.session import Session
 
 SessionOf = Callable[..., Session]
@@ -155,6 +155,49 @@ def test_a_hand_that_never_comes_to_an_end_is_given_up(
     assert end.outcome == "timeout"
     assert session.time == pytest.approx(0.2 + 2.0, abs=0.002)
     assert "misses it by 0.9" in end.text
+
+
+def test_an_alarm_ends_a_motion_a_wait_and_a_hold_in_the_tick_that_sets_it_off(session_of: SessionOf) -> None:
+    for act in (
+        lambda one: one.run(move(), until=None, deadline=None),
+        lambda one: one.wait(lambda _: False, deadline=9.0),
+        lambda one: one.hold(9.0),
+    ):
+        session = session_of()
+        executor = Executor(session, alarm=lambda state: "too late" if state.time >= 0.1 else "")
+        with pytest.raises(Alarmed, match="too late"):
+            act(executor)
+        assert session.ticks == 101
+
+
+def test_a_stop_cancels_what_is_on_and_holds_still_deaf_to_alarms(session_of: SessionOf) -> None:
+    session = session_of()
+    handles: list[Any] = []
+    executor = Executor(session, told=lambda _, one: handles.append(one), alarm=lambda s: "!" if s.time >= 0.25 else "")
+    with pytest.raises(Alarmed):
+        executor.run(move(), until=None, deadline=None)
+    assert [handle.status for handle in handles] == ["active"]
+    start = session.ticks
+    executor.stop()
+    assert [handle.status for handle in handles] == ["canceled"]
+    assert session.ticks - start == round(REST / session.period)
+    state = session.engine.read()
+    assert state.velocity[0] == 0.0
+    assert 0.24 < state.position[0] < 0.3  # half way, and a way to slow down
+
+
+def test_a_joint_that_fails_takes_the_rest_of_the_motion_with_it(session_of: SessionOf, scripted: Any) -> None:
+    """The slide does not follow; the hand, which would go on closing, is canceled."""
+
+    def swing(engine: Any) -> None:
+        engine.state.position[1:] = -0.5
+        engine.state.velocity[1:] = 1.0 if engine.tick % 40 < 20 else -1.0
+
+    handles: list[Any] = []
+    executor = Executor(session_of(scripted(swing)), told=lambda _, handle: handles.append(handle))
+    both = Motion("both", move().trajectory, close().grip, 0.5)
+    assert executor.run(both, until=None, deadline=None).outcome == "failed"
+    assert [handle.status for handle in handles] == ["aborted", "canceled"]
 
 
 def test_a_motion_for_which_there_is_no_controller_is_refused(session_of: SessionOf) -> None:
