@@ -38,6 +38,17 @@ class JointState:
     effort: Array
 
 
+def distinct(name: str, joints: Sequence[str]) -> tuple[str, ...]:
+    """The joints of controller `name`, at least one and each once.
+
+    Raises:
+        InvalidArgument: they are not.
+    """
+    if not joints or len(set(joints)) != len(joints):
+        raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
+    return tuple(joints)
+
+
 def refuse_not_finite(name: str, joints: Sequence[str], measured: JointState, time: float) -> None:
     """
     Raises:

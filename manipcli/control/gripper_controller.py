@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState, refuse_not_finite
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
 from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
@@ -77,12 +77,10 @@ class GripperController:
         compat: Compat | None = None,
     ) -> None:
         self.name = name
-        self.joints = tuple(joints)
+        self.joints = distinct(name, joints)
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        if n == 0 or len(set(self.joints)) != n:
-            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = None if interface == "position" else build_pid(name, self.joints, chosen, compat)
         self._default_fingers = self._parted(fingers)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
 from manipcli.control.course import POSITION, Course
 from manipcli.control.followed_goal import FollowedGoal, Then
 from manipcli.control.gains import build_pid, joint_gains
@@ -115,14 +115,12 @@ class JointTrajectoryController:
         positions_upsampling: bool = False,
     ) -> None:
         self.name = name
-        self.joints = tuple(joints)
+        self.joints = distinct(name, joints)
         if isinstance(command_interfaces, str):
             command_interfaces = (command_interfaces,)
         self.interfaces: tuple[Interface, ...] = tuple(command_interfaces)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        if n == 0 or len(set(self.joints)) != n:
-            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
         wrong = refused(command_interfaces, state_interfaces)
         if wrong is not None:
             raise InvalidArgument("CTRL107", f"controller '{name}': {wrong[0]}", hint=wrong[1])

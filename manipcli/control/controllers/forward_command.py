@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, distinct
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
@@ -50,12 +50,10 @@ class ForwardCommandController:
         self, *, name: str, joints: Sequence[str], interface: Interface, feed_forward: FeedForward = "none"
     ) -> None:
         self.name = name
-        self.joints = tuple(joints)
+        self.joints = distinct(name, joints)
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        if n == 0 or len(set(self.joints)) != n:
-            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
         self._interface = interface
         self._output = ControllerOutput.of(n, 1)
         self._wanted = np.zeros(n)

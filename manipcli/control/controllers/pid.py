@@ -29,6 +29,7 @@ from manipcli.control.controller import (
     FeedForward,
     Fit,
     JointState,
+    distinct,
     refuse_not_finite,
 )
 from manipcli.control.controllers.forward_command import finite_values
@@ -77,12 +78,10 @@ class PidController:
         compat: Compat | None = None,
     ) -> None:
         self.name = name
-        self.joints = tuple(joints)
+        self.joints = distinct(name, joints)
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
-        if n == 0 or len(set(self.joints)) != n:
-            raise InvalidArgument("CTRL101", f"controller '{name}': its joints must be distinct, and at least one")
         if tuple(led) not in (("position",), ("position", "velocity"), ("velocity",)):
             raise InvalidArgument("CTRL182", f"controller '{name}': {list(led)} cannot be led together")
         for joint in {*gains} ^ {*self.joints}:
