@@ -19,28 +19,25 @@ from collections.abc import Collection, Sequence
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
-from manipcli.control.controller import Controller, ControllerOutput, JointState
+from manipcli.control.controller import Controller, ControllerOutput
 from manipcli.control.feed_forward import FeedForwardLaw, NoDynamics
 from manipcli.control.lifecycle import (
     ControllerInfo,
-    ControllerState,
     SwitchResult,
     decided,
     names_of,
     strictness_of,
     ticks_between,
 )
+from manipcli.control.slot import Index, Slot
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.plan.step import Strictness, Switch
 from manipcli.spec.controllers import Interface
-
-Index = slice | npt.NDArray[np.intp]
 
 
 class JointVectors(Protocol):
@@ -52,53 +49,6 @@ class JointVectors(Protocol):
     def velocity(self) -> Array: ...
     @property
     def effort(self) -> Array: ...
-
-
-class _Slot:
-    """A loaded controller, where its joints stand in a joint vector, and what is measured there.
-
-    `measured` and `contact_force` are read-only parts of the vectors that the manager was given, or, where the joints
-    do not stand side by side, copies that are taken anew every tick (`gathered`: copy, vector). It is updated at the
-    tick `first`, at which it was activated, and at every `every`-th one from there.
-    """
-
-    __slots__ = (
-        "contact_force", "controller", "copies", "every", "first", "gathered", "index", "measured", "period",
-        "scattered", "state",
-    )  # fmt: skip
-
-    def __init__(self, controller: Controller, index: Index, every: int, period: float) -> None:
-        self.controller = controller
-        self.index = index
-        self.scattered = not isinstance(index, slice)
-        self.every = every
-        self.first = 0
-        self.period = every * period
-        self.state: ControllerState = "unconfigured"
-        none = np.zeros(0)
-        self.measured = JointState(none, none, none)
-        self.contact_force: Array | None = None
-        self.copies: tuple[tuple[Array, Index, Array], ...] = ()
-        self.gathered: list[tuple[Array, Array]] = []
-
-    def look(self, vectors: Sequence[Array], contact_force: Array | None) -> None:
-        """From now on at these vectors: position, velocity, effort."""
-        self.gathered = []
-        self.measured = JointState(*map(self._part, vectors))
-        self.contact_force = None if contact_force is None else self._part(contact_force)
-
-    def _part(self, vector: Array) -> Array:
-        part = vector[self.index]
-        if self.scattered:
-            self.gathered.append((part, vector))
-            part = part.view()
-        part.flags.writeable = False
-        return part
-
-    def gather(self) -> None:
-        """Copies what is measured now."""
-        for part, vector in self.gathered:
-            part[:] = vector[self.index]
 
 
 class ControllerManager:
@@ -135,8 +85,8 @@ class ControllerManager:
         self.outputs: tuple[ControllerOutput | None, ...] = ()
         self.faults: tuple[Finding, ...] = ()
         self._feed_forward = feed_forward if feed_forward is not None else NoDynamics()
-        self._slots: dict[str, _Slot] = {}
-        self._active: tuple[_Slot, ...] = ()
+        self._slots: dict[str, Slot] = {}
+        self._active: tuple[Slot, ...] = ()
         self._seen: tuple[Array, Array, Array] | None = None
         self._felt: Array | None = None
         self._tick = 0
@@ -188,7 +138,7 @@ class ControllerManager:
         index: Index = np.array(where, dtype=np.intp)
         if where and where == list(range(where[0], where[0] + len(where))):
             index = slice(where[0], where[0] + len(where))
-        self._slots[controller.name] = _Slot(controller, index, every, self.period)
+        self._slots[controller.name] = Slot(controller, index, every, self.period)
         self._rearrange()
 
     def configure(self, name: str) -> None:
@@ -278,7 +228,7 @@ class ControllerManager:
     def __getitem__(self, name: str) -> Controller:
         return self._slot(name).controller
 
-    def _slot(self, name: str) -> _Slot:
+    def _slot(self, name: str) -> Slot:
         if name not in self._slots:
             hint = did_you_mean(name, self._slots, kind="controllers")
             raise InvalidArgument("CTRL161", f"no controller '{name}' is loaded", hint=hint)
@@ -315,7 +265,7 @@ class ControllerManager:
         self._seen = self._felt = None
         self.outputs = tuple(s.controller.output if s.state == "active" else None for s in self._slots.values())
 
-    def _copies(self, slot: _Slot) -> tuple[tuple[Array, Index, Array], ...]:
+    def _copies(self, slot: Slot) -> tuple[tuple[Array, Index, Array], ...]:
         """What is copied into the command every tick: target, where in it, source."""
         command, output = self.command, slot.controller.output
         commands: dict[Interface, Array] = {
@@ -370,7 +320,7 @@ class ControllerManager:
                 target[index] = source
         return self.command
 
-    def _fail(self, slot: _Slot, cause: str, time: float) -> None:
+    def _fail(self, slot: Slot, cause: str, time: float) -> None:
         text = f"controller '{slot.controller.name}' failed in its update: {cause}"
         self.faults += (Finding("CTRL162", text),)
         slot.controller.deactivate(time, text)
