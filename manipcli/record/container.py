@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from manipcli.record.block import ChunkContent
-from manipcli.record.faults import RecordingFailed, RecordingRefused
+from manipcli.record.faults import PARTIAL, RecordingFailed, RecordingRefused
 
 if TYPE_CHECKING:
     from mcap.records import Attachment, AttachmentIndex, ChunkIndex, McapRecord, MetadataIndex, Schema
@@ -28,7 +28,6 @@ PROFILE = "ros2"
 LIBRARY = "manipcli"
 COMPRESSION_LEVEL = -1
 """zstd: a quarter less time than level 1 for 1 % more bytes."""
-PARTIAL = ".partial"
 MESSAGE_INDEX = 0x07
 _INDEX_HEAD = struct.Struct("<BQHI")
 

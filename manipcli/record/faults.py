@@ -31,6 +31,9 @@ class RecordingFailed(ManipcliError):
         )
 
 
+PARTIAL = ".partial"
+"""What the name of a log ends in until it is finished."""
+
 REPAIRABLE = "manipcli repair keeps what is sound of it"
 """The hint where a file is damaged."""
 
@@ -42,4 +45,7 @@ class BadRecording(InvalidInput):
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
         self.cause = cause
+        left = path.with_name(path.name + PARTIAL)
+        if hint is None and not path.exists() and left.is_file():
+            hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))

@@ -12,9 +12,9 @@ import numpy as np
 
 from manipcli.record.block import ChunkContent
 from manipcli.record.columns import PAYLOAD, Int, Places
-from manipcli.record.container import LIBRARY, PARTIAL, Container
+from manipcli.record.container import LIBRARY, Container
 from manipcli.record.contents import REPAIR
-from manipcli.record.faults import BadRecording, RecordingRefused
+from manipcli.record.faults import PARTIAL, BadRecording, RecordingRefused
 from manipcli.record.salvage import Damage, OpenChunk, Salvage
 
 if TYPE_CHECKING:

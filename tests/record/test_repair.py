@@ -349,3 +349,13 @@ def test_whatever_was_done_to_a_log_it_is_refused_or_repaired(small: Path, tmp_p
         with contextlib.suppress(BadRecording):
             snapshot(tmp_path / "bad.mcap", inventory(tmp_path / "bad.mcap"), 1.0)
     assert done > 80
+
+
+def test_the_name_of_a_run_that_was_killed_leads_to_what_it_left(small: Path) -> None:
+    small.rename(small.with_name("killed.mcap.partial"))
+    with pytest.raises(BadRecording) as caught:
+        read_recording(small.with_name("killed.mcap"))
+    assert "killed.mcap.partial is there" in str(caught.value.findings[0].hint)
+    with pytest.raises(BadRecording) as caught:
+        read_recording(small.with_name("never.mcap"))
+    assert caught.value.findings[0].hint is None
