@@ -29,7 +29,8 @@ def diff_logs(a: Path, b: Path, *, tolerance: float = 0.0) -> LogDiff:
     """
     if not (is_own(a) and is_own(b)):
         foreign = [path.name for path in (a, b) if not is_own(path)]
-        why = f"{' and '.join(foreign)} tells of no task: messages alone are compared"
+        verb = "tells" if len(foreign) == 1 else "tell"
+        why = f"{' and '.join(foreign)} {verb} of no task: messages alone are compared"
         return LogDiff(str(a), str(b), None, (), compare_logs(a, b, tolerance=tolerance), (why,), tolerance)
     recordings = open_recording(a), open_recording(b)
     sides = _side(recordings[0], a), _side(recordings[1], b)

@@ -121,7 +121,8 @@ def _answer(made: LogDiff) -> str:
         return f"{FAIL} different{more}: {counted(made.messages)}"
     within = f" within {made.tolerance:g}" if made.tolerance else ""
     if made.same:
-        return f"{PASS} no difference{within}: {number_of(made.messages.messages, 'message')}, and the verdict on them"
+        judged = ", and the verdict on them" if made.sides else ""
+        return f"{PASS} no difference{within}: {number_of(made.messages.messages, 'message')}{judged}"
     return f"{FAIL} different: the messages are the same{within}, the verdict on them is not"
 
 

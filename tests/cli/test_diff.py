@@ -104,5 +104,8 @@ def test_other_robots_are_told_and_what_is_no_run_is_compared_by_messages(
     out = capsys.readouterr().out
     assert "bare.mcap tells of no task: messages alone are compared" in out
     assert "✓ no difference" in out
+    assert "and the verdict on them" not in out
+    assert main(["diff", str(bare), str(bare)]) == 0
+    assert "bare.mcap and bare.mcap tell of no task" in capsys.readouterr().out
     (tmp_path / "text").write_text("hello")
     assert main(["diff", str(bare), str(tmp_path / "text")]) == 4
