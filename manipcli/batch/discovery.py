@@ -18,7 +18,7 @@ def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:
     Raises:
         InvalidInput: a path is not there, or is a file but no task.
     """
-    found: dict[Path, Path] = {}
+    found: dict[str, Path] = {}
     refused: list[Finding] = []
     for path in paths:
         if path.is_dir():
@@ -27,7 +27,7 @@ def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:
             below = [path]
             refused += _no_task(path)
         for file in below:
-            found.setdefault(file.resolve(), file)
+            found.setdefault(os.path.realpath(file), file)
     if refused:
         raise InvalidInput(refused)
     return tuple(found.values())

@@ -99,3 +99,10 @@ def test_a_file_that_cannot_be_read_is_a_case_with_its_findings(folder: Path) ->
     (finding,) = case.findings
     assert finding.place is not None
     assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 3)
+
+
+def test_a_link_to_itself_is_no_task(tmp_path: Path) -> None:
+    (tmp_path / "loop.yaml").symlink_to("loop.yaml")
+    assert task_files([tmp_path]) == ()
+    with pytest.raises(InvalidInput, match="symbolic links"):
+        task_files([tmp_path / "loop.yaml"])
