@@ -15,6 +15,7 @@ from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.switches import foreseen
+from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import Drawn
@@ -177,7 +178,9 @@ def unusable(
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
     claims = None if misclaimed or not controllers else Claims.of(controllers.spec)
-    return (*_unusable(task, robot, scene, claims), *_refused(task, robot), *claimed)
+    unusable = _unusable(task, robot, scene, claims)
+    warned = () if unusable else unjudged(task, robot, scene)
+    return (*unusable, *_refused(task, robot), *claimed, *warned)
 
 
 class Gathered:

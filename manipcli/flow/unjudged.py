@@ -1,0 +1,42 @@
+"""Expectations that a task leaves without evidence: told before the run, which they would fail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.errors import Finding
+from manipcli.model.condition import Seen, World
+from manipcli.model.conditions import CONDITIONS
+from manipcli.model.formula import absent
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import WorldState
+from manipcli.spec.located import Located
+from manipcli.spec.task import TaskSpec
+
+TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "references": "controller_state"}
+"""The words of `record: {topics: ...}` without which nothing is known of each."""
+
+
+def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
+    """A warning for each expectation that needs a topic which `record:` leaves out."""
+    left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
+    if not left_out:
+        return
+    nothing = np.zeros(())
+    start = WorldState(*([nothing] * 8))  # no condition is asked for a margin here
+    steps = tuple(step.id for step in task.spec.steps if step.id is not None)
+    world = World(robot, scene, start, unrecorded=left_out, steps=steps)
+    for k, expected in enumerate(task.spec.expect):
+        topic = absent(expected.condition, world, CONDITIONS)
+        if topic in left_out.values():
+            yield Finding(
+                "TASK234",
+                f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
+                task.place("expect", k),
+                hint=f"add {topic} to record.topics",
+                severity="warning",
+            )
