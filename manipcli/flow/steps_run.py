@@ -160,7 +160,7 @@ class StepsRun:
             kind="watch_broken",
             step="" if at is None else at.id,
             verb="" if at is None else at.verb,
-            outcome="",
+            outcome="failed",
             text=broken.text,
             place=self._task.log_place("watch", broken.index),
         )
