@@ -55,6 +55,12 @@ class Draft:
         """The present situation, with one body put elsewhere."""
         return replace(self._now, bodies=self._put({name: X_WO}))
 
+    def let_go(self, posture: str) -> Situation:
+        """The present situation with the hand at a pose, and empty; whatever is in the way of its joints."""
+        grip = self._grip(self._posture(posture))
+        empty = replace(self._now, carried=None, closed=False)
+        return empty if grip is None else empty.moved(self._with(grip.joints, grip.target))
+
     def joints(self, label: str, names: Sequence[str], target: Sequence[float], *, speed: float = 1.0) -> None:
         """Straight in joint space; joints of the hand are moved by their own controller at the same time.
 

@@ -20,7 +20,7 @@ from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_pose
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
@@ -50,7 +50,8 @@ class PlaceSpec(Model):
 def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
 
-    Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it.
+    Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
+    latter alone where the open hand is too near to it anyhow, as around one that sits deep in it.
     """
     planner.held(situation, spec.object)
     planner.free_start(situation)
@@ -68,8 +69,9 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
         return draft.plan()
 
+    near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
-    candidates = itertools.product((False, True), *ways)
+    candidates = itertools.product((True,) if near else (False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 
