@@ -66,17 +66,9 @@ class Live:
         self._filter = ContactFilter()
         self._contacts: list[Touching] = []
         n, m = len(world.robot.joint_names), len(world.scene.movable)
-        # Row 0 is the tick before the others.
-        self._rows = WorldState(
-            time=np.zeros(SLOW + 1),
-            position=np.zeros((SLOW + 1, n)),
-            velocity=np.zeros((SLOW + 1, n)),
-            effort=np.zeros((SLOW + 1, n)),
-            body_position=np.zeros((SLOW + 1, m, 3)),
-            body_quat_xyzw=np.zeros((SLOW + 1, m, 4)),
-            body_linear=np.full((SLOW + 1, m, 3), np.nan),
-            body_angular=np.full((SLOW + 1, m, 3), np.nan),
-        )
+        self._rows = WorldState.room(n, m, SLOW + 1)  # row 0 is the tick before the others
+        self._rows.body_linear[:] = self._rows.body_angular[:] = np.nan
+        self._numbers = self._rows.numbers
         self._before = self._rows.map(lambda a: a[0, ...])
         self._block = self._rows.map(lambda a: a[1:])
         self._first = True
@@ -90,16 +82,12 @@ class Live:
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
         """The next tick; the arrays may be reused afterwards."""
-        k, states = self._count, self._block
-        states.time[k] = self._moment(tick)
-        states.position[k] = state.position
-        states.velocity[k] = state.velocity
-        states.effort[k] = state.effort
-        states.body_position[k] = state.body_position
-        states.body_quat_xyzw[k] = state.body_quat_xyzw
-        for index, reference in self._references:
-            output = outputs[index]
-            reference.position[k] = np.nan if output is None else output.position
+        k = self._count
+        self._numbers[k + 1] = state.numbers
+        if self._probes:
+            for index, reference in self._references:
+                output = outputs[index]
+                reference.position[k] = np.nan if output is None else output.position
         self._count, self._next = k + 1, tick + 1
         if self._count == SLOW or self._next % SLOW == 0:
             self._ask()
@@ -149,15 +137,15 @@ class Live:
             start = self._next - self._count
             for probe in self._probes:
                 probe.look(moments, start)
-        rows, last = self._rows, self._count
-        for array in (rows.time, rows.position, rows.velocity, rows.effort, rows.body_position, rows.body_quat_xyzw):
-            array[0] = array[last]
+        self._numbers[0] = self._numbers[self._count]
         del self._contacts[:-1]
         self._count, self._first = 0, False
 
     def _moments(self) -> Moments:
         count = self._count
         whole = count == SLOW
+        first = self._next - count
+        self._rows.time[: count + 1] = [self._moment(tick) for tick in range(first - 1, self._next)]
         references = [reference for _, reference in self._references]
         return Moments(
             states=self._block if whole else self._block.map(lambda a: a[:count]),

@@ -72,8 +72,11 @@ class Onlooker:
         self._recorder.tick(tick, state, outputs)
         self._live.tick(tick, state, outputs)
         self._next_tick = tick + 1
-        if self._goals:
-            self._follow(tick)
+        due = tick % self._feedback_ticks == 0
+        for goal in self._goals:
+            if due or goal.handle.result is not None:
+                self._follow(tick)
+                break
         if self._progress is not None and tick % PROGRESS_TICKS == 0:
             self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
 

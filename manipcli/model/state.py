@@ -6,7 +6,7 @@ The same conditions read a live state (no leading axis) and a whole recording (a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ class WorldState:
         body_quat_xyzw: (..., m, 4).
         body_linear: (..., m, 3) [m/s] velocity of O (not of the centre of mass) in the world.
         body_angular: (..., m, 3) [rad/s] in the world.
+        block: (..., 3 n + 7 m) where positions to quaternions are views of one array; None where they are not.
     """
 
     time: Array
@@ -36,10 +37,31 @@ class WorldState:
     body_quat_xyzw: Array
     body_linear: Array
     body_angular: Array
+    block: Array | None = None
+
+    @classmethod
+    def room(cls, joints: int, bodies: int, *leading: int) -> WorldState:
+        """Zeros in one `block`, which a control tick can copy at once."""
+        n, m = joints, bodies
+        block = np.zeros((*leading, 3 * n + 7 * m))
+        poses = block[..., 3 * n :].reshape(*leading, m, 7)
+        position, velocity, effort = (block[..., k * n : (k + 1) * n] for k in range(3))
+        linear, angular = np.zeros((2, *leading, m, 3))
+        time = np.zeros(leading)
+        return cls(time, position, velocity, effort, poses[..., :3], poses[..., 3:], linear, angular, block)
+
+    @property
+    def numbers(self) -> Array:
+        """(..., 3 n + 7 m) position, velocity, effort, then position and quaternion of each body; not to be written."""
+        if self.block is not None:
+            return self.block
+        poses = np.concatenate((self.body_position, self.body_quat_xyzw), axis=-1)
+        flat = poses.reshape(*poses.shape[:-2], poses.shape[-2] * 7)
+        return np.concatenate((self.position, self.velocity, self.effort, flat), axis=-1)
 
     def map(self, change: Callable[[Array], Array]) -> WorldState:
         """The same with every array changed: `states.map(np.copy)`, `states.map(lambda a: a[-1])`."""
-        return WorldState(**{field.name: change(getattr(self, field.name)) for field in fields(self)})
+        return WorldState(*(change(getattr(self, name)) for name in self.__slots__ if name != "block"))
 
 
 class Contact(NamedTuple):

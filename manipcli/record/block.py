@@ -135,8 +135,8 @@ class Block:
         self._robot = robot
         self._period = period
         self._ticks = np.zeros(capacity, dtype=np.int64)
-        self._position, self._velocity, self._effort = (np.zeros((capacity, n)) for _ in range(3))
-        self._body_position, self._body_quat = np.zeros((capacity, m, 3)), np.zeros((capacity, m, 4))
+        self._states = WorldState.room(n, m, capacity)
+        self._numbers = self._states.numbers
         self._actuators = Drivetrain.of(robot)
         self._rows: list[Array | None] = []
         self._ids = {channel.topic: channel.id for channel in channels}
@@ -193,11 +193,7 @@ class Block:
         """Copies one tick; the caller may reuse its arrays. The block must not be full."""
         k = self.count
         self._ticks[k] = tick
-        self._position[k] = state.position
-        self._velocity[k] = state.velocity
-        self._effort[k] = state.effort
-        self._body_position[k] = state.body_position
-        self._body_quat[k] = state.body_quat_xyzw
+        self._numbers[k] = state.numbers
         for rows, output in zip(self._rows, outputs, strict=True):
             if rows is not None:
                 rows[k] = np.nan if output is None else output.rows
@@ -214,19 +210,19 @@ class Block:
         return self._join(times, picked, sorted(singles, key=lambda single: single.ns))
 
     def _measured(self, at: Ticks) -> list[Array]:
-        return [self._position[at], self._velocity[at], self._effort[at]]
+        return [self._states.position[at], self._states.velocity[at], self._states.effort[at]]
 
     def _frames(self, at: Ticks) -> list[Array]:
-        X_position, X_quat = relative_batch(self._robot, self._position[at])
+        X_position, X_quat = relative_batch(self._robot, self._states.position[at])
         links = np.concatenate((X_position, X_quat), axis=2)
-        bodies = np.concatenate((self._body_position[at], self._body_quat[at]), axis=2)
+        bodies = np.concatenate((self._states.body_position[at], self._states.body_quat_xyzw[at]), axis=2)
         return [*links.swapaxes(0, 1), *bodies.swapaxes(0, 1)]
 
     def _state(self, of: _ControllerRows, at: Ticks) -> list[Array]:
         return of.state(at, *self._measured(at))
 
     def _errors(self, of: _ControllerRows, at: Ticks) -> list[Array]:
-        return of.errors(at, self._position[at], self._velocity[at])
+        return of.errors(at, *self._measured(at)[:2])
 
     def _join(self, times: Times, picked: Sequence[Places], singles: Sequence[Single]) -> ChunkContent:
         """Rows and singles in the order of time, and where each message stands.

@@ -29,16 +29,10 @@ class KinematicEngine:
         ]
         self._version = -1
         self._commanded = np.zeros(n, dtype=np.bool_)
-        self._state = WorldState(
-            time=np.zeros(()),
-            position=np.array(settings.start),
-            velocity=np.zeros(n),
-            effort=np.zeros(n),
-            body_position=np.array([body.X_WO.p for body in scene.movable]).reshape(m, 3),
-            body_quat_xyzw=np.array([body.X_WO.quat_xyzw for body in scene.movable]).reshape(m, 4),
-            body_linear=np.zeros((m, 3)),
-            body_angular=np.zeros((m, 3)),
-        )
+        state = self._state = WorldState.room(n, m)
+        state.position[:] = settings.start
+        for k, body in enumerate(scene.movable):
+            state.body_position[k], state.body_quat_xyzw[k] = body.X_WO.p, body.X_WO.quat_xyzw
 
     def read(self, *, velocities: bool = True) -> WorldState:
         return self._state

@@ -8,8 +8,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
-import numpy as np
-
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
@@ -68,19 +66,8 @@ class PybulletEngine:
         ]
         self._start(robot, settings)
         n, m = len(self._joints), len(self._movable)
-        poses = np.zeros(2 * n + 7 * m)
-        bodies = poses[2 * n :].reshape(m, 7)
-        self._buffer, self._pack = poses.data.cast("B"), struct.Struct(f"{poses.size}d").pack_into
-        self._state = WorldState(
-            time=np.zeros(()),
-            position=poses[:n],
-            velocity=poses[n : 2 * n],
-            effort=np.zeros(n),
-            body_position=bodies[:, :3],
-            body_quat_xyzw=bodies[:, 3:],
-            body_linear=np.zeros((m, 3)),
-            body_angular=np.zeros((m, 3)),
-        )
+        state = self._state = WorldState.room(n, m)
+        self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
         self._pairs: set[Pair] = NONE
         self._substeps = settings.substeps
 
@@ -135,6 +122,7 @@ class PybulletEngine:
         states = p.getJointStates(self._robot, self._joints, client)
         numbers = [s[0] for s in states]
         numbers += [s[1] for s in states]
+        numbers += self._motors.efforts(states)
         for k, offset, turned in self._movable:
             position, quat = p.getBasePositionAndOrientation(k, client)
             if turned is not None:
@@ -142,12 +130,6 @@ class PybulletEngine:
             numbers += position if offset is None else _minus(position, _rotated(quat, offset))
             numbers += quat
         self._pack(self._buffer, 0, *numbers)
-        motors = self._motors
-        if motors.measures:
-            state.effort[:] = [s[3] for s in states]
-            state.effort[motors.torques_at] += motors.applied[motors.torques_at]
-        else:
-            state.effort[:] = motors.applied
         if velocities:
             for row, (k, offset, _) in enumerate(self._movable):
                 linear, angular = p.getBaseVelocity(k, client)

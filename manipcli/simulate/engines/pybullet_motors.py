@@ -11,11 +11,8 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Final
 
-import numpy as np
-
 from manipcli.control.actuation import motor_effort_limits
 from manipcli.control.command import JointCommand, Mode
-from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 
 UNLIMITED_EFFORT: Final = 1e6
@@ -27,11 +24,6 @@ POSITION_TIME: Final = 0.01
 
 class Motors:
     """What the moving joints of one robot obey.
-
-    Attributes:
-        applied: (n) the efforts that act besides the motors' own [N m or N].
-        measures: whether there are motors, whose efforts Bullet tells.
-        torques_at: which joints `applied` is for.
 
     Args:
         p, client, body: PyBullet, its world, the robot in it.
@@ -49,9 +41,9 @@ class Motors:
         limits = [joint.limits for joint in robot.moving_joints]
         self._velocities = [math.inf if limit.velocity is None else limit.velocity for limit in limits]
         self._version = -1
-        self.applied: Array = np.zeros(len(self._joints))
-        self.measures = False
-        self.torques_at: slice | list[int] = []
+        self._applied = [0.0] * len(self._joints)  # besides the motors' own
+        self._measures = False
+        self._torques_at: list[int] = []
         self._torque_joints: list[int] = []
         self._torques: list[float] = []
         self._motors: list[tuple[int, int, Mode]] = []
@@ -62,10 +54,13 @@ class Motors:
         if command.version != self._version:
             self._obey(command)
         p, client = self._p, self._client
-        if self._torque_joints:
-            at = self.torques_at
-            self.applied[at] = command.effort[at]
-            self._torques = self.applied[at].tolist()
+        if len(self._torques_at) == len(self._joints):
+            self._torques = self._applied = command.effort.tolist()
+        elif self._torques_at:
+            efforts = command.effort.tolist()
+            self._torques = [efforts[k] for k in self._torques_at]
+            for k in self._torques_at:
+                self._applied[k] = efforts[k]
         for row, joint, mode in self._motors:
             if mode == "position":
                 p.setJointMotorControl2(
@@ -89,17 +84,22 @@ class Motors:
                     physicsClientId=client,
                 )
 
+    def efforts(self, states: Sequence[tuple[float, float, tuple[float, ...], float]]) -> list[float]:
+        """(n) what acts on each joint [N m or N]: commanded, and done by its motor as Bullet's joint states say."""
+        if not self._measures:
+            return self._applied
+        return [state[3] + applied for state, applied in zip(states, self._applied, strict=True)]
+
     def _obey(self, command: JointCommand) -> None:
         """What each joint obeys has changed: motors on or off."""
         self._version = command.version
         modes = command.modes
-        torques = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
-        self.torques_at = slice(None) if len(torques) == len(modes) else torques
-        self._torque_joints = [self._joints[k] for k in torques]
-        self._torques = [0.0] * len(torques)
+        self._torques_at = [k for k, mode in enumerate(modes) if mode in ("effort", "position")]
+        self._torque_joints = [self._joints[k] for k in self._torques_at]
+        self._torques = [0.0] * len(self._torques_at)
         self._motors = [(k, self._joints[k], mode) for k, mode in enumerate(modes) if mode in ("position", "velocity")]
-        self.measures = bool(self._motors) or "brake" in modes
-        self.applied[:] = 0.0
+        self._measures = bool(self._motors) or "brake" in modes
+        self._applied = [0.0] * len(modes)
         for k, mode in enumerate(modes):
             if mode == "brake":
                 self._brake(k)
