@@ -51,6 +51,12 @@ class Draft:
         """What was drafted."""
         return StepPlan(motions=tuple(self._motions), end=self._now)
 
+    def copy(self) -> Draft:
+        """To go on from here in several ways."""
+        other = Draft(self._planner, self._now, verb=self._verb)
+        other._motions = [*self._motions]
+        return other
+
     def with_body(self, name: str, X_WO: Transform) -> Situation:
         """The present situation, with one body put elsewhere."""
         return replace(self._now, bodies=self._put({name: X_WO}))

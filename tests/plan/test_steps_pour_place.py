@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+
+from manipcli.core.geometry import Transform
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
 Story = Any
@@ -14,6 +17,7 @@ Story = Any
 RADIUS, HEIGHT = 0.036, 0.110
 TRAY = np.array([0.70, 0.32])
 RIM = 0.4 + 0.05
+LEANING = {-7.0: 0.0, 7.0: 4.0}
 FACETS = 8e-4  # the cup's wall is 16 boxes, whose corners reach up to r (1 / cos(pi / 16) - 1) beyond its circle
 
 
@@ -242,3 +246,28 @@ def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any)
         panda.do("lift", {"object": "thing"})
         panda.do("place", {"object": "thing", "at": [0.5, 0.2], "on": "table"})
         np.testing.assert_allclose(panda.body("thing").p, [0.5, 0.2, 0.2 + height], atol=2e-4)
+
+
+@pytest.mark.parametrize("degrees", [-7.0, 7.0])
+def test_a_cup_that_turned_in_the_hand_is_put_down_on_its_edge_where_the_arm_would_touch_the_desk(
+    story: Story, degrees: float
+) -> None:
+    """Turned one way the arm behind the hand would come too low; the other way all is free."""
+    bench, before = story.bench, story.steps["place"][0]
+    cup, ball = (bench.scene.movable.index(bench.scene.body(name)) for name in ("cup", "ball"))
+    link = before.carried.link
+    X_WL = bench.planner.kinematics.forward(before.position, link)
+    turned = bench.body("cup", before) @ Transform.of(rpy=(0.0, np.radians(degrees), 0.0))
+    carried = replace(before.carried, X_LO=X_WL.inverse() @ turned)
+    bodies = list(before.bodies)
+    bodies[ball] = Transform.of(xyz=(0.7, 0.3, 0.42))
+    bodies[cup] = turned
+    bench.now = replace(before, bodies=tuple(bodies), carried=carried)
+    plan = bench.plan("place", {"object": "cup"})
+    stands = bench.body("cup", plan.end)
+    lean = np.degrees(np.arccos(stands.R[2, 2]))
+    assert lean == pytest.approx(LEANING[degrees], abs=0.01)
+    # The lowest point of the bottom is on the desk.
+    angle = np.linspace(0.0, 2 * np.pi, 3600)
+    bottom = stands.apply(np.column_stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), np.zeros(3600)]))
+    assert bottom[:, 2].min() == pytest.approx(0.4, abs=2e-4)

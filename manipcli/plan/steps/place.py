@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
@@ -30,6 +30,10 @@ from manipcli.spec.quantity import Angle, Length
 
 UPRIGHT = np.cos(np.radians(5.0))
 """What stands straighter than this (cosine of its tilt) can be placed on."""
+LEANS = tuple(np.radians([0.0, 2.0, 4.0]))
+"""How far [rad] an object may lean when it is let go."""
+POINTING = 0.5
+"""A tool that points less than this (cosine) along the ground points up or down."""
 
 
 class PlaceSpec(Model):
@@ -51,28 +55,67 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
 
     Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
-    latter alone where the open hand is too near to it anyhow, as around one that sits deep in it.
+    latter alone where the open hand is too near to it anyhow, as around one that sits deep in it. Where the arm would
+    come too near to something, the object is put down leaning a little, the arm higher: it stands up when let go.
     """
     planner.held(situation, spec.object)
     planner.free_start(situation)
     X_WG = _goal(spec, planner, situation)
     X_OT = planner.held_in_tool(situation).inverse()
-    X_WT = X_WG @ X_OT
+    lowered: dict[tuple[float, float], Draft | NotPlannable] = {}
 
-    def attempt(candidate: tuple[bool, float, float, float]) -> StepPlan:
-        grazing, clearance, retreat, slope = candidate
+    def lower(lean: float, clearance: float) -> Draft:
+        """Down at the place; found once for all ways to withdraw."""
+        X_WL = _leaning(planner.scene.body(spec.object), X_WG, X_OT, lean)
+        X_WT = X_WL @ X_OT
         draft = Draft(planner, situation)
         draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
-        support = planner.touching(draft.with_body(spec.object, X_WG), spec.object)
+        support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
+        return draft
+
+    def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
+        lean, grazing, clearance, retreat, slope = candidate
+        if (lean, clearance) not in lowered:
+            try:
+                lowered[lean, clearance] = lower(lean, clearance)
+            except NotPlannable as refusal:
+                lowered[lean, clearance] = refusal
+        down = lowered[lean, clearance]
+        if isinstance(down, NotPlannable):
+            raise NotPlannable(down.cause, hint=down.hint)
+        draft = down.copy()
         draft.open(spec.posture)
+        X_WT = planner.tool_pose(draft.now)
         draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
         return draft.plan()
 
     near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
-    candidates = itertools.product((True,) if near else (False, True), *ways)
+    leans = LEANS if _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
+    candidates = itertools.product(leans, (True,) if near else (False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
+
+
+def _horizontal(X_WT: Transform) -> Array | None:
+    """(3,) the way the tool points, along the ground; None where it points up or down."""
+    x, y, _ = X_WT.R[:, 2]
+    length = float(np.hypot(x, y))
+    return np.array([x, y, 0.0]) / length if length > POINTING else None
+
+
+def _leaning(body: Body, X_WG: Transform, X_OT: Transform, lean: float) -> Transform:
+    """X_WO of a body that stands at X_WG and is tilted on its edge by `lean` [rad], so that the arm behind the tool
+    is higher."""
+    h = _horizontal(X_WG @ X_OT)
+    if h is None or lean == 0.0:
+        return X_WG
+    foot = X_WG @ Transform.of(xyz=(body.centre[0], body.centre[1], body.centre[2] - body.size[2] / 2))
+    # z x h turns h downwards; the far edge stays on the ground.
+    R = matrix_from_axis_angle(np.cross([0.0, 0.0, 1.0], h), lean)
+    edge = max(body.size[0], body.size[1]) / 2 * np.sin(lean)
+    about = Transform.of(xyz=foot.p + np.array([0.0, 0.0, edge]), R=R) @ Transform.of(xyz=-foot.p)
+    return about @ X_WG
 
 
 def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
