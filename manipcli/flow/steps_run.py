@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from manipcli.control.action import GoalHandle
 from manipcli.core.errors import NotPlannable, SimulationFailed
-from manipcli.flow.live import Live, Probe
+from manipcli.flow.live import Live
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
 from manipcli.flow.plan import Plan, PlannedStep, plan_step
@@ -23,6 +24,7 @@ from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import Session
+from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.task import StepSpec
@@ -206,37 +208,46 @@ class StepsRun:
         return MotionEnd(end.outcome, end.text + found + _cut_since(saturated, self._session, ticks))
 
     def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
-        probe = self._until(step)
-        try:
-            return self._until_done(step, planned, before, None if probe is None else lambda _: probe.holds)
-        finally:
-            if probe is not None:
-                self._live.close(probe)
-
-    def _until_done(self, step: StepSpec, planned: PlannedStep, before: Situation, until: Until | None) -> MotionEnd:
-        """Every motion of the plan, which begins in `before`, and what the step waits for."""
+        """Every motion of the plan, which begins in `before`, and what the step waits for, asked while it waits."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
-        awaited = until is not None
+        condition = self._condition(step)
         texts = []
         for k, motion in enumerate(planned.plan.motions):
             self._event("phase_started", planned, "", motion.label)
             self._believed = after(planned.plan, before, done=k)
+            awaited = condition if motion.awaits else None
             over = deadline
-            if motion.awaits and until is not None and over is None:
+            if awaited is not None and over is None:
                 over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
-            end = self._executor.run(motion, until=until, deadline=over)
+            with self._asked(awaited) as until:
+                end = self._executor.run(motion, until=until, deadline=over)
             if end.outcome != "done":
                 return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
-            awaited = awaited and not motion.awaits
+            if motion.awaits:
+                condition = None
             texts += [end.text] if end.text else []
         self._believed = planned.plan.end
-        if awaited and until is not None:
+        if condition is not None:
             if deadline is None:
                 deadline = self._session.time + DEFAULT_UNTIL_TIME
-            end = self._executor.wait(until, deadline=deadline)
+            with self._asked(condition) as until:
+                assert until is not None  # there is a condition
+                end = self._executor.wait(until, deadline=deadline)
             if end.outcome != "done":
                 return end
         return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    @contextmanager
+    def _asked(self, condition: ConditionSpec | None) -> Iterator[Until | None]:
+        """Whether a condition holds, from now on; nothing to ask where there is none."""
+        if condition is None:
+            yield None
+            return
+        probe = self._live.open(condition)
+        try:
+            yield lambda _: probe.holds
+        finally:
+            self._live.close(probe)
 
     def _left_behind(self, planned: PlannedStep) -> MotionEnd | None:
         """A failure where the object that the step ends with in the hand is not there; None where it is."""
@@ -251,11 +262,9 @@ class StepsRun:
         where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
         return MotionEnd("failed", f"{where}: it slipped, or was never held")
 
-    def _until(self, step: StepSpec) -> Probe | None:
-        """The step's condition, asked from now on; None where there is none, or only physics could answer it."""
-        if step.until is None or self._live.absent(step.until) is not None:
-            return None
-        return self._live.open(step.until)
+    def _condition(self, step: StepSpec) -> ConditionSpec | None:
+        """What the step waits for; None where it waits for nothing, or only physics could answer it."""
+        return None if step.until is None or self._live.absent(step.until) is not None else step.until
 
     def _tell(self, text: str, *, detail: bool) -> None:
         if self._progress is not None:
