@@ -1,4 +1,4 @@
-"""Which contacts are worth a message: a set of pairs that changed at once, forces that changed at most 100 times a
+"""Which contacts are worth a message: a set of pairs that changed and a knock at once, other forces at most 100 times a
 simulated second."""
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ FORCE_PERIOD = 0.01
 
 FORCE_SHARE, FORCE_LEAST = 0.1, 0.05
 """A force has changed when it differs by more than a tenth of what was recorded and by more than 0.05 N."""
+
+KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
+"""A force that grew by more than half of what was recorded and 1 N besides is written at once."""
 
 DEPTH_LEAST = 2e-4
 """[m] A pair that is deeper by more than this than what was recorded is written at once."""
@@ -43,6 +46,8 @@ class ContactFilter:
         due = time - self._time >= FORCE_PERIOD - 1e-9
         for old, new in zip(self._last, found, strict=True):
             if new.distance < old.distance - DEPTH_LEAST:
+                return True
+            if new.force - old.force > KNOCK_LEAST + KNOCK_SHARE * old.force:
                 return True
             if due and abs(new.force - old.force) > FORCE_LEAST + FORCE_SHARE * old.force:
                 return True

@@ -485,6 +485,10 @@ def test_what_the_robot_touches_is_named_by_its_link(member: EngineMember, opens
     (contact,) = engine.robot_contacts()
     assert (contact.a, contact.b) == ("robot/pad", "wall")
     assert contact.force == pytest.approx(5.0, rel=0.02)
+    run(engine, 3, lambda *_: np.array([5.0]))
+    assert not engine.touches_changed()
+    run(engine, 2, lambda *_: np.array([40.0]))
+    assert engine.touches_changed(), "a knock is seen although it touches nothing else"
 
 
 # -- engines with physics: robots that they do not hold

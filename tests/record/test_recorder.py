@@ -378,10 +378,12 @@ def test_contact_filter_follows_pairs_at_once_and_forces_at_their_pace() -> None
     contacts = ContactFilter()
     assert contacts.changed(0.0, []) is None
     assert contacts.changed(0.001, touch(1.0)) == touch(1.0)
-    assert contacts.changed(0.002, touch(9.0)) is None, "a force alone waits"
+    assert contacts.changed(0.002, touch(1.4)) is None, "a force alone waits"
     assert contacts.changed(0.003, touch(1.0, -0.001)) == touch(1.0, -0.001), "a deeper contact does not"
-    assert contacts.changed(0.012, touch(9.0)) is None
-    assert contacts.changed(0.013, touch(9.0)) == touch(9.0)
+    assert contacts.changed(0.012, touch(1.4)) is None
+    assert contacts.changed(0.013, touch(1.4)) == touch(1.4)
+    assert contacts.changed(0.014, touch(9.0)) == touch(9.0), "nor does a knock"
+    assert contacts.changed(0.015, touch(1.4)) is None, "but its end"
     assert contacts.changed(0.030, touch(9.1)) is None, "nearly the same force"
     two = [Contact("b", "c", 1.0, 0.0), *touch(9.0)]
     assert contacts.changed(0.031, two) == [two[1], two[0]]

@@ -16,7 +16,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
-from manipcli.simulate.engines.pybullet_contacts import NONE, ContactMerger, Pair, Vector, touching_pairs
+from manipcli.simulate.engines.pybullet_contacts import ContactMerger, Pair, Vector, greatest_force, touching_pairs
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
@@ -25,6 +25,10 @@ from manipcli.simulate.engines.pybullet_wrench import WrenchSensor
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
+KNOCK: Final = 1.5
+"""A contact point that carries so many times the force of the strongest one, and `KNOCK_LEAST` more, is a knock."""
+KNOCK_LEAST: Final = 1.0
+"""[N]"""
 MAX_JOINTS: Final = 127
 """Moving and fixed; with one more `getJointState` fails, with thousands the process."""
 
@@ -68,7 +72,8 @@ class PybulletEngine:
         n, m = len(self._joints), len(self._movable)
         state = self._state = WorldState.room(n, m)
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
-        self._pairs: set[Pair] = NONE
+        self._pairs: set[Pair] = set()
+        self._greatest = 0.0
         self._substeps = settings.substeps
 
     def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
@@ -157,11 +162,13 @@ class PybulletEngine:
 
     def touches_changed(self) -> bool:
         points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
-        return (touching_pairs(points) if points else NONE) != self._pairs
+        if not points:
+            return bool(self._pairs)
+        return touching_pairs(points) != self._pairs or greatest_force(points) > KNOCK * self._greatest + KNOCK_LEAST
 
     def robot_contacts(self) -> tuple[Contact, ...]:
         points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
-        self._pairs = touching_pairs(points)
+        self._pairs, self._greatest = touching_pairs(points), greatest_force(points)
         return self._merge(points)
 
     def contacts(self) -> tuple[Contact, ...]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from operator import attrgetter
-from typing import Final
+from operator import attrgetter, itemgetter
 
 from manipcli.model.state import Contact
 
@@ -15,12 +14,17 @@ ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, flo
 """What PyBullet says of a contact point, up to its distance and normal force."""
 _sides = attrgetter("a", "b")
 
-NONE: Final[set[Pair]] = set()
+_force = itemgetter(9)
 
 
 def touching_pairs(points: tuple[ContactPoint, ...]) -> set[Pair]:
     """The pairs of links that touch."""
     return {point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0}
+
+
+def greatest_force(points: tuple[ContactPoint, ...]) -> float:
+    """[N] of a single point."""
+    return max(map(_force, points), default=0.0)
 
 
 class ContactMerger:
