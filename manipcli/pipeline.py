@@ -97,18 +97,22 @@ def run_task(
         progress.warned(doubts)
 
     where = log if log is not None else default_log(task)
-    verdict, simulated = _recorded(
+    verdict, simulated, planning = _recorded(
         task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
     )
     judged = time.perf_counter()
+    timing = Timing(
+        load=loaded - began,
+        plan=planned - loaded + planning,
+        simulate=simulated - planned - planning,
+        judge=judged - simulated,
+    )
     return RunReport(
         verdict=verdict,
         wall_time=judged - began,
-        real_time_factor=verdict.simulated_time / (simulated - planned),
+        real_time_factor=verdict.simulated_time / timing.simulate,
         log=str(where),
-        timing=Timing(
-            load=loaded - began, plan=planned - loaded, simulate=simulated - planned, judge=judged - simulated
-        ),
+        timing=timing,
     )
 
 
@@ -140,7 +144,7 @@ def verify_log(
     plan = plan_task(recorded.task)
     with TemporaryDirectory(prefix="manipcli-") as folder:
         again = Path(folder) / "again.mcap"
-        verdict, _ = _recorded(
+        verdict, _, _ = _recorded(
             recorded.task, plan, again, overwrite=False, embed_meshes=recorded.embedded, progress=progress
         )
         if any(finding.code == INTERRUPTED for finding in verdict.errors):
@@ -150,29 +154,30 @@ def verify_log(
 
 def _recorded(
     task: Task, plan: Plan, where: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress | None
-) -> tuple[Verdict, float]:
-    """Simulate into a log that is judged before it gets its name; the verdict, and when the simulation was over."""
+) -> tuple[Verdict, float, float]:
+    """Simulate into a log that is judged before it gets its name; the verdict, when the simulation was over, and how
+    long it was held up by planning."""
     manager = controllers(task, plan.planner.kinematics)
     recorder = open_log(task, plan, manager, where, overwrite=overwrite, embed_meshes=embed_meshes)
     try:
-        status, cause = _carried_out(task, plan, manager, recorder, progress)
+        status, cause, planning = _carried_out(task, plan, manager, recorder, progress)
         recorder.metadata("run", {"status": status, "cause": cause})
         simulated = time.perf_counter()
         verdict = judge_log(recorder.partial_path, being_written=True)
         recorder.finish(verdict_metadata(verdict))
     finally:
         recorder.close_partial()
-    return verdict, simulated
+    return verdict, simulated, planning
 
 
 def _carried_out(
     task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
-) -> tuple[str, str]:
-    """Simulate; how the run ended, and why where it did not go to its end."""
+) -> tuple[str, str, float]:
+    """Simulate; how the run ended, why where it did not go to its end, and how long [s] steps were planned again."""
     try:
-        simulate(task, plan, manager, recorder, progress)
+        planning = simulate(task, plan, manager, recorder, progress)
     except SimulationFailed as failure:
-        return "failed", str(failure)
+        return "failed", str(failure), 0.0
     except KeyboardInterrupt:
-        return "interrupted", "interrupted by the user"
-    return "complete", ""
+        return "interrupted", "interrupted by the user", 0.0
+    return "complete", "", planning

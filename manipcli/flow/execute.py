@@ -41,8 +41,13 @@ def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerM
     )
 
 
-def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None) -> None:
+def simulate(
+    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
+) -> float:
     """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
+
+    Returns:
+        How long [s] of that went into planning steps again, of the clock on the wall.
 
     Raises:
         SimulationFailed: the world does not stand still before the start, or leaves the plausible.
@@ -67,13 +72,15 @@ def simulate(task: Task, plan: Plan, manager: ControllerManager, recorder: Recor
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
             onlooker = Onlooker(recorder, live, progress, simulation.control_period)
             session.restart_clock(onlooker)
+            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal)
             try:
-                StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal).steps()
+                run.steps()
             finally:
                 for kind, ticks in saturated_ticks(session).items():
                     counts = {name: str(count) for name, count in ticks.items() if count}
                     if counts:
                         recorder.metadata(kind, counts)
+            return run.planning
     finally:
         engine.close()
 

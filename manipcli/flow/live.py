@@ -1,12 +1,14 @@
-"""A run as conditions see it while it goes on: the same moments, ten ticks at a time, that its recording will hold.
+"""A run as conditions see it while it goes on: the same moments that its recording will hold, some ticks at a time.
 
 Contacts pass the filter of the recorder and times are rounded as in the log, so that what a probe answers live is what
-judging the log gives for the same ticks.
+judging the log gives for the same ticks. Who listens to every answer is told at every tenth tick; the others are looked
+at when they are asked, or when there is no more room for what they have not seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -27,15 +29,27 @@ Told = Callable[[Moments, Reading], None]
 """Sees every answer of a probe: some ticks, and the margins on them. Neither is valid afterwards."""
 
 
+ROOM: Final = 500
+"""Ticks that are kept for probes that nobody asks."""
+
+
 class Probe:
     """A condition that is asked while the run goes on, from the tick at which it was opened."""
 
-    def __init__(self, spec: ConditionSpec, world: World, first: int, told: Told | None) -> None:
+    def __init__(
+        self, spec: ConditionSpec, world: World, first: int, told: Told | None, catch_up: Callable[[], None]
+    ) -> None:
         self._gauge = opened(spec, world, CONDITIONS)
         self._first = first
-        self._told = told
-        self.holds = False
-        """Whether it held at the last tick that was looked at."""
+        self._catch_up = catch_up
+        self._held = False
+        self.told = told
+
+    @property
+    def holds(self) -> bool:
+        """Whether it held at the last tick."""
+        self._catch_up()
+        return self._held
 
     def look(self, moments: Moments, start: int) -> None:
         """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""
@@ -44,13 +58,13 @@ class Probe:
             return
         shown = moments.part(skipped, len(moments.times))
         answer = self._gauge(shown)
-        self.holds = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
-        if self._told is not None:
-            self._told(shown, answer)
+        self._held = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
+        if self.told is not None:
+            self.told(shown, answer)
 
 
 class Live:
-    """Gathers ticks and asks the open probes at every tenth; an observer beside the recorder.
+    """Gathers ticks and asks the open probes; an observer beside the recorder.
 
     Args:
         world: of the run.
@@ -61,22 +75,22 @@ class Live:
     def __init__(self, world: World, controllers: Sequence[Controller], period: float) -> None:
         self._world = world
         self._period = period
-        self._probes: dict[Probe, str | None] = {}
+        self._probes: list[Probe] = []
         self._steps = {name: StepTime(name, None, None, "") for name in world.steps}
         self._filter = ContactFilter()
         self._contacts: list[Touching] = []
         n, m = len(world.robot.joint_names), len(world.scene.movable)
-        self._rows = WorldState.room(n, m, SLOW + 1)  # row 0 is the tick before the others
+        self._rows = WorldState.room(n, m, ROOM + 1)  # row 0 is the tick before the others
         self._rows.body_linear[:] = self._rows.body_angular[:] = np.nan
         self._numbers = self._rows.numbers
         self._before = self._rows.map(lambda a: a[0, ...])
-        self._block = self._rows.map(lambda a: a[1:])
         self._first = True
         self._references = [
-            (k, Reference(controller.joints, np.full((SLOW, len(controller.joints)), np.nan)))
+            (k, Reference(controller.joints, np.full((ROOM, len(controller.joints)), np.nan)))
             for k, controller in enumerate(controllers)
             if isinstance(recorded(controller), ControllerChannel)
         ]
+        self._listens = False
         self._count = 0
         self._next = 0
 
@@ -89,7 +103,7 @@ class Live:
                 output = outputs[index]
                 reference.position[k] = np.nan if output is None else output.position
         self._count, self._next = k + 1, tick + 1
-        if self._count == SLOW or self._next % SLOW == 0:
+        if self._count == ROOM or (self._listens and self._next % SLOW == 0):
             self._ask()
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
@@ -104,34 +118,36 @@ class Live:
             self._steps[step] = StepTime(step, self._moment(self._next), None, "")
 
     def step_ended(self, step: str, outcome: str) -> None:
-        """The last tick was the last of a step; what was to be asked until then is closed."""
-        for probe in [probe for probe, until in self._probes.items() if until == step]:
-            self.close(probe)
+        """The last tick was the last of a step."""
         self._steps[step] = StepTime(step, self._steps[step].started, self._moment(self._next), outcome)
 
     def absent(self, spec: ConditionSpec) -> str | None:
         """Why a condition cannot be asked in this run, or None."""
         return absent(spec, self._world, CONDITIONS)
 
-    def open(self, spec: ConditionSpec, *, step: str | None = None, told: Told | None = None) -> Probe:
+    def open(self, spec: ConditionSpec, *, told: Told | None = None) -> Probe:
         """Ask a condition from the next tick on, until it is closed.
 
         Args:
             spec: one that is not `absent`.
-            step: it is closed when this step ends.
             told: called with every answer.
         """
-        probe = Probe(spec, self._world, self._next, told)
-        self._probes[probe] = step
+        self._ask()
+        probe = Probe(spec, self._world, self._next, told, self._ask)
+        self._probes.append(probe)
+        self._listens = self._listens or told is not None
         return probe
 
     def close(self, probe: Probe) -> None:
         """Ask it about the ticks since it was asked last, and no more."""
-        del self._probes[probe]
-        if self._count:
-            probe.look(self._moments(), self._next - self._count)
+        self._ask()
+        self._probes.remove(probe)
+        self._listens = any(probe.told is not None for probe in self._probes)
 
     def _ask(self) -> None:
+        """All probes, about the ticks that they have not seen."""
+        if not self._count:
+            return
         if self._probes:
             moments = self._moments()
             start = self._next - self._count
@@ -143,14 +159,12 @@ class Live:
 
     def _moments(self) -> Moments:
         count = self._count
-        whole = count == SLOW
         first = self._next - count
         self._rows.time[: count + 1] = [self._moment(tick) for tick in range(first - 1, self._next)]
-        references = [reference for _, reference in self._references]
         return Moments(
-            states=self._block if whole else self._block.map(lambda a: a[:count]),
+            states=self._rows.map(lambda a: a[1 : count + 1]),
             before=None if self._first else self._before,
-            references=tuple(one if whole else Reference(one.joints, one.position[:count]) for one in references),
+            references=tuple(Reference(one.joints, one.position[:count]) for _, one in self._references),
             contacts=tuple(self._contacts),
             steps=tuple(self._steps.values()),
         )

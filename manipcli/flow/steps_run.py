@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time as wall_clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,7 +25,6 @@ from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import Session
-from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.task import StepSpec
@@ -83,6 +83,8 @@ class StepsRun:
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
         self._believed = plan.start
+        self.planning = 0.0
+        """How long [s] planning again took, of the clock on the wall."""
         self._failed = False
         self._over = False
         self._at: PlannedStep | None = None
@@ -183,12 +185,15 @@ class StepsRun:
         differences = self._measured.differences(planned_start, now, step)
         anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
         if anew:
+            began = wall_clock.perf_counter()
             try:
                 planned = replace(planned, plan=plan_step(self._plan.planner, step, now))
             except NotPlannable as refusal:
                 self._believed = now
                 why = f", where {'; '.join(differences)}" if differences else ""
                 return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}")
+            finally:
+                self.planning += wall_clock.perf_counter() - began
             why = "; ".join(differences) or "it is tried again"
             self._event("replanned", planned, "", why)
             self._tell(f"planned again: {why}", detail=True)
@@ -208,42 +213,39 @@ class StepsRun:
         return MotionEnd(end.outcome, end.text + found + _cut_since(saturated, self._session, ticks))
 
     def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
-        """Every motion of the plan, which begins in `before`, and what the step waits for, asked while it waits."""
+        """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
-        condition = self._condition(step)
         texts = []
-        for k, motion in enumerate(planned.plan.motions):
-            self._event("phase_started", planned, "", motion.label)
-            self._believed = after(planned.plan, before, done=k)
-            awaited = condition if motion.awaits else None
-            over = deadline
-            if awaited is not None and over is None:
-                over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
-            with self._asked(awaited) as until:
+        with self._asked(step) as until:
+            awaited = until is not None
+            for k, motion in enumerate(planned.plan.motions):
+                self._event("phase_started", planned, "", motion.label)
+                self._believed = after(planned.plan, before, done=k)
+                over = deadline
+                if motion.awaits and until is not None and over is None:
+                    over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
                 end = self._executor.run(motion, until=until, deadline=over)
-            if end.outcome != "done":
-                return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
-            if motion.awaits:
-                condition = None
-            texts += [end.text] if end.text else []
-        self._believed = planned.plan.end
-        if condition is not None:
-            if deadline is None:
-                deadline = self._session.time + DEFAULT_UNTIL_TIME
-            with self._asked(condition) as until:
-                assert until is not None  # there is a condition
+                if end.outcome != "done":
+                    return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
+                awaited = awaited and not motion.awaits
+                texts += [end.text] if end.text else []
+            self._believed = planned.plan.end
+            if awaited and until is not None:
+                if deadline is None:
+                    deadline = self._session.time + DEFAULT_UNTIL_TIME
                 end = self._executor.wait(until, deadline=deadline)
-            if end.outcome != "done":
-                return end
+                if end.outcome != "done":
+                    return end
         return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
-    def _asked(self, condition: ConditionSpec | None) -> Iterator[Until | None]:
-        """Whether a condition holds, from now on; nothing to ask where there is none."""
-        if condition is None:
+    def _asked(self, step: StepSpec) -> Iterator[Until | None]:
+        """Whether what the step waits for holds, asked from now on; None where it waits for nothing, or only physics
+        could answer it."""
+        if step.until is None or self._live.absent(step.until) is not None:
             yield None
             return
-        probe = self._live.open(condition)
+        probe = self._live.open(step.until)
         try:
             yield lambda _: probe.holds
         finally:
@@ -261,10 +263,6 @@ class StepsRun:
             return None
         where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
         return MotionEnd("failed", f"{where}: it slipped, or was never held")
-
-    def _condition(self, step: StepSpec) -> ConditionSpec | None:
-        """What the step waits for; None where it waits for nothing, or only physics could answer it."""
-        return None if step.until is None or self._live.absent(step.until) is not None else step.until
 
     def _tell(self, text: str, *, detail: bool) -> None:
         if self._progress is not None:

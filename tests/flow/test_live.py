@@ -104,7 +104,12 @@ class Watching(Live):
         super().step_started(step)
         if step == "lift_1":
             type(self).of_step = Answers()
-            self.open(OF_STEP, step=step, told=self.of_step.told)
+            self.probe = self.open(OF_STEP, told=self.of_step.told)
+
+    def step_ended(self, step: str, outcome: str) -> None:
+        super().step_ended(step, outcome)
+        if step == "lift_1":
+            self.close(self.probe)
 
 
 EXPECT: list[ConditionSpec] = []
