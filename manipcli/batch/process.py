@@ -11,6 +11,8 @@ import time
 from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from socket import SO_RCVTIMEO, SOL_SOCKET, socket
+from struct import pack
 
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
@@ -38,6 +40,8 @@ DRAWING_TIME = 30.0
 """[s] that drawing may take."""
 LAST_WORDS = 0.5
 """[s] that a process has to write down where it is, before it is ended."""
+HALF_SAID = 5.0
+"""[s] that a process may stop in the middle of a message, and take to be gone once it has said all."""
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
 
 
@@ -62,6 +66,8 @@ class Process:
         self._end: End | None = None
         self.connection: Connection[Job, Message]
         self.connection, childs = Pipe()
+        with socket(fileno=os.dup(self.connection.fileno())) as one:
+            one.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         job.output.parent.mkdir(parents=True, exist_ok=True)
         for stale in (job.log, job.partial, job.picture):
@@ -101,21 +107,22 @@ class Process:
                     self._end = message
                 else:
                     self.doing = message
-        except (EOFError, ConnectionError):
-            return self._gone(self._process.wait())
+        except BlockingIOError:
+            return self.give_up("it stopped in the middle of a message")
+        except (EOFError, OSError):  # also in the middle of a message
+            return self._gone()
         return None
 
-    def give_up(self) -> CaseReport:
-        """Ends the process, which is taking too long or is silent for too long."""
+    def give_up(self, why: str = "") -> CaseReport:
+        """Ends the process, which is taking too long or is silent for too long, or `why` else."""
         settings = self.job.settings
         over = settings.timeout is not None and self.elapsed >= settings.timeout
         limit = f"it took longer than {settings.timeout:g} s" if over else f"no progress for {settings.silence:g} s"
         self._process.send_signal(signal.SIGUSR1)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(LAST_WORDS)
-        except subprocess.TimeoutExpired:
-            self.end()
-        return self._report("hung", f"hung: {limit}; {self.doing}")
+        self.end()
+        return self._report("hung", f"hung: {why or limit}; {self.doing}")
 
     def end(self) -> None:
         """Ends the process; nothing is made of it."""
@@ -129,9 +136,11 @@ class Process:
         for left in (self.job.partial, self.job.log, self.job.output):
             left.unlink(missing_ok=True)
 
-    def _gone(self, code: int) -> CaseReport:
-        self.connection.close()
-        end = self._end
+    def _gone(self) -> CaseReport:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(HALF_SAID)
+        self.end()
+        code, end = self._process.returncode, self._end
         if end is None:
             if code < 0:
                 cause = f"crashed by {signal_name(-code)}"

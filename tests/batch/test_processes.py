@@ -61,6 +61,28 @@ def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -
     assert Path(report.output).read_text().splitlines() == ["before", "no physics here"]
 
 
+HALF = "os.write(int(sys.argv[-1]), (1000).to_bytes(4, 'big') + b'half')\n"
+
+
+def test_a_crash_in_the_middle_of_a_message_costs_one_run(tmp_path: Path) -> None:
+    one, other = sorted(run(jobs(tmp_path, f"{HALF}os.abort()", END)), key=lambda r: r.case.file)
+    assert (one.outcome, other.outcome) == ("crashed", "invalid")
+    assert "SIGABRT" in one.text
+
+
+def test_half_a_message_and_what_stays_after_the_end_hold_nobody_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("manipcli.batch.process.HALF_SAID", 0.3)
+    stays = f"{END}\nparent.close(); time.sleep(100)"
+    one, other = sorted(run(jobs(tmp_path, f"{HALF}time.sleep(100)", stays)), key=lambda r: r.case.file)
+    assert (one.outcome, one.text) == (
+        "hung",
+        "hung: it stopped in the middle of a message; step 1 of 1, 'lift_1' at 2.50 s",
+    )
+    assert (other.outcome, other.text) == ("invalid", "the task cannot be run")
+
+
 @pytest.mark.slow
 def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
     stuck = (
