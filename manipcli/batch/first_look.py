@@ -18,6 +18,8 @@ def looks_like_a_task(path: Path) -> bool:
     if path.suffix not in SUFFIXES or path.name.startswith("."):
         return False
     try:
+        if not path.is_file():  # opening a pipe would wait for who writes into it
+            return False
         with path.open("rb") as file:
             return _TASK.search(file.read(SNIFFED).removeprefix(b"\xef\xbb\xbf")) is not None
     except OSError:

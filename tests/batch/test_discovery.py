@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -99,6 +101,17 @@ def test_a_file_that_cannot_be_read_is_a_case_with_its_findings(folder: Path) ->
     (finding,) = case.findings
     assert finding.place is not None
     assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 3)
+
+
+def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "x.yaml")
+    hung = threading.Timer(5.0, lambda: os.close(os.open(tmp_path / "x.yaml", os.O_WRONLY | os.O_NONBLOCK)))
+    hung.start()  # ends a wait for who writes, so that this fails and does not hang
+    assert task_files([tmp_path]) == ()
+    with pytest.raises(InvalidInput, match="no regular file"):
+        task_files([tmp_path / "x.yaml"])
+    assert hung.is_alive()
+    hung.cancel()
 
 
 def test_a_link_to_itself_is_no_task(tmp_path: Path) -> None:
