@@ -84,7 +84,8 @@ def test(
             silence=max(seconds(silence), 0.1),
             timeout=limit if limit > 0.0 else None,
         )
-        check_outputs(("--junit", junit), reads=paths or ())
+        check_outputs(("--junit", junit))
+        _check_replaced(junit)
         _check_folder(report)
         chosen = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
         at_once = min(jobs or _cores(), max(1, len(chosen)))
@@ -200,6 +201,20 @@ def _write(suite: Suite, junit: Path | None, report: Path | None) -> None:
         report.mkdir(parents=True, exist_ok=True)
         write_whole(report / "index.html", render_page(suite, report).encode())
         console.talk(f"written: {report / 'index.html'}")
+
+
+def _check_replaced(junit: Path | None) -> None:
+    """Before anything is run: no file of the tasks, nor any other that somebody wrote, is replaced by a result.
+
+    Raises:
+        InvalidInput: there is a file, which is not JUnit XML.
+    """
+    if junit is not None and junit.is_file():
+        with junit.open("rb") as file:
+            head = file.read(4096)
+        if head and b"<testsuite" not in head:
+            message = f"--junit '{junit}': there is a file that is no JUnit XML; it is not replaced"
+            raise InvalidInput([Finding("USE089", message)])
 
 
 def _check_folder(report: Path | None) -> None:

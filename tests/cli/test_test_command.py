@@ -69,6 +69,26 @@ def test_wrong_usage_is_4_and_runs_nothing(folder: Path, capsys: pytest.CaptureF
     assert not (folder / "runs").exists()
 
 
+@pytest.mark.parametrize("name", ["a.yaml", "a.baseline.json", "robots/r.yaml"])
+def test_only_earlier_results_are_replaced_by_results(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    (folder / "robots").mkdir()
+    write(folder, "a")
+    (folder / name).write_text("task: a\nsteps: [\n")
+    assert main(["test", ".", "--junit", name]) == 4
+    assert f"error[USE089]: --junit '{name}': there is a file that is no JUnit XML" in capsys.readouterr().err
+    assert (folder / name).read_text() == "task: a\nsteps: [\n"
+
+
+def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
+    (folder / "out.xml").touch()
+    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    for _ in range(2):
+        assert main(["test", "--junit", "out.xml"]) == 4
+        assert parse(folder / "out.xml").getroot().get("errors") == "1"
+
+
 def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "b.yaml").write_text("task: b\nsteps: [\n")
     assert main(["test", "--github"]) == 4
