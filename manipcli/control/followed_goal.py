@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Literal
 
@@ -95,4 +96,5 @@ class FollowedGoal:
     def next_point(self, clock: float) -> int:
         """The point of its trajectory that comes next, or its last."""
         times = self.trajectory.times
-        return min(int(np.searchsorted(times, clock - self.begin + INSTANT, side="right")), len(times) - 1)
+        # bisect: numpy would copy all times first, where they are a column of something.
+        return min(bisect_right(times, clock - self.begin + INSTANT), len(times) - 1)

@@ -64,7 +64,7 @@ class GoalLog:
     def feedback(self, ns: int, number: int, feedback: Feedback) -> bytes:
         """The FeedbackMessage of the controller's action."""
         writer = CdrWriter()
-        writer.octets(goal_id(self.channel.name, number))
+        writer.octets(self._goals[number].id)
         if self.channel.action == "gripper_cmd":
             self._joint_state(writer, ns, feedback)
             return writer.data
