@@ -50,7 +50,7 @@ class Job:
 
     @property
     def log(self) -> Path:
-        """Named by the task file and the sample, so that no two jobs of a batch share it."""
+        """`tasks/pour.mcap` of `tasks/pour.yaml`, `tasks/pour@17.mcap` of its sample 17."""
         return self._beside(".mcap", self.settings.folder)
 
     @property
@@ -91,10 +91,17 @@ class Job:
         return shlex.join(words)
 
     def _beside(self, suffix: str, folder: Path) -> Path:
-        shown = Path(self.case.file).with_suffix("")
-        parts = ["__" if part == ".." else part for part in shown.parts if part != shown.anchor]
-        sample = "" if self.case.sample is None else f"-{self.case.sample}"
-        return folder.joinpath(*parts[:-1], f"{parts[-1]}{sample}{suffix}")
+        """Where a file of this job goes; no two jobs of a batch, nor the index of pages, share one.
+
+        Names of folders that are nothing but `_` grow by two, which leaves `_` for the root and `__` for `..`. In a
+        stem `@` is doubled; a single one begins a suffix other than `.yaml`, or a sample.
+        """
+        file = Path(self.case.file)
+        names = {file.anchor: "_", "..": "__"}
+        parts = [names.get(part, part if part.strip("_") else f"{part}__") for part in file.parts[:-1]]
+        kind = "" if file.suffix == ".yaml" and file.stem != "index" else f"@{file.suffix[1:]}"
+        sample = "" if self.case.sample is None else f"@{self.case.sample}"
+        return folder.joinpath(*parts, f"{file.stem.replace('@', '@@')}{kind}{sample}{suffix}")
 
 
 @dataclass(frozen=True, slots=True)

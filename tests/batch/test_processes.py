@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from manipcli.batch.job import Job, Settings
 from manipcli.batch.pool import run_jobs
@@ -203,13 +205,42 @@ def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:
     ("file", "sample", "log"),
     [
         ("tasks/pour.yaml", None, "tasks/pour.mcap"),
-        ("tasks/pour.yaml", 17, "tasks/pour-17.mcap"),
+        ("tasks/pour.yml", None, "tasks/pour@yml.mcap"),
+        ("tasks/pour.yaml", 17, "tasks/pour@17.mcap"),
         ("../other/pour.yaml", None, "__/other/pour.mcap"),
-        ("/abs/pour.v2.yaml", None, "abs/pour.v2.mcap"),
+        ("/abs/pour.v2.yaml", None, "_/abs/pour.v2.mcap"),
     ],
 )
-def test_every_case_has_a_log_of_its_own(file: str, sample: int | None, log: str) -> None:
+def test_a_log_is_named_by_its_task(file: str, sample: int | None, log: str) -> None:
     assert Job(Case(file, "pour", sample), Path(file), Settings()).log == Path("runs/test") / log
+
+
+STEMS = st.text("x1-@.ymal_", min_size=1, max_size=5).filter(lambda stem: not stem.startswith("."))
+FILES = st.builds(
+    lambda root, folders, stem, suffix: root + "".join(f"{name}/" for name in folders) + stem + suffix,
+    st.sampled_from(["", "/"]),
+    st.lists(st.sampled_from(["..", "_", "__", "___", "____", "t", "@", "x.yaml"]), max_size=2),
+    STEMS | st.sampled_from(["index", "x", "x@yml", "x@1", "x-1", "x.yml"]),
+    st.sampled_from([".yaml", ".yml"]),
+)
+CASES = st.tuples(FILES, st.none() | st.integers(0, 11))
+
+
+@given(CASES, CASES)
+@example(("x.yaml", None), ("x.yml", None))
+@example(("pour.yaml", 1), ("pour-1.yaml", None))
+@example(("pour.yml", 1), ("pour@yml.yaml", 1))
+@example(("/t/x.yaml", None), ("t/x.yaml", None))
+@example(("../x.yaml", None), ("__/x.yaml", None))
+@example(("index.yaml", None), ("index@yaml.yaml", None))
+def test_no_two_cases_share_a_file(one: tuple[str, int | None], other: tuple[str, int | None]) -> None:
+    settings = Settings(pages=Path("pages"))
+    a, b = (Job(Case(file, "t", sample), Path(file), settings) for file, sample in (one, other))
+    of_a, of_b = ({job.log, job.partial, job.picture, job.output, job.page} for job in (a, b))
+    assert len(of_a) == len(of_b) == 5
+    assert not {".." for path in of_a if ".." in path.parts}
+    assert Path("pages/index.html") not in of_a | of_b
+    assert of_a == of_b if one == other else not of_a & of_b
 
 
 def test_the_command_that_does_it_again_can_be_pasted_into_a_shell() -> None:
