@@ -11,6 +11,7 @@ import time
 from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
 
@@ -70,8 +71,7 @@ class Process:
             one.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
         job.output.parent.mkdir(parents=True, exist_ok=True)
-        for stale in (job.log, job.partial, job.picture):
-            stale.unlink(missing_ok=True)
+        _remove(job.log, job.partial, job.picture, job.page)
         with job.output.open("wb") as output:
             self._process = subprocess.Popen(
                 [*(command or (sys.executable, "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
@@ -133,8 +133,7 @@ class Process:
     def forget(self) -> None:
         """Ends the process, and removes what it left."""
         self.end()
-        for left in (self.job.partial, self.job.log, self.job.output):
-            left.unlink(missing_ok=True)
+        _remove(self.job.log, self.job.partial, self.job.picture, self.job.output, self.job.page)
 
     def _gone(self) -> CaseReport:
         with suppress(subprocess.TimeoutExpired):
@@ -198,3 +197,9 @@ class Process:
     def _last_line(self) -> str:
         lines = self.job.output.read_text("utf-8", "replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+
+
+def _remove(*files: Path | None) -> None:
+    for file in files:
+        if file is not None:
+            file.unlink(missing_ok=True)

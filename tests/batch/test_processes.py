@@ -184,10 +184,11 @@ def _pickled(report: RunReport) -> bytes:
 
 def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
-    for suffix in (".mcap", ".png", ".mcap.partial"):
+    for suffix in (".mcap", ".png", ".mcap.partial", ".html"):
         (tmp_path / "runs" / f"t0{suffix}").write_text("old")
-    (report,) = run(jobs(tmp_path, "sys.exit(3)"))
-    assert (report.log, report.picture) == (None, None)
+    (job,) = jobs(tmp_path, "sys.exit(3)")
+    (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "runs"))])
+    assert (report.log, report.picture, report.page) == (None, None, None)
 
 
 def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:
