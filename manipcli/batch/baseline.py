@@ -45,12 +45,23 @@ Measures = dict[Key, Measure]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A number that is not what it was; `new` None: it is not measured any more. `worse` by more than is tolerated."""
+    """A number that is not what it was; `new` None: it is not measured any more. `worse` by more than is tolerated.
+
+    The margin of a condition of several parts has the unit of the one that decides: where that is another one now, it
+    is told, and not worse.
+    """
 
     key: Key
     old: Measure
     new: Measure | None
     worse: bool
+
+    @property
+    def word(self) -> str:
+        """How the new one is, before the name of the old."""
+        if self.new is not None and self.new.unit != self.old.unit:
+            return "unlike"
+        return "worse than" if self.worse else "better than"
 
     def __str__(self) -> str:
         """`step 'pour_1' takes 7.1 s; its baseline is 6.5 s (8.9 % longer)`."""
@@ -59,6 +70,8 @@ class Change:
         old = self.old
         if self.new is None:
             return f"{name} is in the baseline ({old}) and was not measured; `manipcli bless` writes a new one"
+        if self.new.unit != self.old.unit:
+            return f"{name} {verb} {self.new}; its baseline is {old}: another part of it decides now"
         share = abs(self.new.value / self.old.value - 1.0) if self.old.value else math.inf
         by = f"{100.0 * share:{'.0f' if share > 0.1 else '.2g'}} % " if share < 10.0 else ""
         word = more if self.new.value > self.old.value else less
@@ -105,7 +118,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
 
 
 def compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> tuple[Change, ...]:
-    """What is worse or better than it was by more than is tolerated, and what is not measured any more.
+    """What is worse or better than it was by more than is tolerated, and what is not or cannot be compared any more.
 
     A time or energy may grow, and a margin shrink, by its share of the old value, and by what `FLOORS` says.
     """
@@ -118,7 +131,7 @@ def _compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> Iterato
     for key, before in old.items():
         now = new.get(key)
         if now is None or now.unit != before.unit:
-            yield Change(key, before, None, worse=True)
+            yield Change(key, before, now, worse=now is None)
             continue
         allowed = max(shares[key[0]] * abs(before.value), FLOORS.get(before.unit, 0.0))
         loss = before.value - now.value if key[0] == "margins" else now.value - before.value

@@ -73,7 +73,7 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
         return Place(job.case.file, found.line, found.column)
 
     worse = tuple(Trouble(f"worse than the baseline: {one}", place(one)) for one in changes if one.worse)
-    return worse, [f"better than the baseline: {one}" for one in changes if not one.worse]
+    return worse, [f"{one.word} the baseline: {one}" for one in changes if not one.worse]
 
 
 def draw(

@@ -95,4 +95,4 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     changes = compared(old, new, exact) if old is not None else ()
     if old is not None and not changes:
         return [*lines, f"  as before, within {', '.join(quantity(one, unit) for unit, one in FLOORS.items())}"]
-    return [*lines, *(f"  {'worse' if one.worse else 'better'} than before: {one}" for one in changes)]
+    return [*lines, *(f"  {one.word} before: {one}" for one in changes)]
