@@ -86,10 +86,10 @@ def simulate(
 
 
 def _world(task: Task, plan: Plan, session: Session) -> World:
-    """What live conditions are asked in; the present state is that at time 0."""
+    """What live conditions are asked in, which is what the log will tell the judge; now is time 0."""
     return World(
-        task.robot,
-        task.scene,
+        task.true.robot,
+        task.true.scene,
         start=session.engine.read().map(np.copy),
         physics=ENGINES[task.spec.simulation.engine].physics == "full",
         referenced=frozenset(name for one in session.manager.controllers if one.interfaces for name in one.joints),

@@ -282,7 +282,9 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
             continue
         if tried is not step:
             loc: Loc = ("steps", k, "on_fail", "with")
-            found += [(loc, replace(p, loc=())) for p in STEPS[tried.verb].check(tried.body, robot, scene)]
+            wrong = STEPS[tried.verb].check(tried.body, robot, scene)
+            wrong += () if tried.until is None else problems(tried.until, setting, CONDITIONS)
+            found += [(loc, replace(p, loc=())) for p in wrong]
     findings = [
         *again,
         *(

@@ -118,7 +118,7 @@ def log_places(recording: Recording, path: Path) -> Places:
         Written(known.get(str(step.id), "").rpartition(":")[0], TASK, task.place("steps", k).line)
         for k, step in enumerate(task.spec.steps)
     )
-    return steps, tuple(Written("", TASK, task.place(*key).line) for key in _judged_at(task.spec))
+    return steps, tuple(Written("", TASK, task.place(*key).line) for key in judged_at(task.spec))
 
 
 def task_places(task: Located[TaskSpec]) -> Places:
@@ -130,10 +130,10 @@ def task_places(task: Located[TaskSpec]) -> Places:
         return Written(f"{name}:{place.line}", name, place.line) if place.line > 0 else Written("")
 
     steps = tuple(written("steps", k) for k in range(len(task.spec.steps)))
-    return steps, tuple(written(*key) for key in _judged_at(task.spec))
+    return steps, tuple(written(*key) for key in judged_at(task.spec))
 
 
-def _judged_at(spec: TaskSpec) -> tuple[tuple[str, int], ...]:
+def judged_at(spec: TaskSpec) -> tuple[tuple[str, int], ...]:
     """Where in a task the expectations stand, and what is watched."""
     return tuple((key, k) for key in ("expect", "watch") for k in range(len(getattr(spec, key))))
 

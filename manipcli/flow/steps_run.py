@@ -122,6 +122,8 @@ class StepsRun:
                 step = retried(self._task.file, index)
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
             end = self._attempt(step, planned, planned_start, again=attempt > 1)
+            if end.outcome == "done" or attempt == attempts or not self._may_go_on:
+                end = self._closed(planned, end)
             ended = self._session.time
             self._event("step_ended", planned, end.outcome, end.text)
             if end.outcome == "done" or not self._may_go_on:
@@ -131,8 +133,6 @@ class StepsRun:
                 self._tell(f"{end.outcome}: {end.text}; it is tried again", detail=False)
             if attempt < attempts or step.may_fail:
                 self._executor.stop()
-        self._live.step_ended(planned.id, end.outcome)
-        self._watching.step_ended(planned.id)
         tolerated = end.outcome != "done" and step.may_fail and self._may_go_on
         if tolerated:
             self._event("step_tolerated", planned, "", "on_fail: continue")
@@ -146,6 +146,18 @@ class StepsRun:
             text=end.text,
             tolerated=tolerated,
         )
+
+    def _closed(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
+        """The end of a step; another one if what is watched in it turns out to be broken, of which the last ticks are
+        only looked at now."""
+        self._live.step_ended(planned.id, end.outcome)
+        self._watching.step_ended(planned.id)
+        broken = self._alarm(self._session.state)
+        if not broken:
+            return end
+        self._executor.stop()
+        self._live.step_ended(planned.id, "failed")
+        return MotionEnd("failed", f"stopped: {broken}")
 
     @property
     def _may_go_on(self) -> bool:

@@ -1,4 +1,4 @@
-"""Expectations that a task leaves without evidence: told before the run, which they would fail."""
+"""Conditions that a task leaves without evidence: told before the run."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from manipcli.model.formula import absent
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
+from manipcli.simulate.engines import ENGINES
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
@@ -22,21 +23,30 @@ TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "refer
 
 
 def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
-    """A warning for each expectation that needs a topic which `record:` leaves out."""
+    """A warning for each expectation and watch that needs a topic which `record:` leaves out, and for each `until` that
+    the engine cannot answer."""
     left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
-    if not left_out:
+    physics = task.spec.simulation.engine not in ENGINES.names or ENGINES[task.spec.simulation.engine].physics == "full"
+    if not left_out and physics:
         return
     nothing = np.zeros(())
     start = WorldState(*([nothing] * 8))  # no condition is asked for a margin here
     steps = tuple(step.id for step in task.spec.steps if step.id is not None)
     world = World(robot, scene, start, unrecorded=left_out, steps=steps)
-    for k, expected in enumerate(task.spec.expect):
-        topic = absent(expected.condition, world, CONDITIONS)
-        if topic in left_out.values():
-            yield Finding(
-                "TASK234",
-                f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
-                task.place("expect", k),
-                hint=f"add {topic} to record.topics",
-                severity="warning",
-            )
+    for key, expectations in (("expect", task.spec.expect), ("watch", task.spec.watch)):
+        for k, expected in enumerate(expectations):
+            topic = absent(expected.condition, world, CONDITIONS)
+            if topic in left_out.values():
+                yield Finding(
+                    "TASK236",
+                    f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
+                    task.place(key, k),
+                    hint=f"add {topic} to record.topics",
+                    severity="warning",
+                )
+    live = World(robot, scene, start, physics=physics, steps=steps)
+    for k, step in enumerate(task.spec.steps):
+        reason = None if step.until is None else absent(step.until, live, CONDITIONS)
+        if reason is not None:
+            message = f"`until` is not waited for: {reason}"
+            yield Finding("TASK237", message, task.place("steps", k, "until"), severity="warning")

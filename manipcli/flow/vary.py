@@ -32,6 +32,8 @@ from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
 
 EVERY: Final = "*"
 """In a path: each name of a mapping, or each item of a list."""
+LARGEST: Final = 1e100
+"""Amounts are below this [SI]: what is drawn stays finite."""
 _TASK_KEYS: Final = ("scene", "frames", "simulation")
 _CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
 
@@ -211,7 +213,17 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
         if broken is not None:
             loc = (*((how,) if how else ()), law.word)
             raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
+    _refuse_endless(law, nominal, how)
     return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
+
+
+def _refuse_endless(law: Law, nominal: Sequence[float], how: str) -> None:
+    """Amounts so large that what is drawn would be infinite."""
+    for row in law.rows:
+        for amount, value in zip(row, nominal, strict=True):
+            reach = amount * value if how == "scale" else amount + (value if how == "offset" else 0.0)
+            if not max(abs(amount), abs(reach)) < LARGEST:
+                raise _Problem(f"{amount:g} is too large an amount", loc=(*((how,) if how else ()), law.word))
 
 
 def _law(

@@ -18,6 +18,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import Condition, Problem, Setting, World
+from manipcli.model.conditions.step_done import StepDoneSpec
 from manipcli.model.formula import absent, opened, problems, scopes
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, opposite
@@ -175,12 +176,25 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
         if setting.steps is not None and name not in setting.steps:
             known = (*setting.steps, END) if loc == ("at",) else setting.steps
             found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
+    if not found:
+        found += _too_early(spec, named)
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:
         wanted = scopes(spec.condition, seam)
         if len(wanted) > 1:
             message = f"`{wanted['end']}` is expected at the end, `{wanted['always']}` all the time, and this has both"
             found.append(Problem((spec.word,), message, "say `at: end`, `during: STEP`, or write `always: {...}`"))
     return tuple(found)
+
+
+def _too_early(spec: ExpectationSpec, named: Sequence[tuple[tuple[str | int, ...], str]]) -> Iterator[Problem]:
+    """A step that is to be done while it goes on."""
+    condition = spec.condition
+    needed = () if spec.quantifier == "never" else condition.members if condition.name == "all" else (condition,)
+    waited = {one.body.step for one in needed if not one.combines and isinstance(one.body, StepDoneSpec)}
+    for loc, name in named:
+        if name in waited:
+            message = f"step '{name}' is not done before its end, and this is asked before"
+            yield Problem(loc, message, "say `at: end`, or name a later step")
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:

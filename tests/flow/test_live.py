@@ -35,6 +35,8 @@ scene:
   cup: {{cup: {{radius: 36 mm, height: 110 mm}}, mass: 150 g, rests_on: desk, at: [0.75, 0.0], friction: 1.0}}
   ball: {{sphere: {{radius: 14 mm}}, mass: 10 g, inside: cup}}
   tray: {{tray: {{size: [0.3, 0.3, 0.05]}}, rests_on: desk, at: [0.70, 0.32], fixed: true}}
+vary:
+  scene.cup.mass: {{choice: [80 g]}}
 steps:
   - pick: {{object: cup, approach: {{from: side, distance: 9 cm}}, grasp: {{posture: wrap, force: 8 N, height: 68 mm}}}}
   - lift: {{object: cup, by: 8 cm}}
@@ -118,7 +120,7 @@ OF_STEP: ConditionSpec
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
-    """The task, run with a live probe for each expectation, and what judging its log asks and answers."""
+    """A sample of the task, run with a live probe for each expectation, and what judging its log asks and answers."""
     global OF_STEP
     folder = tmp_path_factory.mktemp("live")
     file = folder / "small.yaml"
@@ -127,7 +129,7 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
     EXPECT[:], OF_STEP = [one.condition for one in whole], last.condition
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(execute, "Live", Watching)
-        report = pipeline.run_task(file, log=folder / "small.mcap")
+        report = pipeline.run_task(file, log=folder / "small.mcap", sample=0)
     assert [step.outcome for step in report.verdict.steps] == ["done"] * 3
     found: list[Answers] = []
     plain = expectation.opened

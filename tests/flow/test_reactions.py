@@ -24,7 +24,7 @@ task: small
 robot: {ROOT}/robots/differential_wrist/robot.yaml
 controllers: {ROOT}/controllers/differential_wrist.yaml
 start: up
-params: {{near: 0.05, wide: 2 * $near}}
+params: {{near: 0.05, wide: 2 * $near, goal: up}}
 simulation: {{engine: kinematic, settle: 0, control_period: 2 ms, step: 2 ms}}
 """
 PERIOD = 0.002
@@ -144,6 +144,16 @@ def test_a_watch_that_is_broken_after_the_last_step_fails_the_run(run: Run, tmp_
     assert verdict.simulated_time == pytest.approx(0.3 + REST, abs=0.03)
 
 
+def test_a_watch_that_breaks_in_the_last_ticks_of_its_step_fails_that_step(run: Run, tmp_path: Path) -> None:
+    """The step ends between two looks, 5 ticks after the moment."""
+    watch = "watch:\n  - always: {duration: {below: 0.1 s}}\n    during: wait_1\n"
+    verdict = run(f"steps:\n  - wait: 0.11 s\n  - wait: 0.2 s\n{watch}")
+    assert [step.outcome for step in verdict.steps] == ["failed", "not_run"]
+    assert "is broken at t = 0.1" in verdict.steps[0].text
+    (broken,) = events(tmp_path, "watch_broken")
+    assert broken.step == "wait_1"
+
+
 def test_a_watch_wins_over_a_retry(run: Run) -> None:
     verdict = run(f"steps:\n{AWAY}    on_fail: {{retry: 5, then: continue}}\n{WATCH}")
     assert verdict.verdict == "failed"
@@ -201,6 +211,11 @@ def test_the_same_attempts_make_the_same_bytes(run: Run, tmp_path: Path) -> None
         ("    on_fail: {retry: 1, with: {near: 5 s}}\n", "8:24", "when it is tried again"),
         ("    on_fail: {retry: 0}\n", "9:22", "must be at least 1, not 0"),
         ("    on_fail: retry\n", "9:14", "'stop'"),
+        (
+            "    until: {at_pose: {pose: $goal}}\n    on_fail: {retry: 1, with: {goal: dwon}}\n",
+            "10:31",
+            "'dwon' is not a pose",
+        ),
         ("watch:\n  - upright: {object: cup}\n", "10:5", "expected one of never, always"),
         ("watch:\n  - never: {duration: {below: 1 s}}\n    at: end\n", "11:9", "expected nothing"),
         ("watch:\n  - never: {duration: {below: 1 s}}\n    during: wait_7\n", "11:13", "no step 'wait_7'"),

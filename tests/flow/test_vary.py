@@ -203,6 +203,8 @@ MISTAKES = (
     ("scene.peg.mass: {uniform: [2, 1]}", "the least value is above the most", None),
     ("scene.peg.friction: {normal: [1, 0]}", "the standard deviation must be above 0", None),
     ("scene.peg.yaw: {choice: [[1, 2]]}", "a list of amounts for a single number", None),
+    ("simulation.settle: {uniform: [-1e308, 1e308]}", "-1e+308 is too large an amount", None),
+    ("simulation.step: {scale: {choice: [1e300]}}", "1e+300 is too large an amount", None),
     ("scene.block.at: {choice: [[1, 2, 3]]}", "expected 2 amounts, got 3", None),
     ("simulation.seed: {choice: [1.5]}", "'simulation.seed' is a whole number, which 1.5 is not", None),
 )  # fmt: skip

@@ -422,6 +422,15 @@ def test_the_same_recording_gives_the_same_verdict() -> None:
     assert judged(recording(), *expect) == judged(recording(), *expect)
 
 
+def test_a_step_is_not_done_before_its_end() -> None:
+    for scope in ({"at": "wait_1"}, {"during": ["go", "wait_1"]}):
+        (spec,) = expectations({"step_done": {"step": "wait_1"}, **scope})
+        (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
+        assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
+    (later,) = expectations({"step_done": {"step": "go"}, "at": "wait_1"})
+    assert expectation_problems(later, SETTING, CONDITIONS) == ()
+
+
 @pytest.mark.parametrize(
     ("name", "written", "loc", "hint"),
     [

@@ -53,6 +53,8 @@ def check(spec: RestsOnSpec, setting: Setting) -> tuple[Problem, ...]:
     )
     if not problems and spec.object == spec.of:
         return (Problem(("of",), f"'{spec.of}' cannot rest on itself"),)
+    if not problems and not setting.scene.gravity.any():
+        return (Problem(("object",), f"'{spec.object}' has no weight: the scene has no gravity"),)
     return problems
 
 
