@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from manipcli.batch.baseline import Change, Key, baseline_path, compared, measured, read_baseline
+from manipcli.batch.baseline import Key, baseline_path, compared, measured, read_baseline
 from manipcli.batch.job import Job
 from manipcli.core.errors import Place
 from manipcli.core.whole_file import write_whole
 from manipcli.flow.replay import open_playback
-from manipcli.flow.report import file_places, log_page, refused_page
+from manipcli.flow.report import file_places, judged_at, log_page, refused_page
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.verdict import Verdict
 from manipcli.pipeline import load_task
@@ -22,6 +22,8 @@ from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step
 from manipcli.spec import load
+from manipcli.spec.located import Located
+from manipcli.spec.task import TaskSpec
 
 SIZE = (960, 720)
 """Width and height of the picture [pixel]."""
@@ -32,20 +34,15 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
     if verdict.verdict == "passed":
         return ()
     task = load.load_task(job.path, model=task_spec(), overrides=job.settings.overrides, seed=job.settings.seed)
-
-    def place(*key: str | int) -> Place:
-        found = task.place(*key)
-        return Place(job.case.file, found.line, found.column)
-
     steps = [
-        Trouble(describe_step(step), place("steps", k), step.ended)
+        Trouble(describe_step(step), _place(job, task, "steps", k), step.ended)
         for k, step in enumerate(verdict.steps)
         if step.outcome not in ("done", "not_run") and not step.tolerated
     ]
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [
-        Trouble(describe_expectation(one), place("expect", k), one.at)
-        for k, one in enumerate(verdict.expectations)
+        Trouble(describe_expectation(one), _place(job, task, *key), one.at)
+        for key, one in zip(judged_at(task.spec), verdict.expectations, strict=False)
         if one.outcome != "passed" and not refused
     ]
     if verdict.verdict == "error" or not (steps or unmet):
@@ -66,14 +63,20 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
     task = load.load_task(job.path, model=task_spec())
     changes = compared(old, measured(verdict, job.log), task.spec.baseline.tolerance)
     loc: dict[Key, tuple[str | int, ...]] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
-    loc |= {("margins", one.name): ("expect", k) for k, one in enumerate(verdict.expectations)}
-
-    def place(change: Change) -> Place:
-        found = task.place(*loc.get(change.key, ("task",)))
-        return Place(job.case.file, found.line, found.column)
-
-    worse = tuple(Trouble(f"worse than the baseline: {one}", place(one)) for one in changes if one.worse)
+    judged = zip(judged_at(task.spec), verdict.expectations, strict=False)
+    loc |= {("margins", one.name): key for key, one in judged}
+    worse = tuple(
+        Trouble(f"{one.word} the baseline: {one}", _place(job, task, *loc.get(one.key, ("task",))))
+        for one in changes
+        if one.worse
+    )
     return worse, [f"{one.word} the baseline: {one}" for one in changes if not one.worse]
+
+
+def _place(job: Job, task: Located[TaskSpec], *key: str | int) -> Place:
+    """Where something stands in the task file, under the name by which that is shown."""
+    found = task.place(*key)
+    return Place(job.case.file, found.line, found.column)
 
 
 def draw(

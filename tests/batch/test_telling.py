@@ -1,0 +1,60 @@
+"""Why a run did not pass stands at the line that says what was broken, in an annotation as in JUnit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+from manipcli.batch.baseline import Measure, baseline_path, write_baseline
+from manipcli.batch.job import Job, Settings
+from manipcli.batch.telling import against_baseline, junit, troubles
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.suite import Case
+
+ROOT = Path(__file__).parents[2]
+TASK = f"""\
+task: nod
+robot: {ROOT}/robots/differential_wrist/robot.yaml
+controllers: {ROOT}/controllers/differential_wrist.yaml
+steps:
+  - wait: 1 s
+watch:
+  - always: {{tracking: {{group: wrist, within: 0.1 rad}}}}
+expect:
+  - duration: {{below: 20 s}}
+"""
+VERDICT = Verdict(
+    task="nod", verdict="failed", seed=1, engine="kinematic", simulated_time=1.0,
+    steps=(StepOutcome("wait_1", "wait", "done", started=0.0, ended=1.0, planned_duration=1.0),),
+    expectations=(
+        ExpectationOutcome("duration", "passed", 19.0, "s", 1.0),
+        ExpectationOutcome("tracking", "failed", -0.1, "rad", 0.5),
+    ),
+)  # fmt: skip
+
+
+def job(tmp_path: Path) -> Job:
+    (tmp_path / "nod.yaml").write_text(TASK)
+    return Job(Case("t/nod.yaml", "nod"), tmp_path / "nod.yaml", Settings(folder=tmp_path))
+
+
+def test_a_broken_watch_is_told_at_its_line(tmp_path: Path) -> None:
+    (trouble,) = troubles(job(tmp_path), VERDICT)
+    assert str(trouble.place) == "t/nod.yaml:7:5"
+    report = RunReport(VERDICT, wall_time=1.0, real_time_factor=1.0, log="x", timing=Timing(0, 0, 1, 0))
+    (case,) = [
+        one for one in fromstring(junit(job(tmp_path), report)).iter("testcase") if one.find("failure") is not None
+    ]
+    assert case.get("line") == "7"
+
+
+def test_a_watch_that_is_worse_than_it_was_is_told_at_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = job(tmp_path)
+    old, new = ({("duration",): Measure(1.0, "s"), ("margins", "tracking"): Measure(at, "rad")} for at in (0.3, 0.1))
+    write_baseline(baseline_path(one.path), old)
+    monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: new)
+    ((trouble,), notes) = against_baseline(one, VERDICT)
+    assert (str(trouble.place), notes) == ("t/nod.yaml:7:5", [])
