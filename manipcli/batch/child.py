@@ -131,6 +131,6 @@ def _noted(what: str, make: Callable[[], None]) -> list[str]:
     """Makes something without which the verdict stands; a note where that is refused."""
     try:
         make()
-    except ManipcliError as error:
+    except (ManipcliError, OSError) as error:
         return [f"{what}: {error}"]
     return []

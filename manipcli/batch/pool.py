@@ -8,6 +8,7 @@ from multiprocessing.connection import wait
 
 from manipcli.batch.job import Job
 from manipcli.batch.process import Process
+from manipcli.core.errors import Finding
 from manipcli.report.suite import CaseReport, troubles_of
 
 WATCH_PERIOD = 0.1
@@ -36,9 +37,12 @@ def run_jobs(
             while waiting and len(running) < at_once:
                 job = waiting.popleft()
                 if job.case.findings:
-                    yield unreadable(job)
-                else:
+                    yield _not_run(job, "the file cannot be read", job.case.findings)
+                    continue
+                try:
                     running.append(Process(job, command=command))
+                except OSError as error:
+                    yield _not_run(job, "it cannot be run", (Finding("USE106", f"it cannot be run: {error}"),))
             if not running:
                 continue
             if onlooker is not None:
@@ -57,14 +61,13 @@ def run_jobs(
             process.forget()
 
 
-def unreadable(job: Job) -> CaseReport:
-    """A task file that cannot be read is not run."""
+def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:
     return CaseReport(
         case=job.case,
         outcome="invalid",
         duration=0.0,
         command=job.command,
-        text="the file cannot be read",
-        findings=job.case.findings,
-        troubles=troubles_of(job.case.findings),
+        text=why,
+        findings=findings,
+        troubles=troubles_of(findings),
     )

@@ -61,6 +61,9 @@ class Process:
         Args:
             job: what it does.
             command: another program that speaks with its parent as `batch/child.py` does.
+
+        Raises:
+            OSError: its files cannot be written, or there is no process to be had.
         """
         self.job = job
         self.doing = Beat("starting")
@@ -83,7 +86,8 @@ class Process:
                 env={**ONE_THREAD, **os.environ},
             )
         childs.close()
-        self.connection.send(job)
+        with suppress(ConnectionError):  # it is gone already, which is heard of
+            self.connection.send(job)
 
     @property
     def elapsed(self) -> float:
@@ -162,7 +166,7 @@ class Process:
             job.output.unlink(missing_ok=True)
         else:
             self._draw_what_is_left()
-            if not job.output.stat().st_size:
+            if job.output.exists() and not job.output.stat().st_size:
                 job.output.unlink()
         kept = {path: str(path) if path.exists() else None for path in (job.log, job.partial, job.picture, job.output)}
         return CaseReport(

@@ -139,7 +139,10 @@ def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Su
     finally:
         running.close()
     if reports:
-        remember(jobs[0].settings.folder, reports)
+        try:
+            remember(jobs[0].settings.folder, reports)
+        except OSError as error:
+            console.talk(f"what failed is not remembered: {error}")
     order = {job.case.id: k for k, job in enumerate(jobs)}
     reports.sort(key=lambda one: order[one.case.id])
     return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped)

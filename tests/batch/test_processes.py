@@ -63,6 +63,23 @@ def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -
     assert Path(report.output).read_text().splitlines() == ["before", "no physics here"]
 
 
+def test_a_run_whose_files_cannot_be_written_costs_itself_alone(tmp_path: Path) -> None:
+    long, other = jobs(tmp_path, END, "os.abort()")
+    long = replace(long, case=replace(long.case, file=f"{'x' * 245}.yaml"))
+    one, other_report = run([long, other], at_once=1)
+    assert (one.case, one.outcome, other_report.outcome) == (long.case, "invalid", "crashed")
+    assert "File name too long" in one.troubles[0].message
+
+
+def test_a_process_that_never_begins_is_a_crash(tmp_path: Path) -> None:
+    for _ in range(3):  # whether it is gone before it is spoken to is a matter of luck
+        (report,) = run_jobs(jobs(tmp_path, END), at_once=1, command=("/bin/false",))
+        assert (report.outcome, report.text) == (
+            "crashed",
+            "ended with exit code 1 before it was done: it said nothing",
+        )
+
+
 HALF = "os.write(int(sys.argv[-1]), (1000).to_bytes(4, 'big') + b'half')\n"
 
 

@@ -89,6 +89,19 @@ def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
         assert parse(folder / "out.xml").getroot().get("errors") == "1"
 
 
+def test_a_folder_that_cannot_be_written_to_takes_nothing_from_the_answer(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "runs").touch()
+    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    write(folder, "a")
+    assert main(["test", "-n", "1"]) == 4
+    told = capsys.readouterr()
+    assert "error[USE106]: it cannot be run: [Errno" in told.out
+    assert "✗ 2 invalid" in told.out
+    assert "what failed is not remembered: " in told.err
+
+
 def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "b.yaml").write_text("task: b\nsteps: [\n")
     assert main(["test", "--github"]) == 4
