@@ -26,15 +26,15 @@ sys.path[:] = json.loads(sys.argv[1])
 from manipcli.batch.child import main
 main(int(sys.argv[2]))
 """
-"""The child finds what its parent finds, however that was started."""
+"""The child finds what its parent finds, however that was started; `-P`: and not what lies in the working directory."""
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 """Where nothing else is said: as many runs as there are cores leave none for threads of libraries."""
 DRAWING = """
 import json, sys
-sys.path[:] = json.loads(sys.argv[1])
+sys.path[:], log, picture, packages, outside = json.loads(sys.argv[1])
 from pathlib import Path
 from manipcli.batch.telling import draw
-draw(Path(sys.argv[2]), Path(sys.argv[3]))
+draw(Path(log), Path(picture), package_path=[Path(path) for path in packages], allow_outside=outside)
 """
 """The picture of what a run left that did not come to its end."""
 DRAWING_TIME = 30.0
@@ -77,7 +77,7 @@ class Process:
         _remove(job.log, job.partial, job.picture, job.page)
         with job.output.open("wb") as output:
             self._process = subprocess.Popen(
-                [*(command or (sys.executable, "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
+                [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=output,
@@ -190,10 +190,12 @@ class Process:
         """The end of the log as far as it got, drawn where whatever went wrong cannot do so once more."""
         if not self.job.partial.exists():
             return
-        words = [json.dumps(sys.path), str(self.job.partial), str(self.job.picture)]
+        settings = self.job.settings
+        packages = [str(path) for path in settings.package_path]
+        told = [sys.path, str(self.job.partial), str(self.job.picture), packages, settings.allow_outside]
         with suppress(subprocess.TimeoutExpired):
             subprocess.run(
-                [sys.executable, "-c", DRAWING, *words],
+                [sys.executable, "-P", "-c", DRAWING, json.dumps(told)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                 timeout=DRAWING_TIME, check=False, start_new_session=True,
             )  # fmt: skip

@@ -199,6 +199,31 @@ def _pickled(report: RunReport) -> bytes:
     return pickle.dumps(End(report, troubles=troubles))
 
 
+def test_nothing_in_the_working_directory_is_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("manipcli.batch.process.CHILD", f"import json{CHILD}")
+    Path("json.py").write_text("raise SystemExit('not the library')")
+    (report,) = run_jobs(jobs(tmp_path, END), at_once=1)
+    assert (report.outcome, report.text) == ("invalid", "the task cannot be run")
+
+
+def test_what_a_crash_left_is_drawn_with_the_meshes_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("json.py").write_text("raise SystemExit('not the library')")
+    drawer = tmp_path / "other" / "manipcli" / "batch"
+    drawer.mkdir(parents=True)
+    for package in (drawer.parent, drawer):
+        (package / "__init__.py").touch()
+    (drawer / "telling.py").write_text("def draw(log, picture, **how): picture.write_text(f'{log.name} {how}')")
+    monkeypatch.syspath_prepend(tmp_path / "other")
+    (job,) = jobs(tmp_path, "open(job.partial, 'w').close(); os.abort()")
+    settings = replace(job.settings, package_path=(tmp_path,), allow_outside=True)
+    (report,) = run([replace(job, settings=settings)])
+    assert report.picture is not None
+    how = {"package_path": [tmp_path], "allow_outside": True}
+    assert Path(report.picture).read_text() == f"t0.mcap.partial {how}"
+
+
 def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     for suffix in (".mcap", ".png", ".mcap.partial", ".html"):
