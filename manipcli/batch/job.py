@@ -76,11 +76,11 @@ class Job:
         """Whether the task is run as it is written."""
         return self.case.sample is None and not self.settings.overrides and self.settings.seed is None
 
-    @property
-    def command(self) -> str:
-        """What does the same again, for a shell."""
+    def command(self, verb: str = "run") -> str:
+        """What does the same again, for a shell; `test` compares with the baseline, too."""
         settings = self.settings
-        words = ["manipcli", "run", self.case.file]
+        file = self.case.file
+        words = ["manipcli", verb, f"./{file}" if file.startswith("-") else file]
         words += [] if settings.seed is None else ["--seed", str(settings.seed)]
         words += [] if self.case.sample is None else ["--sample", str(self.case.sample)]
         for override in settings.overrides:

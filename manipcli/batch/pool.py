@@ -66,7 +66,7 @@ def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:
         case=job.case,
         outcome="invalid",
         duration=0.0,
-        command=job.command,
+        command=job.command(),
         text=why,
         findings=findings,
         troubles=troubles_of(findings),

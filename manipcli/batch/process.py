@@ -154,10 +154,10 @@ class Process:
             return self._report("invalid", "the task cannot be run", end=end)
         word = _WORDS.get(exit_code(end.report.verdict), "error")
         if word == "passed" and end.troubles:  # it is worse than it was
-            return self._report("failed", end.troubles[0].message, end=end)
+            return self._report("failed", end.troubles[0].message, end=end, verb="test")
         return self._report(word, end.report.verdict.text, end=end)
 
-    def _report(self, outcome: CaseWord, text: str, *, end: End | None = None) -> CaseReport:
+    def _report(self, outcome: CaseWord, text: str, *, end: End | None = None, verb: str = "run") -> CaseReport:
         job = self.job
         end = end if end is not None else End(None, troubles=(Trouble(text, at=self.doing.at),))
         if outcome == "passed" and not job.settings.keep_logs:
@@ -173,7 +173,7 @@ class Process:
             case=job.case,
             outcome=outcome,
             duration=self.elapsed,
-            command=job.command,
+            command=job.command(verb),
             text=text,
             run=end.report,
             findings=end.findings,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import sys
 import time
@@ -14,7 +15,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from manipcli.batch.job import Job, Settings
+from manipcli.batch.job import End, Job, Settings
 from manipcli.batch.pool import run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
@@ -191,10 +192,6 @@ def test_the_verdict_arrives_whole_and_only_what_failed_keeps_its_log(
 
 
 def _pickled(report: RunReport) -> bytes:
-    import pickle
-
-    from manipcli.batch.job import End
-
     troubles = () if report.verdict.verdict == "passed" else (Trouble("x", Place("t0.yaml", 1, 1)),)
     return pickle.dumps(End(report, troubles=troubles))
 
@@ -288,7 +285,15 @@ def test_no_two_cases_share_a_file(one: tuple[str, int | None], other: tuple[str
 
 def test_the_command_that_does_it_again_can_be_pasted_into_a_shell() -> None:
     settings = Settings(overrides=("scene.cup.mass=80 g",), seed=4, package_path=(Path("p q"),), allow_outside=True)
-    assert Job(Case("my tasks/a.yaml", "a", 17), Path("x"), settings).command == (
+    assert Job(Case("my tasks/a.yaml", "a", 17), Path("x"), settings).command() == (
         "manipcli run 'my tasks/a.yaml' --seed 4 --sample 17 --set 'scene.cup.mass=80 g' --package-path 'p q' "
         "--allow-outside"
     )
+    assert Job(Case("-x'.yaml", "x"), Path("x"), Settings()).command("test") == """manipcli test './-x'"'"'.yaml'"""
+
+
+def test_what_is_worse_than_its_baseline_is_seen_again_by_testing(tmp_path: Path) -> None:
+    good = RunReport(VERDICT, wall_time=1.0, real_time_factor=1.0, log="x", timing=Timing(0, 0, 1, 0))
+    end = pickle.dumps(End(good, troubles=(Trouble("worse than the baseline: the task takes 2 s"),)))
+    (report,) = run(jobs(tmp_path, f"import pickle; parent.send(pickle.loads({end!r}))"))
+    assert (report.outcome, report.command) == ("failed", "manipcli test t0.yaml")
