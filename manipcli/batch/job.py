@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,11 @@ FOLDER = Path("runs") / "test"
 """Where logs of tests go, below the working directory."""
 
 
+def limit(seconds: float) -> float:
+    """Of a time as an option gives it: 0 means never."""
+    return seconds if seconds > 0.0 else math.inf
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What holds for all runs of a batch; as the options of `run`, and what is made of each.
@@ -24,7 +30,7 @@ class Settings:
         keep_logs: also those of runs that passed.
         baseline: a run of a task as it is written may not be worse than its baseline.
         silence: a run that shows no progress for so long is ended [s].
-        timeout: a run that takes longer is ended [s]; None for no limit.
+        timeout: a run that takes longer is ended [s]; of both, `inf` for never.
     """
 
     overrides: tuple[str, ...] = ()
@@ -37,7 +43,7 @@ class Settings:
     keep_logs: bool = False
     baseline: bool = True
     silence: float = 60.0
-    timeout: float | None = 600.0
+    timeout: float = 600.0
 
 
 @dataclass(frozen=True, slots=True)

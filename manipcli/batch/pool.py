@@ -13,6 +13,8 @@ from manipcli.report.suite import CaseReport, troubles_of
 
 WATCH_PERIOD = 0.1
 """[s] between two looks at what is being done, where nothing comes to an end."""
+LONGEST_WAIT = 60.0
+"""[s] between two looks where nobody is shown what is being done."""
 
 Onlooker = Callable[[Sequence[Process]], None]
 
@@ -48,7 +50,8 @@ def run_jobs(
             if onlooker is not None:
                 onlooker(running)
             patience = max(0.0, min(process.patience for process in running))
-            wait([process.connection for process in running], min(WATCH_PERIOD, patience) if onlooker else patience)
+            period = WATCH_PERIOD if onlooker else LONGEST_WAIT
+            wait([process.connection for process in running], min(period, patience))
             for process in [*running]:
                 report = process.hear()
                 if report is None and process.patience <= 0.0:

@@ -98,8 +98,7 @@ class Process:
     def patience(self) -> float:
         """[s] until it will be given up on, as far as is known now."""
         settings = self.job.settings
-        silence = settings.silence - (time.monotonic() - self._heard)
-        return silence if settings.timeout is None else min(silence, settings.timeout - self.elapsed)
+        return min(settings.silence - (time.monotonic() - self._heard), settings.timeout - self.elapsed)
 
     def hear(self) -> CaseReport | None:
         """Takes what the process has said; what came of it once it is gone."""
@@ -120,7 +119,7 @@ class Process:
     def give_up(self, why: str = "") -> CaseReport:
         """Ends the process, which is taking too long or is silent for too long, or `why` else."""
         settings = self.job.settings
-        over = settings.timeout is not None and self.elapsed >= settings.timeout
+        over = self.elapsed >= settings.timeout
         limit = f"it took longer than {settings.timeout:g} s" if over else f"no progress for {settings.silence:g} s"
         self._process.send_signal(signal.SIGUSR1)
         with suppress(subprocess.TimeoutExpired):

@@ -28,6 +28,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--manipcli-timeout", type=float, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
     )
+    group.addoption(
+        "--manipcli-silence",
+        type=float,
+        default=60.0,
+        metavar="S",
+        help="end a task that shows no progress for so long [s]; 0: never",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -166,10 +173,10 @@ def _run(case: Case, path: Path, settings: Settings) -> CaseReport:
 
 
 def _settings(config: pytest.Config, folder: Path) -> Settings:
-    from manipcli.batch.job import Settings
+    from manipcli.batch.job import Settings, limit
 
-    limit: float = config.getoption("manipcli_timeout")
-    return Settings(folder=folder, timeout=limit if limit > 0.0 else None)
+    silence, timeout = config.getoption("manipcli_silence"), config.getoption("manipcli_timeout")
+    return Settings(folder=folder, silence=limit(silence), timeout=limit(timeout))
 
 
 def _is_looked_for(path: Path, session: pytest.Session) -> bool:

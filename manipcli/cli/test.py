@@ -45,7 +45,7 @@ def test(
         str, typer.Option("--timeout", metavar="T", help="End a run that takes longer; 0: never.")
     ] = "10 min",
     silence: Annotated[
-        str, typer.Option("--silence", metavar="T", help="End a run that shows no progress for so long.")
+        str, typer.Option("--silence", metavar="T", help="End a run that shows no progress for so long; 0: never.")
     ] = "60 s",
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML, for CI.")] = None,
     report: Annotated[
@@ -69,9 +69,8 @@ def test(
     """
     from manipcli.cli.interrupts import Interrupts
 
-    limit = seconds(timeout)
     with Interrupts():
-        from manipcli.batch.job import Settings
+        from manipcli.batch.job import Settings, limit
 
         settings = Settings(
             overrides=tuple(overrides or ()),
@@ -81,8 +80,8 @@ def test(
             pages=report,
             junit=junit is not None,
             keep_logs=keep_logs,
-            silence=max(seconds(silence), 0.1),
-            timeout=limit if limit > 0.0 else None,
+            silence=limit(seconds(silence)),
+            timeout=limit(seconds(timeout)),
         )
         check_outputs(("--junit", junit))
         _check_replaced(junit)

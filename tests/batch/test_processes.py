@@ -15,7 +15,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from manipcli.batch.job import End, Job, Settings
+from manipcli.batch.job import End, Job, Settings, limit
 from manipcli.batch.pool import run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
@@ -115,6 +115,16 @@ def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
     assert report.text == "hung: no progress for 1 s; step 1 of 1, 'lift_1' at 2.50 s"
     assert report.output is not None
     assert "stuck_here" in Path(report.output).read_text()
+
+
+@pytest.mark.parametrize("forever", [limit(0.0), 1e300])
+@pytest.mark.parametrize("watched", [False, True])
+def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None:
+    (job,) = jobs(tmp_path, f"time.sleep(0.3); {END}", timeout=forever)
+    job = replace(job, settings=replace(job.settings, silence=forever))
+    onlooker = (lambda _: None) if watched else None
+    (report,) = run_jobs([job], at_once=1, onlooker=onlooker, command=(sys.executable, "-c", CHILD))
+    assert report.outcome == "invalid"
 
 
 @pytest.mark.slow

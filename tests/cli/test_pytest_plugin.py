@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 import manipcli.batch.discovery
 import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
+from manipcli.cli.pytest_plugin import _settings
 
 pytest_plugins = ["pytester"]
 
@@ -90,6 +92,13 @@ def test_samples_are_tests_of_their_own(project: pytest.Pytester) -> None:
     path.write_text(path.read_text() + "vary: {simulation.settle: {uniform: [0.1 s, 0.2 s]}}\n")
     ids = collected(project, "--manipcli-samples", "2", "tasks/good.yaml", "tasks/late.yaml")
     assert ids == ["tasks/good.yaml::good[0]", "tasks/good.yaml::good[1]", "tasks/late.yaml::late"]
+
+
+@pytest.mark.parametrize(("word", "seconds"), [("0", math.inf), ("2.5", 2.5)])
+def test_silence_and_timeout_are_options(pytester: pytest.Pytester, word: str, seconds: float) -> None:
+    config = pytester.parseconfig(*LOADED, *ALONE, f"--manipcli-silence={word}", f"--manipcli-timeout={word}")
+    settings = _settings(config, Path())
+    assert (settings.silence, settings.timeout) == (seconds, seconds)
 
 
 def test_the_plugin_loads_nothing_but_itself() -> None:

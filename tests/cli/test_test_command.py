@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -15,6 +16,7 @@ from xml.etree.ElementTree import parse
 
 import pytest
 
+from manipcli.batch.job import Job
 from manipcli.cli.app import main
 
 ROOT = Path(__file__).parents[2]
@@ -100,6 +102,14 @@ def test_a_folder_that_cannot_be_written_to_takes_nothing_from_the_answer(
     assert "error[USE106]: it cannot be run: [Errno" in told.out
     assert "✗ 2 invalid" in told.out
     assert "what failed is not remembered: " in told.err
+
+
+def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(folder, "a")
+    given: list[Job] = []
+    monkeypatch.setattr("manipcli.batch.pool.run_jobs", lambda jobs, **_: (one for one in given.extend(jobs) or ()))
+    main(["test", "--silence", "0", "--timeout", "0 s"])
+    assert (given[0].settings.silence, given[0].settings.timeout) == (math.inf, math.inf)
 
 
 def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
