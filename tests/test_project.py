@@ -79,6 +79,7 @@ def test_reading_a_file_loads_no_arrays_and_no_physics() -> None:
     assert _loaded(f"import {', '.join(names)}") & (HEAVY - {"pydantic", "yaml", "rich"}) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layer", "line"),
     [

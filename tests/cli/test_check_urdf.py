@@ -41,6 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class TestCheckUrdf:
     """In a folder with a good description, one with a warning, one with an error, and a xacro file."""
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("words", "code"),
         [

@@ -31,6 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_log_and_its_copy_are_the_same(
     folder: Path, tmp_path: Path, rewrite_log: Rewrite, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -61,6 +62,7 @@ def test_another_motion_is_told_by_step_and_from_when_on(folder: Path, capsys: p
     assert "✗ first difference: t = 0" in out
 
 
+@pytest.mark.slow
 def test_a_tolerance_lets_small_numbers_be(
     folder: Path, tmp_path: Path, rewrite_log: Rewrite, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,6 +30,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     return tmp_path / "my demo"
 
 
+@pytest.mark.slow
 def test_its_files_are_sound(project: Path) -> None:
     files = sorted(str(path) for kind in ("tasks", "robots", "controllers") for path in (project / kind).iterdir())
     assert main(["check", *files]) == 0
@@ -48,6 +49,7 @@ def test_every_yaml_file_names_a_schema_that_is_there(project: Path) -> None:
         assert {*yaml.safe_load(path.read_text())} <= {*schema["properties"]}
 
 
+@pytest.mark.slow
 def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own, gone = project / "tasks" / "pick_place.yaml", project / "README.md"
     own.write_text("mine")

@@ -19,6 +19,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("output", ["a.png", "b.png", "./a.png"])
 @pytest.mark.parametrize(
     "words",

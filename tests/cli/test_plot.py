@@ -23,6 +23,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_overview_comes_to_the_terminal(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", str(log)]) == 0
     told = capsys.readouterr()
@@ -45,6 +46,7 @@ def test_a_table_to_stdout_and_to_a_file_is_the_same(
     assert (float(rows[0][0]), float(rows[-1][0])) == (0.1, 0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf", "PNG"])
 def test_a_figure_goes_to_a_file(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], ending: str) -> None:
     path = tmp_path / f"a.{ending}"

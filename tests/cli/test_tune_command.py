@@ -24,6 +24,7 @@ def test_the_table_names_the_joint_and_says_what_its_numbers_are(capsys: pytest.
     assert "of each joint alone" in out
 
 
+@pytest.mark.slow
 def test_json_a_figure_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     figure, file = tmp_path / "step.svg", tmp_path / "tuned.yaml"
     wanted = ["--bandwidth", "8 Hz", "--damping", "0.8", "--period", "2ms", "--format", "json"]
@@ -51,6 +52,7 @@ def test_no_file_is_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert file.read_text() != "mine"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "told"),
     [

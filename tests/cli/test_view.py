@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 LINK = '<robot name="one"><link name="base"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_prints_the_address_and_ends_well(tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "one.urdf"

@@ -30,6 +30,7 @@ def examined(folder: Path, check: Check) -> Examination:
     return examine(path, packages=Packages(path))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("check", CHECKS.members, ids=lambda check: check.code)
 def test_a_check_fires_on_its_bad_example_and_nothing_else_is_an_error(tmp_path: Path, check: Check) -> None:
     found = examined(tmp_path, check)
@@ -62,6 +63,7 @@ def test_one_file_a_check() -> None:
     assert {check.name.replace("-", "_") for check in CHECKS} <= modules
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ROBOTS, ids=lambda path: path.parent.name)
 def test_no_check_finds_an_error_in_the_robots_of_this_project(file: Path) -> None:
     spec = load_robot(file).spec

@@ -96,6 +96,7 @@ def test_every_step_has_a_case() -> None:
     assert {step[0] for step, _ in CASES.values()} == set(STEPS.names)
 
 
+@pytest.mark.slow
 @every_case
 def test_begins_where_the_robot_is_and_goes_on_where_it_got(task: Task, planned: dict[str, Planned], name: str) -> None:
     case = planned[name]

@@ -56,6 +56,7 @@ def arm(session: Session, ticks: int) -> Array:
     return np.array([session.tick().position[index] for _ in range(ticks)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "names",
     [

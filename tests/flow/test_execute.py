@@ -67,6 +67,7 @@ def test_a_body_that_cannot_stay_where_it_starts_is_named(run: Run, name: str, b
     assert [step.outcome for step in verdict.steps] == ["not_run"]
 
 
+@pytest.mark.slow
 def test_what_stands_stays(run: Run, tmp_path: Path) -> None:
     """Over half a second nothing creeps: below 0.1 mm and 0.1 deg."""
     verdict = run(
@@ -104,6 +105,7 @@ def test_a_move_of_one_joint_leaves_the_others_where_they_are(run: Run, tmp_path
     assert states.position[-1][:7] == pytest.approx([-0.4, 0.1, 0.3, *home[3:]], abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_hand_that_grips_air_fails_its_step(run: Run) -> None:
     verdict = run(scene(TABLE, steps="grasp: {posture: wrap}"))
     assert verdict.steps[0].outcome == "failed"
@@ -124,6 +126,7 @@ WAITING = (
 NEAR = "wait: 0.1 s\n    until: {near: {object: ball, to: [0.7, 0, 0.22], within: 1 cm}}"
 
 
+@pytest.mark.slow
 def test_until_that_holds_ends_the_step_and_one_that_does_not_fails_it(run: Run) -> None:
     held = run(scene(*WAITING, steps=NEAR))
     assert held.steps[0].outcome == "done"

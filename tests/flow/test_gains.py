@@ -54,6 +54,7 @@ def test_too_much_damping_is_told_with_the_gain_that_would_do() -> None:
     assert float(told[1]) == pytest.approx(2.0 * inertia / 1e-3, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("overrides", "told"),
     [
@@ -83,6 +84,7 @@ def test_an_effort_limit_below_gravity_or_below_the_plan_is_told() -> None:
     assert "the planned motions need up to" in lags.message
 
 
+@pytest.mark.slow
 def test_loops_that_only_quarrel_together_are_told() -> None:
     """Damping near the bound of each joint: the arm as a whole is softer than any joint alone."""
     bounds = {}

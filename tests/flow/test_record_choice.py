@@ -23,6 +23,7 @@ TASK = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("record", "unknown"),
     [

@@ -52,6 +52,7 @@ def task_file(tmp_path: Path, controllers: str, steps: str = "  - move: {to: {jo
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controllers", [ROS_1, ROS_2], ids=["ROS 1", "ROS 2"])
 def test_a_task_runs_with_a_file_of_ros_as_it_is(tmp_path: Path, controllers: str) -> None:
     report = run_task(task_file(tmp_path, controllers), log=tmp_path / "t.mcap", allow_outside=True)
@@ -93,6 +94,7 @@ def interfaces(command: str, state: str = "position, velocity") -> str:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     ["position", "position, velocity", "position, velocity, acceleration", "velocity", "effort", "position, effort"],
@@ -102,6 +104,7 @@ def test_legal_sets_of_command_interfaces(tmp_path: Path, command: str) -> None:
     assert errors(tmp_path, interfaces(command, "position, velocity, acceleration")) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -120,6 +123,7 @@ def test_sets_of_command_interfaces_that_are_refused(tmp_path: Path, command: st
     assert "command_interfaces" in line or "interface" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("state", ["", "effort", "velocity", "velocity, acceleration", "acceleration", "bad_name"])
 def test_sets_of_state_interfaces_that_are_refused(tmp_path: Path, state: str) -> None:  # [64]
     found = errors(tmp_path, interfaces("position", state))
@@ -128,12 +132,14 @@ def test_sets_of_state_interfaces_that_are_refused(tmp_path: Path, state: str) -
     assert "state_interfaces" in found[0] or "state interface" in found[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["velocity", "effort", "position, effort"])
 @pytest.mark.parametrize("state", ["position", "velocity"])
 def test_laws_that_need_position_and_velocity(tmp_path: Path, command: str, state: str) -> None:  # [64]
     assert errors(tmp_path, interfaces(command, state))
 
 
+@pytest.mark.slow
 def test_an_empty_list_of_command_interfaces_is_refused(tmp_path: Path) -> None:  # [64]
     (line,) = errors(tmp_path, interfaces(""))
     assert "controllers.yaml:2:62: error[CTRL206]: x.command_interfaces: expected at least 1 item, got none" in line

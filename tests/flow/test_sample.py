@@ -48,6 +48,7 @@ def test_inertia_follows_a_varied_mass() -> None:
     np.testing.assert_allclose(heavy, 3.0 * light)
 
 
+@pytest.mark.slow
 def test_where_a_body_is_is_planned_for() -> None:
     task = _sample("{scene.block.at: {offset: {choice: [[3 cm, -2 cm]]}}}")
     expected = NOMINAL.scene.body("block").X_WO.p + np.array([0.03, -0.02, 0.0])

@@ -61,6 +61,7 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         assert problems == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("steps", "expected"),
     [

@@ -108,6 +108,7 @@ def test_the_topics_of_a_task_are_those_of_its_log(task: Callable[..., Path], tm
     assert all(sum(b == name for _, b in _edges(graph)) == 1 for name in after), "one publisher each"
 
 
+@pytest.mark.slow
 def test_the_command_takes_tasks_and_logs(
     task: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -55,6 +55,7 @@ GRASPING = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [*ACROSS, *GRASPING, "  - wait: 1 s\n"])
 def test_an_arm_and_a_hand_with_a_controller_each_can_do_every_step(tmp_path: Path, step: str) -> None:
     assert told(tmp_path, WHOLE, step) == []

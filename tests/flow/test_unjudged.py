@@ -9,6 +9,7 @@ from manipcli.flow.load import load_task
 POUR = Path(__file__).resolve().parents[2] / "tasks" / "pour.yaml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("topics", "told"),
     [

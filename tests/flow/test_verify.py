@@ -175,6 +175,7 @@ def test_a_log_that_ends_early_is_compared_as_far_as_it_goes(
     assert made.messages.first.time == 0.7
 
 
+@pytest.mark.slow
 def test_a_log_without_its_files_and_a_foreign_one_are_refused(
     log: Path, tmp_path: Path, rewrite_log: Rewrite, capsys: pytest.CaptureFixture[str]
 ) -> None:

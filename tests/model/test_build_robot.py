@@ -255,6 +255,7 @@ DESCRIPTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.parent.name)
 def test_what_we_write_reads_as_the_same_robot(path: Path, tmp_path: Path) -> None:
     content = RobotSpec(robot=path.parent.name, description=DESCRIPTIONS[path.parent.name])

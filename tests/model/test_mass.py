@@ -68,6 +68,7 @@ def test_a_turned_part_turns_its_inertia() -> None:
     np.testing.assert_allclose(union((turned,), 1.0).inertia, union((straight,), 1.0).inertia, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_cup_has_centre_and_inertia_of_its_cells() -> None:
     shape = body_shapes.cup(CupSpec(radius=0.036, height=0.11, wall=0.004), WHITE)
     made = union(shape.geometries, 0.15)

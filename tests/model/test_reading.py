@@ -132,6 +132,7 @@ def test_every_tick_is_that_of_its_deciding_member(formula: Node | Leaf) -> None
         assert truth is None or truth == (margin > 0.0)
 
 
+@pytest.mark.slow
 @given(formulas, st.sampled_from(["least", "greatest"]), st.sets(st.integers(1, T - 1)))
 @settings(max_examples=150, deadline=None)
 def test_over_time_it_is_the_extreme_of_what_applies_wherever_it_is_cut(

@@ -206,6 +206,7 @@ def test_a_bad_number_hides_no_error_of_the_tree(tmp_path: Path) -> None:
     assert {finding.code for finding in errors(tmp_path, text)} == {"URDF009", "URDF007"}
 
 
+@pytest.mark.slow
 def test_thousands_of_links_and_of_mimics_are_read_in_no_time(tmp_path: Path) -> None:
     count = 5000
     links = "".join(f'<link name="l{k}"/>' for k in range(count))
@@ -302,6 +303,7 @@ def test_transmissions_of_both_generations_say_the_same(tmp_path: Path, text: st
 PUT = ["", "0", "nan", '"', "<", "a", "-"]
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.integers(0, len(GOOD)), length=st.integers(0, 12), put=st.sampled_from(PUT))
 def test_any_change_of_the_text_gives_parts_or_findings(tmp_path: Path, at: int, length: int, put: str) -> None:

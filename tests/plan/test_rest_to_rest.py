@@ -29,6 +29,7 @@ def test_one_radian_at_100_rad_s2_takes_a_fifth_of_a_second() -> None:
     assert np.max(motion.velocities) == pytest.approx(10.0)
 
 
+@pytest.mark.slow
 @given(st.floats(0.01, 3.0), st.floats(0.2, 5.0), st.floats(0.5, 50.0))
 @settings(max_examples=40, deadline=None)
 def test_duration_is_that_of_the_trapezoid(distance: float, v: float, a: float) -> None:
@@ -38,6 +39,7 @@ def test_duration_is_that_of_the_trapezoid(distance: float, v: float, a: float) 
     assert exact - 1e-8 <= motion.duration <= exact + PERIOD + 1e-8
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3)), min_size=1, max_size=7),
     st.floats(0.1, 4.0),

@@ -97,6 +97,7 @@ def test_two_waypoints_are_the_straight_move_and_one_is_a_rest(make_arm7: Callab
     assert np.ptp(rest.positions) == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", ["", "import matplotlib.pyplot as plt; assert plt.plot and not hasattr(plt, 'nope')"])
 def test_matplotlib_is_not_imported_for_it_and_stays_importable(after: str) -> None:
     program = (

@@ -131,6 +131,7 @@ def test_a_hand_that_holds_takes_nothing_else(bench: Make, story: Story) -> None
     assert arm.refused("pick", {"object": "cup"}).cause == "'cup' is in the hand already"
 
 
+@pytest.mark.slow
 def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
     """1.26 m away; the arm ends at about 1.1 m."""
     scene = "\n  post: {box: {size: [0.1, 0.1, 0.4]}, pose: {xyz: [1.2, 0.4, 0.2]}, fixed: true}\n"

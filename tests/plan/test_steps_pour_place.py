@@ -114,6 +114,7 @@ def test_a_tilted_cup_is_put_upright_before_it_pours(bench: Make, story: Story) 
     np.testing.assert_allclose(lip(X_WO[-1])[:2], TRAY, atol=FACETS)
 
 
+@pytest.mark.slow
 def test_a_receiver_out_of_reach_is_refused_with_what_was_tried(bench: Make, story: Story) -> None:
     arm = bench()
     arm.now = story.steps["pour"][0]
@@ -219,6 +220,7 @@ def test_a_place_is_said_completely_and_consistently(bench: Make) -> None:
     assert arm.problems("pour", {"object": "cup", "into": "trey"})[0][2] == "did you mean 'tray'?"
 
 
+@pytest.mark.slow
 def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any) -> None:
     """A cylinder, a mesh (an octahedron prism) and a URDF body: each goes 30 cm to the left."""
     corners = [(0.02 * np.cos(a), 0.02 * np.sin(a)) for a in np.arange(8) * np.pi / 4]

@@ -106,6 +106,7 @@ def test_topics_of_one_log_alone_and_logs_that_end_earlier(log: Path, tmp_path: 
     assert not open_end["/contacts"].same, "they are missing before its end"
 
 
+@pytest.mark.slow
 def test_what_never_finds_a_partner_does_not_fill_the_memory(
     log: Path, tmp_path: Path, rewrite_log: Rewrite, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,6 +69,7 @@ def stamp(message: Any) -> int:
     return int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
 
 
+@pytest.mark.slow
 def test_every_message_decodes_to_what_was_put_in(log: tuple[Any, Path]) -> None:
     run, path = log
     topics = decoded(path)
@@ -266,6 +267,7 @@ def test_the_caller_may_reuse_its_arrays(tmp_path: Path, make_run: MakeRun) -> N
     assert np.isfinite([m.position for _, m in decoded(tmp_path / "run.mcap")["/joint_states"]]).all()
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_the_run(tmp_path: Path, make_run: MakeRun) -> None:
     run = make_run(500)
     recorder = run.recorder(tmp_path / "run.mcap", period=0.0005)

@@ -116,6 +116,7 @@ def messages_of(data: bytes, begin: int) -> list[int]:
     return [record.log_time for record in breakup_chunk(chunk)]
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_costs_at_most_the_part_it_is_in(small: Path, tmp_path: Path) -> None:
     data = small.read_bytes()
     whole, names = read_by_mcap(small)

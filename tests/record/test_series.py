@@ -262,6 +262,7 @@ def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
     assert read > 50 and refused > 50
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "says", "hint"),
     [

@@ -107,6 +107,7 @@ def test_any_width_will_do(columns: int) -> None:
     assert _lines(CHART, columns=columns)
 
 
+@pytest.mark.slow
 def test_one_value_and_none_are_drawn_too() -> None:
     one = Curve("a", "", "", np.array([1.0]), np.array([5.0]))
     none = Curve("b", "", "", np.array([1.0, 2.0]), np.array([np.nan, np.nan]))
@@ -117,6 +118,7 @@ def test_one_value_and_none_are_drawn_too() -> None:
     assert figure.render(chart, "svg")
 
 
+@pytest.mark.slow
 def test_a_figure_is_the_kind_that_was_asked_for_and_the_same_bytes_each_time() -> None:
     png = figure.render(CHART, "png")
     with Image.open(io.BytesIO(png)) as image:

@@ -77,6 +77,7 @@ def _in_world(frame: str, tree: dict[str, tuple[str, np.ndarray]]) -> np.ndarray
     return X
 
 
+@pytest.mark.slow
 def test_every_frame_stands_where_tf_says(log: Path, playback: Playback) -> None:
     tree = _transforms(log)
     frames = draw(playback.robot, playback.scene).frames

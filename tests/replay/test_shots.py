@@ -236,6 +236,7 @@ def test_what_is_no_view_is_told(text: str) -> None:
         direction(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["webp", "gif"])
 @pytest.mark.parametrize(("fps", "speed"), [(10.0, 1.0), (15.0, 4.0), (12.5, 0.5)])
 def test_a_film_has_its_frames_and_lasts_as_long_as_the_run(

@@ -200,6 +200,7 @@ def test_a_task_that_was_refused_has_a_page_and_junit(run_cli: Callable[..., Ran
     assert "cannot be planned" in junit.read_text("utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--report", "--junit"])
 def test_where_nothing_can_be_written_is_told_before_the_run(
     run_cli: Callable[..., Ran], tmp_path: Path, option: str

@@ -95,6 +95,7 @@ INVALID = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", INVALID)
 def test_an_invalid_file_is_told_with_its_place(call: Call, tmp_path: Path, case: str) -> None:
     text, told = INVALID[case]
@@ -164,6 +165,7 @@ UNPLANNABLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", UNPLANNABLE)
 def test_an_impossible_step_is_refused_before_anything_moves(call: Call, tmp_path: Path, case: str) -> None:
     steps, told = UNPLANNABLE[case]
@@ -181,6 +183,7 @@ def test_an_impossible_step_is_refused_before_anything_moves(call: Call, tmp_pat
     assert files(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_cup_out_of_reach_is_told_with_its_step(call: Call, tmp_path: Path) -> None:
     text = unplannable(call("run", ROOT / "tasks" / "pour.yaml", "--set", "scene.cup.at=[1.12, 0.0]"))
     assert "step 'pick_1': no way to pick 'cup'" in text
@@ -200,6 +203,7 @@ TYPOS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("override", "told"), TYPOS)
 def test_a_wrong_override_names_itself_and_what_was_meant(call: Call, tmp_path: Path, override: str, told: str) -> None:
     text = refused(call("run", ROOT / "tasks" / "pour.yaml", "--set", override), 4)
@@ -217,6 +221,7 @@ def test_a_log_is_not_overwritten_without_being_told(call: Call, tmp_path: Path)
     assert log.read_bytes().startswith(b"\x89MCAP0\r\n")
 
 
+@pytest.mark.slow
 def test_a_log_never_replaces_a_file_of_its_task(call: Call, tmp_path: Path) -> None:
     task = written(tmp_path, HEAD + "start: home\n" + HOME)
     before = task.read_bytes()
@@ -227,6 +232,7 @@ def test_a_log_never_replaces_a_file_of_its_task(call: Call, tmp_path: Path) -> 
     assert task.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_log_that_cannot_be_written_is_told_before_the_simulation(call: Call, tmp_path: Path) -> None:
     task = written(tmp_path, HEAD + HOME)
     (tmp_path / "folder.mcap").mkdir()

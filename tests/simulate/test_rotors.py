@@ -77,6 +77,7 @@ def integrated(robot: RobotModel, seconds: float) -> tuple[np.ndarray, np.ndarra
     return q, v
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 @pytest.mark.parametrize("rotors", [(5e-5, 2e-5), (5e-4, 2e-4), (0.0, 2e-4)])
 def test_a_joint_accelerates_its_rotor_too(

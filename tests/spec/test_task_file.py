@@ -572,6 +572,7 @@ def test_the_resolved_text_is_the_whole_spec_in_si() -> None:
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12)
 
 
+@pytest.mark.slow
 @given(
     name=st.from_regex(r"\w[\w .+-]{0,10}\w", fullmatch=True),
     description=TEXTS,
@@ -651,6 +652,7 @@ def test_a_mutated_task_loads_or_is_refused_with_findings(data: st.DataObject) -
         assert all(finding.place is not None for finding in error.findings)
 
 
+@pytest.mark.slow
 @given(path=st.text("abcdeimnoprstu0123_1.", max_size=12), value=VALUES)
 def test_any_override_applies_or_is_refused(path: str, value: str) -> None:
     for prefix in ("", "scene.", "scene.cup.", "steps.", "steps.0.", "steps.pour_1.pour.", "simulation."):

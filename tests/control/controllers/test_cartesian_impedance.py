@@ -79,6 +79,7 @@ def off(before, now):
     return np.concatenate([now[1] - before[1], rotation_vector(now[0] @ before[0].T)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrench", [(8.0, 0, 0, 0, 0, 0), (0, -6.0, 4.0, 0, 0, 0), (0, 0, 0, 0.4, -0.3, 0.5)])
 def test_a_force_displaces_the_tool_by_its_share_of_the_stiffness(wrench):
     """At rest J^T (F + K e) + N (...) = 0, and N is orthogonal to J^T: e = -K^-1 F, whatever the posture wants."""
@@ -102,6 +103,7 @@ def test_axes_of_the_tool_turn_with_it():
     np.testing.assert_allclose(moved, [9.0 / 900.0, 0.0, 0.0], atol=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("posture", [0.0, 10.0])
 @pytest.mark.parametrize("damping", [None, (60.0, 60.0, 60.0, 2.0, 2.0, 2.0)])
 def test_energy_does_not_grow(posture, damping):
