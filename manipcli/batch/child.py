@@ -51,6 +51,7 @@ class _Beats:
     def __init__(self, parent: Parent) -> None:
         self._parent = parent
         self._doing = ""
+        self._at = 0.0
         self._next = 0.0
 
     def doing(self, what: str) -> None:
@@ -61,7 +62,8 @@ class _Beats:
         self.doing("planned")
 
     def told(self, text: str, *, detail: bool) -> None:
-        """The ticks say enough."""
+        """A step was planned again, which may have taken long, or is tried again."""
+        self._parent.send(Beat(self._doing, self._at))
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
         self._doing = f"step {index + 1} of {total}, '{step.id}'"
@@ -69,12 +71,15 @@ class _Beats:
         self._next = 0.0
 
     def tick(self, simulated_time: float, wall: float) -> None:
+        self._at = simulated_time
         if wall >= self._next:
             self._next = wall + BEAT_PERIOD
             self._parent.send(Beat(self._doing or "before the first step", simulated_time))
 
     def step_ended(self, outcome: StepOutcome) -> None:
-        """The next one begins, or the end is told."""
+        """The next one begins, or the run is judged."""
+        self._doing = f"after {self._doing}"
+        self._parent.send(Beat(self._doing, self._at))
 
 
 def _end_of(job: Job, beats: _Beats) -> End:

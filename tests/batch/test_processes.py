@@ -9,19 +9,26 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from manipcli.batch.child import _Beats
 from manipcli.batch.job import End, Job, Settings, limit
 from manipcli.batch.pool import run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
-from manipcli.judge.verdict import ExpectationOutcome, Verdict
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Trouble
+
+if TYPE_CHECKING:
+    from manipcli.flow.plan import PlannedStep
 
 CHILD = f"""
 import os, signal, sys, time
@@ -125,6 +132,19 @@ def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None
     onlooker = (lambda _: None) if watched else None
     (report,) = run_jobs([job], at_once=1, onlooker=onlooker, command=(sys.executable, "-c", CHILD))
     assert report.outcome == "invalid"
+
+
+def test_a_step_that_is_planned_again_and_the_end_of_one_are_signs_of_life() -> None:
+    ours, childs = Pipe()
+    step = cast("PlannedStep", SimpleNamespace(id="pick_1"))
+    beats = _Beats(childs)
+    beats.step_started(step, 1, 2)
+    beats.tick(2.5, 1.0)
+    beats.told("planned again", detail=True)
+    beats.step_ended(StepOutcome("pick_1", "pick", "done", started=2.0, ended=2.5, planned_duration=0.5))
+    told = [str(ours.recv()) for _ in range(4)]
+    one = "step 2 of 2, 'pick_1'"
+    assert told == [one, f"{one} at 2.50 s", f"{one} at 2.50 s", f"after {one} at 2.50 s"]
 
 
 @pytest.mark.slow
