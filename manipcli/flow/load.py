@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TypeVar
@@ -56,8 +56,8 @@ class Truth:
 class Task:
     """A task that can be planned: the three files as written, and the robot and scene that they mean.
 
-    `findings` are warnings and notes; errors do not get here. `places`: where the steps were written, of a task
-    that was read from a log.
+    `findings` are warnings and notes; errors do not get here. `places`: where steps, expectations and watches were
+    written, of a task that was read from a log.
     """
 
     file: Located[TaskSpec]
@@ -66,7 +66,7 @@ class Task:
     robot: RobotModel
     scene: Scene
     findings: tuple[Finding, ...]
-    places: tuple[str, ...] = ()
+    places: Mapping[Loc, str] = field(default_factory=dict)
     drawn: Drawn | None = None
     truth: Truth | None = None
 
@@ -92,9 +92,8 @@ class Task:
 
     def log_place(self, *path: str | int) -> str:
         """`pour.yaml:21:5`: no folder of this machine gets into a log."""
-        match path:
-            case ("steps", int(index)) if self.places:
-                return self.places[index]
+        if path in self.places:
+            return self.places[path]
         place = self.file.place(*path)
         return f"{Path(place.file).name}:{place.line}:{place.column}"
 

@@ -46,11 +46,13 @@ class PlannedMotion:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What will be done. `planner` can plan a step again from what was measured."""
+    """What will be done. `planner` can plan a step again from what was measured; `judged`: where expectations and
+    watches were written, for the log."""
 
     steps: tuple[PlannedStep, ...]
     start: Situation
     planner: Planner
+    judged: tuple[str, ...] = ()
 
     @property
     def motions(self) -> tuple[PlannedMotion, ...]:
@@ -62,7 +64,8 @@ class Plan:
         )
 
     def to_json(self) -> bytes:
-        """What the log carries: ids, verbs, where the steps were written, durations, and each trajectory's ends."""
+        """What the log carries: ids, verbs, where steps and what is judged were written, durations, and each
+        trajectory's ends."""
         steps = [
             {
                 "id": step.id,
@@ -73,7 +76,7 @@ class Plan:
             }
             for step in self.steps
         ]
-        return json.dumps({"steps": steps}, indent=1).encode()
+        return json.dumps({"steps": steps, "judged": list(self.judged)}, indent=1).encode()
 
 
 def plan_task(task: Task) -> Plan:
@@ -84,7 +87,8 @@ def plan_task(task: Task) -> Plan:
     """
     planner = _planner(task)
     start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
-    return Plan(steps=tuple(_steps(task, planner, start)), start=start, planner=planner)
+    judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
+    return Plan(steps=tuple(_steps(task, planner, start)), start=start, planner=planner, judged=judged)
 
 
 def refused(task: Task, refusal: NotPlannable) -> Verdict:

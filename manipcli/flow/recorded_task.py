@@ -10,7 +10,7 @@ from pathlib import Path
 
 from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.flow.load import Task, unusable
+from manipcli.flow.load import Loc, Task, unusable
 from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.sample import sampled
@@ -107,16 +107,16 @@ def _drawn(recording: Recording, path: Path) -> Drawn | None:
         raise InvalidInput([Finding("LOG103", message)]) from None
 
 
-def _places(recording: Recording, path: Path, spec: TaskSpec) -> tuple[str, ...]:
-    """Where the steps were written, as the plan in the log says; () where it does not."""
+def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
+    """Where steps and what is judged were written, as the plan in the log says; {} where it does not."""
     try:
         plan = json.loads(attached(recording, path, PLAN))
-        steps = plan["steps"] if isinstance(plan, dict) else []
-        places = tuple(step["place"] for step in steps)
+        places = [*(step["place"] for step in plan["steps"]), *plan["judged"]]
     except (KeyError, TypeError, ValueError, RecursionError):
-        return ()
-    whole = len(places) == len(spec.steps) and all(isinstance(place, str) for place in places)
-    return places if whole else ()
+        return {}
+    keys = [*(("steps", k) for k in range(len(spec.steps))), *spec.judged_at]
+    whole = len(places) == len(keys) and all(isinstance(place, str) for place in places)
+    return dict(zip(keys, places, strict=True)) if whole else {}
 
 
 def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:

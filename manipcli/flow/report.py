@@ -111,14 +111,16 @@ def refused_page(task: Task, verdict: Verdict) -> RunPage:
 
 
 def log_places(recording: Recording, path: Path) -> Places:
-    """Where the log says that steps were written, and the lines of steps and expectations in the resolved task."""
+    """Where the log says that steps and expectations were written, and their lines in the resolved task."""
     task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
-    known = _step_places(recording)
-    steps = tuple(
-        Written(known.get(str(step.id), "").rpartition(":")[0], TASK, task.place("steps", k).line)
-        for k, step in enumerate(task.spec.steps)
-    )
-    return steps, tuple(Written("", TASK, task.place(*key).line) for key in judged_at(task.spec))
+    known, judged = _known_places(recording)
+
+    def written(place: str, *key: str | int) -> Written:
+        return Written(place.rpartition(":")[0], TASK, task.place(*key).line)
+
+    steps = tuple(written(known.get(str(step.id), ""), "steps", k) for k, step in enumerate(task.spec.steps))
+    keys = task.spec.judged_at
+    return steps, tuple(written(judged[k] if len(judged) == len(keys) else "", *key) for k, key in enumerate(keys))
 
 
 def task_places(task: Located[TaskSpec]) -> Places:
@@ -130,12 +132,7 @@ def task_places(task: Located[TaskSpec]) -> Places:
         return Written(f"{name}:{place.line}", name, place.line) if place.line > 0 else Written("")
 
     steps = tuple(written("steps", k) for k in range(len(task.spec.steps)))
-    return steps, tuple(written(*key) for key in judged_at(task.spec))
-
-
-def judged_at(spec: TaskSpec) -> tuple[tuple[str, int], ...]:
-    """Where in a task the expectations stand, and what is watched."""
-    return tuple((key, k) for key in ("expect", "watch") for k in range(len(getattr(spec, key))))
+    return steps, tuple(written(*key) for key in task.spec.judged_at)
 
 
 def file_places(path: Path, overrides: Sequence[str]) -> Places:
@@ -147,15 +144,17 @@ def file_places(path: Path, overrides: Sequence[str]) -> Places:
     return task_places(load_spec(path, model=task_spec(), overrides=overrides))
 
 
-def _step_places(recording: Recording) -> dict[str, str]:
-    """Where each step was written, `pour.yaml:21:5`, by its id; of those begun, where the plan does not say."""
+def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
+    """Where each step was written, `pour.yaml:21:5`, by its id, of those begun where the plan does not say; and where
+    each expectation and watch, none where the plan does not say."""
     places = {event.step: event.place for event in recording.events if event.place}
     try:
         # Any: what a file holds is not known before it is looked at.
         plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
-        return places | {str(step["id"]): str(step["place"]) for step in plan["steps"]}
+        steps = {str(step["id"]): str(step["place"]) for step in plan["steps"]}
+        return places | steps, [str(place) for place in plan.get("judged", ())]
     except (ValueError, KeyError, TypeError, AttributeError):
-        return places
+        return places, []
 
 
 def _near(task_file: Path, task: TaskSpec) -> tuple[Path, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from manipcli.control.action import GoalHandle
 from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.flow.holding import Holding
 from manipcli.flow.live import Live
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
@@ -82,6 +83,7 @@ class StepsRun:
         self._replans = replan is not False
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._holding = Holding(task.true.robot, task.true.scene)
         self._believed = plan.start
         self.planning = 0.0
         """How long [s] planning again took, of the clock on the wall."""
@@ -239,6 +241,8 @@ class StepsRun:
                 end = self._executor.run(motion, until=until, deadline=over)
                 if end.outcome != "done":
                     return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
+                if motion.grip is not None and planned.plan.end.carried is not None:
+                    self._holding.taken(planned.plan.end.carried.body, self._session.touched)
                 awaited = awaited and not motion.awaits
                 texts += [end.text] if end.text else []
             self._believed = planned.plan.end
@@ -274,7 +278,8 @@ class StepsRun:
         if away <= LEFT_BEHIND:
             return None
         where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
-        return MotionEnd("failed", f"{where}: it slipped, or was never held")
+        grasp = self._holding.told(carried.body)
+        return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
 
     def _tell(self, text: str, *, detail: bool) -> None:
         if self._progress is not None:

@@ -25,7 +25,7 @@ class Drawn:
 
     def __str__(self) -> str:
         """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`."""
-        first = [f"{path}={_shown(value)}" for path, value in self.values[:MOST_SHOWN]]
+        first = [f"{path}={value_text(value)}" for path, value in self.values[:MOST_SHOWN]]
         rest = len(self.values) - len(first)
         return f"sample {self.number}: {', '.join(first)}" + (f", and {rest} more" if rest else "")
 
@@ -59,7 +59,8 @@ def _scalar(value: object) -> float:
     return value
 
 
-def _shown(value: Number) -> str:
+def value_text(value: Number) -> str:
+    """To four digits, in SI."""
     if isinstance(value, tuple):
-        return f"[{', '.join(map(_shown, value))}]"
+        return f"[{', '.join(map(value_text, value))}]"
     return f"{value:.4g}"

@@ -103,6 +103,9 @@ def _verdict(
     undone = next((step for step in steps if step.outcome != "done" and not step.tolerated), None)
     if undone is not None:
         why = f": {undone.text}" if undone.text else ""
+        first = undone.attempts[0].text if undone.attempts else ""
+        if first not in ("", undone.text):
+            why += f" (the first attempt: {first})"
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ')}{why}"
     if not steps:
         return "failed", "the recording knows no steps"

@@ -129,7 +129,7 @@ class Planner:
         if carried is not None:
             holds = f"holds '{carried.body}'"
         else:
-            holds = "holds something else" if situation.closed else "holds nothing"
+            holds = "is closed, but not on it" if situation.closed else "holds nothing"
         raise NotPlannable(
             f"'{body}' is not held: the hand {holds}", hint=f"`pick` it first, or `grasp: {{object: {body}}}`"
         )

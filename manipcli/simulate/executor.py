@@ -106,9 +106,9 @@ class Executor:
             if not busy and awaited is None:
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if deadline is not None and session.time >= deadline:
-                why = _late(handles)
+                late = "this motion was" if busy or awaited is None else "the condition under `until` held"
                 self._cancel()
-                return MotionEnd("timeout", why)
+                return MotionEnd("timeout", f"the time of the step was over before {late}")
             if deadline is None and session.time >= given_up:
                 late = f"it is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
                 self._cancel()
@@ -213,12 +213,6 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
         if "contact" not in stops and "stalled" not in stops:
             return MotionEnd("failed", f"the hand closed on nothing: {text}")
     return MotionEnd("done", text)
-
-
-def _late(handles: tuple[GoalHandle, ...]) -> str:
-    if any(handle.active for handle in handles):
-        return "the time of the step was over before this motion was"
-    return "the time of the step was over before the condition under `until` held"
 
 
 def _unreached(handles: tuple[GoalHandle, ...]) -> str:

@@ -107,6 +107,11 @@ class Session:
         """(n) in how many ticks each joint's command was cut."""
         return self._limiter.saturations.astype(np.float64)
 
+    @property
+    def touched(self) -> tuple[Contact, ...]:
+        """What the robot touched when it was last looked at; at most ten ticks ago."""
+        return self._touched
+
     def restart_clock(self, observer: Observer) -> None:
         """The next tick is number 0, and the first that `observer` sees; the world stays as it is."""
         self.ticks = 0

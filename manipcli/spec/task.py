@@ -209,7 +209,10 @@ class StepSpec(KeyedSpec):
     """What every step has beside its one verb key. `body` is the validated block under the verb."""
 
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
-    until: ConditionSpec | None = Field(None, description="The step ends once this holds, too.")
+    until: ConditionSpec | None = Field(
+        None,
+        description="What the step waits for when it has moved (`pour`: in its dwell), 30 s or until its `timeout`.",
+    )
     timeout: Annotated[Time, Field(gt=0)] | None = Field(None, description="Fails the step after this [s], above 0.")
     on_fail: OnFail = Field(
         "stop",
@@ -277,6 +280,11 @@ class TaskSpec(Model):
     def judged(self) -> tuple[ExpectationSpec, ...]:
         """What the recording is asked: what is expected, then what was watched."""
         return (*self.expect, *self.watch)
+
+    @property
+    def judged_at(self) -> tuple[tuple[str, int], ...]:
+        """Where in the file each of `judged` stands."""
+        return tuple((key, k) for key in ("expect", "watch") for k in range(len(getattr(self, key))))
 
     @model_validator(mode="after")
     def _recordable(self) -> TaskSpec:

@@ -106,6 +106,11 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     )
     assert told is not None, verdict.text
     assert int(told[1]) > 50
+    grasp = r"the hand took it with ([\d.]+) N, of which friction 0\.05 \(0\.05 x 1 of the hand\) carries ([\d.]+) N"
+    force = re.search(grasp, verdict.text)
+    assert force is not None, verdict.text
+    assert float(force[2]) == pytest.approx(0.05 * float(force[1]), rel=0.01)
+    assert verdict.text.endswith("; it weighs 1.47 N")
 
 
 CUP = Mover("pick_1", ("cup", "ball"), (0.0, -0.1, 0.0))

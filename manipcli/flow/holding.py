@@ -1,0 +1,45 @@
+"""What the hand holds things with: how hard it pressed, and what friction can carry at that."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
+from manipcli.model.state import Contact
+from manipcli.model.touch import grips
+
+
+class Holding:
+    """Remembers each grasp, to say why what was taken is no longer there.
+
+    Args:
+        robot, scene: the world as it is.
+    """
+
+    def __init__(self, robot: RobotModel, scene: Scene) -> None:
+        self._robot = robot
+        self._scene = scene
+        self._pressed: dict[str, float] = {}
+
+    def taken(self, body: str, contacts: Sequence[Contact]) -> None:
+        """The hand has closed on a body, and touches this."""
+        self._pressed[body] = sum(force for force, _ in grips(contacts, body))
+
+    def told(self, name: str) -> str:
+        """The force N of the hand on a body at the grasp, the mu N that friction can carry, and its weight m g.
+
+        The friction of a contact is the product of the two surfaces', as in Bullet.
+        """
+        pressed = self._pressed.get(name)
+        if pressed is None:
+            return ""
+        body = self._scene.body(name)
+        friction = body.friction * self._robot.friction
+        weight = body.mass * float(np.linalg.norm(self._scene.gravity))
+        grasp = f"the hand took it with {readable(pressed, 'N')}, of which friction {friction:.3g}"
+        shares = f"({body.friction:.3g} x {self._robot.friction:.3g} of the hand)"
+        return f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it weighs {readable(weight, 'N')}"
