@@ -10,7 +10,7 @@ from manipcli.batch.job import Job
 from manipcli.core.errors import Place
 from manipcli.core.whole_file import write_whole
 from manipcli.flow.replay import open_playback
-from manipcli.flow.report import file_places, judged_at, log_page, refused_page
+from manipcli.flow.report import file_places, log_page, refused_page
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.verdict import Verdict
 from manipcli.pipeline import load_task
@@ -42,7 +42,7 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [
         Trouble(describe_expectation(one), _place(job, task, *key), one.at)
-        for key, one in zip(judged_at(task.spec), verdict.expectations, strict=False)
+        for key, one in zip(task.spec.judged_at, verdict.expectations, strict=False)
         if one.outcome != "passed" and not refused
     ]
     if verdict.verdict == "error" or not (steps or unmet):
@@ -63,7 +63,7 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
     task = load.load_task(job.path, model=task_spec())
     changes = compared(old, measured(verdict, job.log), task.spec.baseline.tolerance)
     loc: dict[Key, tuple[str | int, ...]] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
-    judged = zip(judged_at(task.spec), verdict.expectations, strict=False)
+    judged = zip(task.spec.judged_at, verdict.expectations, strict=False)
     loc |= {("margins", one.name): key for key, one in judged}
     worse = tuple(
         Trouble(f"{one.word} the baseline: {one}", _place(job, task, *loc.get(one.key, ("task",))))

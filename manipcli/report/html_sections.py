@@ -3,6 +3,8 @@ in order."""
 
 from __future__ import annotations
 
+from manipcli.core.text import number_of
+from manipcli.judge.drawn import value_text
 from manipcli.judge.verdict import StepOutcome
 from manipcli.report.facts import RunFacts
 from manipcli.report.html_parts import (
@@ -49,6 +51,7 @@ def head(page: RunPage) -> Markup:
         "header",
         element("div", element("h1", verdict.task), word, class_="title"),
         element("p", verdict.text, class_="says") if good or not page.causes else None,
+        element("p", str(verdict.drawn)) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
     )
@@ -253,7 +256,17 @@ def provenance(page: RunPage) -> Markup:
         if hashes
         else None
     )
-    notes = [element("p", f"Note: {note}", class_="about") for note in page.notes]
-    return element(
-        "section", heading("provenance", "Provenance"), element("dl", *pairs, class_="figures small"), listed, *notes
+    drawn = page.verdict.drawn
+    values = [(element("code", path), value_text(value)) for path, value in drawn.values] if drawn is not None else []
+    sample = (
+        element(
+            "details",
+            element("summary", f"{number_of(len(values), 'value')} of the sample (SI)"),
+            table(("path", "value"), values),
+        )
+        if values
+        else None
     )
+    notes = [element("p", f"Note: {note}", class_="about") for note in page.notes]
+    figures = element("dl", *pairs, class_="figures small")
+    return element("section", heading("provenance", "Provenance"), figures, sample, listed, *notes)

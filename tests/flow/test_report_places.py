@@ -1,0 +1,61 @@
+"""The page about a run names the lines of the user's own file, and says which sample it is of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from manipcli.flow.report import log_page
+from manipcli.pipeline import run_task, verify_log
+from manipcli.report.html import render_page
+
+ROOT = Path(__file__).parents[2]
+TASK = f"""# The wrist waits.
+
+task: short
+robot: {ROOT}/robots/differential_wrist/robot.yaml
+controllers: {ROOT}/controllers/differential_wrist.yaml
+simulation: {{engine: kinematic}}
+scene:
+  pillar: {{cylinder: {{radius: 1 cm, height: 1 cm}}, fixed: true, pose: {{xyz: [2, 2, 1]}}}}
+steps: [{{wait: 50 ms}}]
+expect:
+  - duration: {{below: 2 s}}
+watch:
+  - always: {{duration: {{below: 20 ms}}}}
+vary:
+  scene.pillar.pose.xyz: {{offset: {{uniform: [-1 cm, 1 cm]}}}}
+"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("places")
+    (folder / "mine.yaml").write_text(TASK)
+    run_task(folder / "mine.yaml", sample=3, log=folder / "run.mcap")
+    return folder / "run.mcap"
+
+
+def test_expectations_and_watches_stand_where_the_user_wrote_them(log: Path) -> None:
+    page = log_page(log)
+    lines = TASK.splitlines()
+    at = [written.place for written in (*page.steps, *page.expectations)]
+    told = [lines[int(place.removeprefix("mine.yaml:")) - 1] for place in at]
+    assert [line.strip() for line in told] == [
+        "steps: [{wait: 50 ms}]", "- duration: {below: 2 s}", "- always: {duration: {below: 20 ms}}"
+    ]  # fmt: skip
+    assert "task.yaml:" not in render_page(page)
+
+
+def test_the_page_tells_what_was_drawn(log: Path) -> None:
+    page = log_page(log)
+    assert page.verdict.drawn is not None
+    assert str(page.verdict.drawn).startswith("sample 3: scene.pillar.pose.xyz=[")
+    shown = render_page(page)
+    assert str(page.verdict.drawn) in shown
+    assert "1 value of the sample" in shown
+
+
+def test_a_log_is_simulated_again_with_the_places_of_its_run(log: Path) -> None:
+    assert verify_log(log).identical
