@@ -215,6 +215,10 @@ class Planner:
         hint = "no way around is searched for: `move` to a pose from which the way is free"
         if carried is not None and hit.time <= 0.0 and carried.body in (hit.a, hit.b):
             hint = f"`lift` '{carried.body}' first"
+        if carried is None and hit.time <= 0.0 and hit.distance < 0.0:
+            hint = "put them apart, or let the robot begin elsewhere: `start: POSE` in the task"
+            overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
+            return NotPlannable(f"{overlap} where the robot begins, {when}", hint=hint)
         near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
         clearance = f"{1000 * CLEARANCE:.0f} mm"
         return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -134,3 +135,15 @@ def test_mimics_follow_and_references_move_at_one_speed(bench: Make) -> None:
     assert with_mimics(panda.robot, q)[:, j].tolist() == [0.01, 0.02]
     way = ramp(np.array([0.0, 0.0]), np.array([0.2, -1.0]), np.array([0.0, 0.1, 0.5, 2.0]))
     np.testing.assert_allclose(way, [[0, 0], [0.1, -0.1], [0.2, -0.5], [0.2, -1.0]])
+
+
+def test_a_robot_that_begins_in_something_is_told_so(bench: Make) -> None:
+    """A box of 20 cm about the origin of the tool."""
+    x, y, z = bench().planner.tool_pose(bench().start).p
+    at = f"[{x:.4f}, {y:.4f}, {z:.4f}]"
+    arm = bench(scene=f"{{wall: {{box: {{size: [20 cm, 20 cm, 20 cm]}}, pose: {{xyz: {at}}}, fixed: true}}}}")
+    refusal = arm.refused("move", {"to": {"joint_1": 0.3}})
+    assert re.match(
+        r"'robot/\w+' and 'wall' overlap by [\d.]+ mm where the robot begins, at t = 0.00 s of 'move'$", refusal.cause
+    )
+    assert refusal.hint is not None and "`start: POSE`" in refusal.hint
