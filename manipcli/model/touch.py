@@ -48,3 +48,19 @@ def unknown_part(setting: Setting, name: str, loc: tuple[str | int, ...]) -> tup
     known = links if name.startswith(f"{ROBOT}/") else (ROBOT, *bodies)
     message = f"'{name}' is neither a body of the scene nor a part of the robot"
     return (Problem(loc, message, did_you_mean(name, known)),)
+
+
+def impossible_pair(setting: Setting, pair: tuple[str, str], loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+    """Empty if both parts exist and the simulation lets them touch each other."""
+    unknown = tuple(found for k, name in enumerate(pair) for found in unknown_part(setting, name, (*loc, k)))
+    if unknown:
+        return unknown
+    if all(name.partition("/")[0] == ROBOT for name in pair):
+        message = "the robot does not collide with itself in the simulation, so nothing can be said of that"
+        return (Problem(loc, message, "leave the pair out: the planner keeps the robot off itself"),)
+    if pair[0] == pair[1]:
+        return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)
+    fixed = {body.name for body in setting.scene.bodies if body.fixed}
+    if fixed.issuperset(pair):
+        return (Problem(loc, f"'{pair[0]}' and '{pair[1]}' are both fixed, so nothing can be said of their contact"),)
+    return ()

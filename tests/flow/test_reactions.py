@@ -161,7 +161,7 @@ def test_a_watch_wins_over_a_retry(run: Run) -> None:
 
 
 def test_what_cannot_be_watched_is_not_evaluated(run: Run) -> None:
-    verdict = run("steps:\n  - wait: 0.1 s\nwatch:\n  - never: {collision: [robot, robot]}\n")
+    verdict = run("steps:\n  - wait: 0.1 s\nwatch:\n  - never: {collision: [robot, floor]}\n")
     assert verdict.verdict == "failed"
     assert "the engine has no physics" in verdict.expectations[0].text
 

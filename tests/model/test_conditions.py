@@ -337,6 +337,7 @@ def test_all_ticks_at_once_give_what_pieces_of_them_give(
         ("upright", {"object": "cp", "within": 0.1}, ("object",), "did you mean 'cup'?"),
         ("near", {"object": "cup", "to": "stat", "within": 0.1}, ("to",), "did you mean 'start'?"),
         ("near", {"object": "cup", "to": "drp", "within": 0.1}, ("to",), "did you mean 'drop'?"),
+        ("near", {"object": "cup", "to": "cup", "within": 0.1}, ("to",), "`to: start` is where it was at first"),
         ("at_rest", {"object": "trai"}, ("object",), "did you mean 'tray'?"),
         ("outside", {"object": "ball", "of": "stick"}, ("of",), None),
         ("above", {"object": "cup", "of": "try"}, ("of",), "did you mean 'tray'?"),

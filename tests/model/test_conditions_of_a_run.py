@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.build_scene import build_scene
@@ -318,6 +319,35 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
     (problem,) = condition.check(condition.spec.model_validate(written), Setting(ROBOT, SCENE, WORLD.steps))
     assert problem.loc == loc
     assert hint is None or problem.hint == hint
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [
+        (["robot", "robot"], "the robot does not collide with itself"),
+        (["robot/finger", "robot"], "the robot does not collide with itself"),
+        (["robot/finger", "robot/thumb"], "the robot does not collide with itself"),
+        (["cube", "cube"], "'cube' cannot touch itself"),
+        (["desk", "shelf"], "'desk' and 'shelf' are both fixed"),
+    ],
+)
+@pytest.mark.parametrize("name", ["collision", "no_collision", "contact_force"])
+def test_parts_that_never_touch_are_refused(name: str, pair: list[str], told: str) -> None:
+    shelf = replace(SCENE.body("desk"), name="shelf")
+    setting = Setting(ROBOT, replace(SCENE, bodies=(*SCENE.bodies, shelf)))
+    written, loc = (
+        ({"pair": pair, "below": 1}, ("pair",)) if name == "contact_force" else ({"pairs": [pair]}, ("pairs", 0))
+    )
+    condition: Condition[Any] = CONDITIONS[name]
+    (problem,) = condition.check(condition.spec.model_validate(written), setting)
+    assert problem.loc == loc
+    assert problem.message.startswith(told)
+
+
+@pytest.mark.parametrize("above", [1.0, 3.0])
+def test_a_range_of_forces_in_which_no_force_is_is_refused(above: float) -> None:
+    with pytest.raises(ValidationError, match=r"no force is below 1 N and above [13] N"):
+        CONDITIONS["contact_force"].spec.model_validate({"of": "cube", "below": 1.0, "above": above})
 
 
 @pytest.mark.parametrize("name", ["slip", "tool_speed"])

@@ -14,7 +14,7 @@ from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, 
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import Contact
-from manipcli.model.touch import between, unknown_part
+from manipcli.model.touch import between, impossible_pair
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
 
@@ -97,13 +97,8 @@ def _gauge(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
 
 
 def check(spec: NoCollisionSpec | CollisionSpec, setting: Setting) -> tuple[Problem, ...]:
-    """Every part is a body, the robot, or one of its links."""
-    return tuple(
-        found
-        for i, pair in enumerate(spec.pairs)
-        for j, name in enumerate(pair)
-        for found in unknown_part(setting, name, ("pairs", i, j))
-    )
+    """Every part is a body, the robot, or one of its links, and can touch the other of its pair."""
+    return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(setting, pair, ("pairs", k)))
 
 
 NO_COLLISION = Condition(

@@ -11,7 +11,7 @@ from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, 
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, least, reading
 from manipcli.model.state import Contact
-from manipcli.model.touch import between, is_part, unknown_part
+from manipcli.model.touch import between, impossible_pair, is_part, unknown_part
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Force
 
@@ -30,6 +30,11 @@ class ContactForceSpec(Model):
             raise problem("conflict", "say either `pair: [a, b]` or `of: part`")
         if self.below is None and self.above is None:
             raise problem("conflict", "say how hard: `below`, `above`, or both")
+        if self.below is not None and self.above is not None and self.above >= self.below:
+            asked = f"no force is below {readable(self.below, 'N')} and above {readable(self.above, 'N')}"
+            raise problem(
+                "conflict", asked, at=("above",), hint="write the least force under `above`, the largest under `below`"
+            )
         return self
 
 
@@ -63,10 +68,10 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
 
 
 def check(spec: ContactForceSpec, setting: Setting) -> tuple[Problem, ...]:
-    """The parts exist."""
-    if spec.of is not None:
-        return unknown_part(setting, spec.of, ("of",))
-    return tuple(p for j, name in enumerate(spec.pair or ()) for p in unknown_part(setting, name, ("pair", j)))
+    """The parts exist, and those of a pair can touch each other."""
+    if spec.pair is not None:
+        return impossible_pair(setting, spec.pair, ("pair",))
+    return unknown_part(setting, spec.of or "", ("of",))
 
 
 CONTACT_FORCE = Condition(

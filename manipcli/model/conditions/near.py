@@ -69,7 +69,7 @@ def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
 
 
 def check(spec: NearSpec, setting: Setting) -> tuple[Problem, ...]:
-    """The body exists, and so does the target."""
+    """The body exists, and so does the target, which is another."""
     scene = setting.scene
     problems = unknown_body(scene, spec.object, ("object",))
     if isinstance(spec.to, str):
@@ -77,6 +77,8 @@ def check(spec: NearSpec, setting: Setting) -> tuple[Problem, ...]:
         if spec.to not in known:
             message = f"'{spec.to}' is neither `start` nor a frame or body of the scene"
             return (*problems, Problem(("to",), message, did_you_mean(spec.to, known)))
+        if spec.to == spec.object != START:
+            return (Problem(("to",), f"'{spec.object}' is always near itself", "`to: start` is where it was at first"),)
     return problems
 
 
