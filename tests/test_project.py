@@ -116,5 +116,5 @@ def test_the_readme_begins_with_two_commands_that_stand_alone() -> None:
     commands = re.findall(r"^python3 -m venv .*$", (ROOT / "README.md").read_text(), flags=re.MULTILINE)
     assert len(commands) == 2
     assert commands[0].endswith("manipcli run tasks/pour.yaml")
-    assert commands[1].endswith("python -m pytest")
+    assert commands[1].endswith("python -m pytest -n auto")
     assert all("pip install -e " in command for command in commands)
