@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
-from manipcli.core.text import did_you_mean, shorten
+from manipcli.core.text import any_of, nearest, shorten
 
 
 class UnitError(ManipcliError):
@@ -191,8 +191,8 @@ def _symbol(symbol: str) -> Unit:
     unit = _UNITS.get(plain)
     if unit is None:
         word = _WORDS.get(plain.casefold())
-        hint = f"did you mean '{word}'?" if word else did_you_mean(plain, _UNITS, kind="units")
-        raise UnitError(f"unknown unit '{shorten(symbol)}'", hint=hint)
+        close = (word,) if word else nearest(plain, _UNITS)
+        raise UnitError(f"unknown unit '{shorten(symbol)}'", hint=f"did you mean {any_of(close)}?" if close else None)
     return unit
 
 
@@ -237,7 +237,10 @@ def to_si(text: str, *wanted: Dimension) -> float:
     Raises:
         UnitError: as `parse_quantity`; another dimension; or no unit where one is needed.
     """
-    quantity = parse_quantity(text)
+    try:
+        quantity = parse_quantity(text)
+    except UnitError as error:
+        raise UnitError(f"{error.cause}; expected {describe(*wanted)}", hint=error.hint) from None
     if quantity.dimension in wanted:
         return quantity.value
     if quantity.dimension == NUMBER and "%" not in text:
@@ -279,7 +282,7 @@ _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
 def readable(value: float, symbol: str, *, digits: int = 3) -> str:
     """`value` in the SI unit `symbol`, for people: `readable(0.0042, "m")` is `4.2 mm`; angles in degrees."""
     if value == 0.0 or not math.isfinite(value):
-        return f"{value:g} {symbol}".rstrip()
+        return f"{value + 0.0:g} {symbol}".rstrip()  # never -0
     for least, shown, factor in _READABLE.get(symbol, ()):
         if abs(value) >= least:
             return f"{value * factor:.{digits}g} {shown}"

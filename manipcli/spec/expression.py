@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import did_you_mean, shorten
+from manipcli.core.text import did_you_mean, escape, shorten
 from manipcli.core.units import (
     NUMBER,
     NUMBER_PATTERN,
@@ -73,7 +73,7 @@ def evaluate(text: str, params: Params) -> Scalar:
 
 def _param(name: str, params: Params) -> Scalar:
     if name not in params:
-        hint = did_you_mean(name, params, kind="params") or "the task has no params: block"
+        hint = did_you_mean(name, params, kind="params") or no_params(name)
         raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
     return params[name]
 
@@ -218,6 +218,12 @@ class _Substitution:
             code = f"{self.area}{203 if error.unknown else 211}"
             self.findings.append(Finding(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
             return node
+
+
+def no_params(name: str) -> str:
+    """The hint where a task uses a parameter and has none."""
+    word = escape(name)
+    return f"the task has no parameters: write `params: {{{word}: ...}}` at its top, and ${word} where it is used"
 
 
 def escaped(text: str) -> str:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manipcli.spec.expression import escaped, substitute
+from manipcli.core.text import did_you_mean
+from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, Source, validate
 from manipcli.spec.task import StepSpec, TaskSpec
 from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, node_at
@@ -28,7 +29,7 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     for name, entry in changed.entries.items():
         if name not in entries:
             path = ("steps", index, "on_fail", "with", name)
-            hint = f"params: {', '.join(entries)}" if entries else "the task has no params: block"
+            hint = did_you_mean(name, entries, kind="params") or no_params(name)
             told.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
         entries[name] = Entry(entry.key_place, _escaped(entry.node))
     block = Entry(changed.place, MappingNode(entries, changed.place))

@@ -73,7 +73,7 @@ def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
         __doc__=TaskSpec.__doc__,
         steps=(tuple[step, ...], TaskSpec.model_fields["steps"]),  # type: ignore[valid-type]
         expect=(tuple[expectation, ...], TaskSpec.model_fields["expect"]),  # type: ignore[valid-type]
-        watch=(tuple[_watches(condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
+        watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
     )
     return cast(type[TaskSpec], model)
 
@@ -98,10 +98,10 @@ def _expectations(members: Members, condition: object) -> object:
     return _union("expectation", models, common=_EXPECTATION)
 
 
-def _watches(condition: object) -> object:
+def _watches(names: Sequence[str], condition: object) -> object:
     """`never` and `always` of any condition."""
     models = [_keyed(WatchSpec, name, condition, QUANTIFIERS[name]) for name in WATCHED]
-    return _union("watch", models, common=("id", "during"))
+    return _union("watch", models, common=("id", "during"), below=(*names, *COMBINATIONS))
 
 
 _CONDITION = "Condition"
@@ -113,14 +113,17 @@ def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[Keyed
     return _keyed(base, name, condition if name == "not" else listed, COMBINATIONS[name])
 
 
-def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str]) -> object:
-    """`Annotated[A | B | ..., which key, one key]` of models that are each known by one key."""
+def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str], below: Sequence[str] = ()) -> object:
+    """`Annotated[A | B | ..., which key, one key]` of models that are each known by one key.
+
+    `below`: words that are no such key, but may stand below any of them.
+    """
     names = tuple(model.word for model in models)
     tagged = [Annotated[model, Tag(_tag(model.word))] for model in models]
     one_of = reduce(or_, tagged[1:], tagged[0]) if len(tagged) > 1 else tagged[0]
     if len(tagged) > 1:
         one_of = Annotated[one_of, Discriminator(_key_of(names))]
-    return Annotated[one_of, BeforeValidator(_check(kind, names, tuple(common)))]
+    return Annotated[one_of, BeforeValidator(_check(kind, names, tuple(common), tuple(below)))]
 
 
 def _tag(name: str) -> str:
@@ -162,9 +165,12 @@ def _key_of(names: tuple[str, ...]) -> Callable[[object], str | None]:
     return key_of
 
 
-def _check(kind: str, names: tuple[str, ...], common: tuple[str, ...]) -> Callable[[object], object]:
+def _check(
+    kind: str, names: tuple[str, ...], common: tuple[str, ...], below: tuple[str, ...]
+) -> Callable[[object], object]:
     """Exactly one of `names` among the keys; what else is wrong the member's model tells."""
 
+    kinds = f"{kind}es" if kind.endswith("ch") else f"{kind}s"
     what, its = ("a step", "verb") if kind == "verb" else (f"an {kind}" if kind[0] in "aeiou" else f"a {kind}", "name")
 
     def check(value: object) -> object:
@@ -172,7 +178,7 @@ def _check(kind: str, names: tuple[str, ...], common: tuple[str, ...]) -> Callab
             return value
         if not isinstance(value, dict):
             forgot = isinstance(value, str) and value in names
-            hint = f"write `{value}:` with a colon" if forgot else f"{kind}s: {listed(names)}"
+            hint = f"write `{value}:` with a colon" if forgot else f"{kinds}: {listed(names)}"
             raise problem("verb", f"expected {what}: a mapping with one {its}", hint=hint)
         found = [key for key in value if key in names]
         others = [str(key) for key in value if key not in names and key not in common]
@@ -180,7 +186,10 @@ def _check(kind: str, names: tuple[str, ...], common: tuple[str, ...]) -> Callab
             message = f"{what} has exactly one {its}, not both '{found[0]}' and '{found[1]}'"
             raise problem("verb", message, at=(found[1],), key=True, hint=f"write a list item for each {kind}")
         if not found and others:
-            near = did_you_mean(others[0], (*names, *common), kind=f"{kind}s", most=3)
+            near = did_you_mean(others[0], (*names, *common), kind=kinds, most=3)
+            if others[0] in below:
+                near = " or ".join(f"`{name}: {{{others[0]}: ...}}`" for name in reversed(names))
+                near = f"write {near}"
             message = f"unknown {kind} '{escape(others[0])}', expected one of {listed(names, most=30)}"
             raise problem("name", message, at=(others[0],), key=True, hint=near)
         if not found:

@@ -97,6 +97,18 @@ def test_another_dimension_is_named_beside_the_units_that_fit() -> None:
     )
 
 
+@pytest.mark.parametrize("text", ["5 W", "five", "1e999 J"])
+def test_what_is_no_quantity_is_told_with_the_units_that_fit(text: str) -> None:
+    with pytest.raises(UnitError) as caught:
+        to_si(text, units.ENERGY)
+    assert caught.value.cause.endswith("; expected a torque or an energy (N m, mN m, N mm, J)")
+    assert "km" not in (caught.value.hint or "")
+
+
+def test_nothing_has_no_sign() -> None:
+    assert (units.readable(-0.0, "N"), units.readable(-0.0, "rad")) == ("0 N", "0 rad")
+
+
 def test_a_text_without_a_unit_could_be_meant_either_way() -> None:
     with pytest.raises(UnitError, match="has no unit; expected a length") as caught:
         to_si("5", units.LENGTH)

@@ -344,6 +344,15 @@ def test_parts_that_never_touch_are_refused(name: str, pair: list[str], told: st
     assert problem.message.startswith(told)
 
 
+@pytest.mark.parametrize("written", [["robot"], [], ["robot", "desk", "cube"], [["robot", "desk"]], ["robot", 3]])
+def test_a_short_collision_is_two_names(written: Any) -> None:
+    with pytest.raises(ValidationError, match="expected two names") as caught:
+        CONDITIONS["collision"].spec.model_validate(written)
+    (error,) = caught.value.errors()
+    assert error["loc"] == ()
+    assert "`collision: [robot, desk]`" in error["ctx"]["hint"]
+
+
 @pytest.mark.parametrize("above", [1.0, 3.0])
 def test_a_range_of_forces_in_which_no_force_is_is_refused(above: float) -> None:
     with pytest.raises(ValidationError, match=r"no force is below 1 N and above [13] N"):

@@ -21,6 +21,7 @@ from manipcli.spec.load import load_task, load_task_text
 from manipcli.spec.located import Located
 from manipcli.spec.quantity import Angle, JointValue, Length, Time
 from manipcli.spec.resolved import resolved
+from manipcli.spec.retry import retried
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.schema import task_schema
 from manipcli.spec.task import TaskSpec
@@ -427,6 +428,31 @@ def test_a_task_is_called_what_a_file_can(name: str) -> None:
 def test_a_generated_id_gives_way_to_a_given_one() -> None:
     spec = load(TASK.replace("id: last", "id: wait_2")).spec
     assert [step.id for step in spec.steps] == ["move_1", "pour_1", "wait_2", "wait_3"]
+
+
+@pytest.mark.parametrize(
+    ("watch", "message", "hint"),
+    [
+        ("near: {object: a, within: 1}", "unknown watch 'near'", "write `always: {near: ...}` or `never: {near: ...}`"),
+        ("not: {near: {}}", "unknown watch 'not'", "write `always: {not: ...}` or `never: {not: ...}`"),
+        ("alway: {}", "unknown watch 'alway'", "did you mean 'always'?"),
+        ("zzz: {}", "unknown watch 'zzz'", "watches: never, always, id, during"),
+        ("[]", "expected a watch", "watches: never, always"),
+    ],
+)
+def test_what_is_watched_stands_under_always_or_never(watch: str, message: str, hint: str) -> None:
+    found = only(f"{TASK}watch:\n  - {watch}\n")
+    assert message in found.message
+    assert found.hint == hint
+
+
+def test_a_parameter_of_a_retry_that_the_task_does_not_have_is_told_with_what_to_write() -> None:
+    task = TASK.replace("params: {tilt: 120 deg, n: 2}\n", "").replace("$tilt", "1").replace("$n", "1")
+    text = task.replace("timeout: 8 s", "on_fail: {retry: 1, with: {tilt: 2}}")
+    with pytest.raises(InvalidInput) as caught:
+        retried(load(text), 1)
+    (found,) = caught.value.findings
+    assert "`params: {tilt: ...}`" in (found.hint or "")
 
 
 def test_an_id_is_taken_once() -> None:

@@ -15,7 +15,7 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Force
 
 Pair = tuple[str, str]
@@ -43,7 +43,12 @@ class CollisionSpec(Model):
     @model_validator(mode="before")
     @classmethod
     def _pair(cls, value: object) -> object:
-        return {"pairs": [value]} if isinstance(value, list | tuple) else value
+        if not isinstance(value, list | tuple):
+            return value
+        if len(value) != 2 or not all(isinstance(part, str) for part in value):
+            hint = "write `collision: [robot, desk]`, or several as `collision: {pairs: [[robot, desk], [cup, desk]]}`"
+            raise problem("count", "expected two names: those of the parts that touch", hint=hint)
+        return {"pairs": [value]}
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
