@@ -110,8 +110,8 @@ def _settle(task: Task, session: Session) -> None:
         speed = float(np.linalg.norm(state.body_linear[k]))
         if not shift < SETTLED_SHIFT:
             raise SimulationFailed(
-                f"'{body.name}' overlaps something, or stands on nothing: it moved by {1000 * shift:.1f} mm "
-                "while the world came to rest",
+                f"'{body.name}' moved by {1000 * shift:.1f} mm while the world came to rest: it overlaps something, "
+                "stands on nothing, or something ran into it",
                 time=0.0,
             )
         if not speed < SETTLED_SPEED:

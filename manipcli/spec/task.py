@@ -42,7 +42,7 @@ class SimulationSpec(Model):
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
         (0.0, 0.0, -9.81), description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
     )
-    settle: Annotated[Time, Field(ge=0, description="Simulated before the start, 0 or more. Default 0.5 s.")] = 0.5
+    settle: Annotated[Time, Field(ge=0, le=60, description="Simulated before the start, 0 to 60 s. Default 0.5 s.")] = 0.5
 
     @model_validator(mode="after")
     def _whole_steps(self) -> SimulationSpec:
