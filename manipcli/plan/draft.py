@@ -12,11 +12,11 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried
-from manipcli.model.robot import Cylinder
 from manipcli.plan.hand import closed_on, ramp, with_mimics
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, JointPath, follow_poses, joint_path, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
+from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
@@ -59,7 +59,7 @@ class Draft:
 
     def with_body(self, name: str, X_WO: Transform) -> Situation:
         """The present situation, with one body put elsewhere."""
-        return replace(self._now, bodies=self._put({name: X_WO}))
+        return put(self._planner, self._now, {name: X_WO})
 
     def let_go(self, posture: str) -> Situation:
         """The present situation with the hand at a pose, and empty; whatever is in the way of its joints."""
@@ -242,19 +242,7 @@ class Draft:
 
     def spill(self, into: str) -> None:
         """What lay in the carried object is predicted to lie on the floor of the container `into` now."""
-        planner, carried = self._planner, self._now.carried
-        interior = planner.scene.body(into).interior
-        if carried is None or interior is None:
-            return
-        shape = interior.shape
-        depth = shape.length if isinstance(shape, Cylinder) else shape.size[2]
-        X_WS = planner.body_pose(self._now, into) @ interior.X_OS
-        landed = {}
-        for name in planner.contents(self._now, carried.body):
-            body = planner.scene.body(name)
-            bottom = body.centre[2] - body.size[2] / 2
-            landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], -depth / 2 - bottom))
-        self._now = replace(self._now, bodies=self._put(landed))
+        self._now = spilled(self._planner, self._now, into)
 
     @contextmanager
     def _told(self, label: str) -> Iterator[None]:
@@ -317,7 +305,7 @@ class Draft:
             self._now = self._now.moved(self._with(grip.joints, grip.target))
         if trajectory is not None:
             self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
-            self._carry(before)
+            self._now = carried_along(self._planner, before, self._now)
         self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
 
     def _refuse_collision(
@@ -348,24 +336,6 @@ class Draft:
             positions[:, columns] = ramp(self._now.position[columns], grip.target, speed * times)
             positions = np.asarray(with_mimics(robot, positions))
         return times, positions
-
-    def _carry(self, before: Situation) -> None:
-        """What is held goes with the hand, and what lies in that goes with it."""
-        carried = before.carried
-        if carried is None:
-            return
-        planner = self._planner
-        X_WO = planner.kinematics.forward(self._now.position, carried.link) @ carried.X_LO
-        X_WA = planner.body_pose(before, carried.body)
-        moved = {carried.body: X_WO}
-        for name in planner.contents(before, carried.body):
-            moved[name] = X_WO @ X_WA.inverse() @ planner.body_pose(before, name)
-        self._now = replace(self._now, bodies=self._put(moved))
-
-    def _put(self, where: dict[str, Transform]) -> tuple[Transform, ...]:
-        """X_WO of all movable bodies, some of them put elsewhere."""
-        movable = self._planner.scene.movable
-        return tuple(where.get(body.name, X_WO) for body, X_WO in zip(movable, self._now.bodies, strict=True))
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
         """The present position with some joints elsewhere; joints that mimic them follow."""
