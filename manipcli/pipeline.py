@@ -7,7 +7,7 @@ the verdict of a run is that of its log, read back from the file before it gets 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -86,7 +86,7 @@ def run_task(
     load_libraries(task)
     loaded = time.perf_counter()
     try:
-        plan = plan_task(task)
+        plan = plan_task(task, doing=_told(progress))
     except NotPlannable as refusal:
         took = time.perf_counter() - began
         timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
@@ -152,6 +152,11 @@ def verify_log(
         return compared(recording, log, again, unlike=recorded.unlike, began=began)
 
 
+def _told(progress: Progress | None) -> Callable[[str], None]:
+    """Who is told what is being done."""
+    return progress.doing if progress is not None else lambda _: None
+
+
 def _recorded(
     task: Task, plan: Plan, where: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress | None
 ) -> tuple[Verdict, float, float]:
@@ -163,7 +168,7 @@ def _recorded(
         status, cause, planning = _carried_out(task, plan, manager, recorder, progress)
         recorder.metadata("run", {"status": status, "cause": cause})
         simulated = time.perf_counter()
-        verdict = judge_log(recorder.partial_path, being_written=True)
+        verdict = judge_log(recorder.partial_path, being_written=True, doing=_told(progress))
         recorder.finish(verdict_metadata(verdict))
     finally:
         recorder.close_partial()

@@ -45,6 +45,9 @@ class StepProgress:
         if self._live:
             console.redraw("")
 
+    def doing(self, what: str) -> None:
+        """Is told to nobody: it soon is done."""
+
     def warned(self, findings: Sequence[Finding]) -> None:
         """What may go wrong, known before the first step."""
         for finding in findings:

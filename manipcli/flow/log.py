@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -29,7 +30,7 @@ from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
-from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.record.recording import EMBEDDED, Recording, Span
 from manipcli.record.selection import Selection
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_robot_text, load_task_text
@@ -146,17 +147,32 @@ def _portable_robot(spec: RobotSpec) -> RobotSpec:
     return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
 
 
-def judge_log(path: Path, *, being_written: bool = False) -> Verdict:
+def judge_log(path: Path, *, being_written: bool = False, doing: Callable[[str], None] = lambda _: None) -> Verdict:
     """The verdict on a log, from the log alone; a verdict stored in it is not looked at.
 
     Args:
         path: the log, or what a killed run left.
         being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
+        doing: told of each span that is judged.
 
     Raises:
         InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
     """
-    return judge_recording(open_recording(path, being_written=being_written), path)
+    recording = open_recording(path, being_written=being_written)
+    return judge_recording(replace(recording, spans=_Watched(recording.spans, doing)), path)
+
+
+@dataclass(frozen=True, slots=True)
+class _Watched:
+    """Spans; somebody is told of each that is read."""
+
+    spans: Iterable[Span]
+    doing: Callable[[str], None]
+
+    def __iter__(self) -> Iterator[Span]:
+        for span in self.spans:
+            self.doing("judging")
+            yield span
 
 
 def judge_recording(recording: Recording, path: Path) -> Verdict:

@@ -25,6 +25,10 @@ PROGRESS_TICKS: Final = 50
 class Progress(Protocol):
     """Whoever shows how far a run is."""
 
+    def doing(self, what: str) -> None:
+        """A sign of life while no time goes by: a step is planned, a part of the log is judged."""
+        ...
+
     def warned(self, findings: Sequence[Finding]) -> None:
         """What may go wrong, known before the first step."""
         ...

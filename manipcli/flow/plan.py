@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,8 +79,12 @@ class Plan:
         return json.dumps({"steps": steps, "judged": list(self.judged)}, indent=1).encode()
 
 
-def plan_task(task: Task) -> Plan:
+def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> Plan:
     """Plan every step.
+
+    Args:
+        task: whose steps.
+        doing: told of each step before it is planned.
 
     Raises:
         NotPlannable: names the step and why; no later step was planned.
@@ -88,7 +92,7 @@ def plan_task(task: Task) -> Plan:
     planner = _planner(task)
     start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=tuple(_steps(task, planner, start)), start=start, planner=planner, judged=judged)
+    return Plan(steps=tuple(_steps(task, planner, start, doing)), start=start, planner=planner, judged=judged)
 
 
 def refused(task: Task, refusal: NotPlannable) -> Verdict:
@@ -145,8 +149,9 @@ def start_position(task: Task) -> Array:
     return with_mimics(robot, q)
 
 
-def _steps(task: Task, planner: Planner, situation: Situation) -> Iterator[PlannedStep]:
+def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[str], None]) -> Iterator[PlannedStep]:
     for k, step in enumerate(task.spec.steps):
+        doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{step.id}'")
         planned = plan_step(planner, step, situation)
         yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned, place=task.log_place("steps", k))
         situation = planned.end

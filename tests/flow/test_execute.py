@@ -142,7 +142,7 @@ def test_the_time_for_an_until_ends_with_it(run: Run, monkeypatch: pytest.Monkey
     """What follows in the step (a cup tilted back) may take longer than was left to wait."""
     plan_task = pipeline.plan_task
 
-    def with_a_sequel(task: pipeline.Task) -> pipeline.Plan:
+    def with_a_sequel(task: pipeline.Task, **_: object) -> pipeline.Plan:
         plan = plan_task(task)
         sequel = Motion("sequel", trajectory=None, grip=None, duration=0.5)
         (step,) = plan.steps
@@ -161,6 +161,10 @@ class Stopping:
 
     def __init__(self, at: float, error: BaseException) -> None:
         self._at, self._error = at, error
+        self.heard: list[str] = []
+
+    def doing(self, what: str) -> None:
+        self.heard.append(what)
 
     def warned(self, findings: object) -> None: ...
 
@@ -173,6 +177,15 @@ class Stopping:
             raise self._error
 
     def step_ended(self, outcome: object) -> None: ...
+
+
+def test_each_step_that_is_planned_and_each_span_that_is_judged_is_a_sign_of_life(run: Run) -> None:
+    progress = Stopping(9.0, KeyboardInterrupt())
+    run(scene(TABLE, steps="wait: 0.9 s\n  - wait: 0.9 s"), "simulation.engine=kinematic", progress=progress)
+    planning = ["planning step 1 of 2, 'wait_1'", "planning step 2 of 2, 'wait_2'"]
+    assert progress.heard[:2] == planning
+    assert set(progress.heard[2:]) == {"judging"}
+    assert len(progress.heard[2:]) >= 4  # a span each half second
 
 
 def test_an_interrupted_run_leaves_a_whole_log_that_says_so(run: Run, tmp_path: Path) -> None:

@@ -20,6 +20,8 @@ class Listener:
     def __init__(self) -> None:
         self.doubts: list[Finding] = []
 
+    def doing(self, what: str) -> None: ...
+
     def warned(self, findings: Sequence[Finding]) -> None:
         self.doubts += findings
 
