@@ -14,6 +14,7 @@ import numpy as np
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
+from manipcli.flow.changed_files import Files, out_of_range
 from manipcli.flow.switches import foreseen
 from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
@@ -155,7 +156,8 @@ def load_task(
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
     if task is not None and robot_file and controllers_file:
-        gathered.findings += bind(task, robot_file, controllers_file)[1]
+        varied, wrong = bind(task, robot_file, controllers_file)
+        gathered.findings += (*wrong, *out_of_range(Files(task, robot_file, controllers_file), varied))
     if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
         raise gathered.refusal()
     robot, notes = built

@@ -8,30 +8,24 @@ controllers keep what the files say (`Varied.only_world`).
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow import load
+from manipcli.flow.changed_files import Changes, Files
 from manipcli.flow.load import Task, Truth
 from manipcli.flow.vary import Varied, bind, draw
-from manipcli.judge.drawn import Drawn, Number
+from manipcli.judge.drawn import Drawn
 from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import build_scene
 from manipcli.model.packages import Packages
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.spec.base import Model
-from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.located import Located, Source, validate
-from manipcli.spec.override import Override, apply
+from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Node, ScalarNode, SequenceNode
-
-M = TypeVar("M", bound=Model)
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
 SceneOf = Callable[[Located[TaskSpec]], Scene]
@@ -93,7 +87,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
     values = dict(drawn.values)
     changes = [(one, values[one.path]) for one in varied if one.path in values]
     seen = [(one, value) for one, value in changes if not one.only_world]
-    written = _Files(task.file, task.robot_file, task.controllers_file)
+    written = Files(task.file, task.robot_file, task.controllers_file)
     try:
         planned = written.changed(seen)
         true = written.changed(changes)
@@ -112,45 +106,6 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
     )
 
 
-Changes = Sequence[tuple[Varied, Number]]
-
-
 def _same(changes: Changes, seen: Changes, area: str) -> bool:
     """Whether of this file nothing changes that is not seen."""
     return sum(one.area == area for one, _ in changes) == sum(one.area == area for one, _ in seen)
-
-
-@dataclass(frozen=True, slots=True)
-class _Files:
-    """The three files of a task."""
-
-    task: Located[TaskSpec]
-    robot: Located[RobotSpec]
-    controllers: Located[ControllersSpec]
-
-    def changed(self, changes: Changes) -> _Files:
-        """With these values in their places; a value that is refused is told where it is varied."""
-        overrides = [
-            Override(one.area, one.parts, _node(value, place := self.task.source.key_place("vary", one.key)), place)
-            for one, value in changes
-        ]
-        return _Files(
-            _changed(self.task, overrides), _changed(self.robot, overrides), _changed(self.controllers, overrides)
-        )
-
-
-def _changed(file: Located[M], overrides: Iterable[Override]) -> Located[M]:
-    source = file.source
-    mine = [one for one in overrides if one.area == source.area]
-    if not mine:
-        return file
-    root, findings = apply(source.root, mine, type(file.spec), source.area)
-    return validate(
-        Source(source.name, root, source.area, source.kept), type(file.spec), findings=[*file.findings, *findings]
-    )
-
-
-def _node(value: Number, place: Place) -> Node:
-    if isinstance(value, tuple):
-        return SequenceNode(tuple(ScalarNode(one, place) for one in value), place)
-    return ScalarNode(value, place)

@@ -94,9 +94,22 @@ class Varied:
             (len(self.law.rows),) * (1 if self.law.together else len(self.nominal)) if self.law.word == "grid" else ()
         )
 
+    def ends(self, inside: float = 0.0) -> tuple[Number, ...]:
+        """The ends of `uniform`, by a share `inside` of it; each item of `choice`, `grid`; () of `normal`: no end."""
+        rows = self.law.rows
+        if self.law.word == "normal":
+            return ()
+        if self.law.word == "uniform" and not self.whole:
+            shares = (inside, 1.0 - inside)
+            rows = tuple(tuple((1.0 - u) * a + u * b for a, b in zip(*rows, strict=True)) for u in shares)
+        return tuple(self._written(row) for row in rows)
+
     def value(self, seed: int, sample: int, items: Sequence[int]) -> Number:
         """What is drawn; `items`: of each of its grids, which one."""
-        drawn = [self._component(k, seed, sample, items) for k in range(len(self.nominal))]
+        return self._written([self._component(k, seed, sample, items) for k in range(len(self.nominal))])
+
+    def _written(self, drawn: Sequence[float]) -> Number:
+        """The value in the file, from what is drawn of each component."""
         if self.how == "offset":
             drawn = [a + b for a, b in zip(self.nominal, drawn, strict=True)]
         elif self.how == "scale":
@@ -201,7 +214,7 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
     values = leaf.value if isinstance(leaf.value, tuple) else (leaf.value,)
     nominal = tuple(one for one in values if isinstance(one, int | float) and not isinstance(one, bool))
     if leaf.value is None:
-        raise _Problem(f"there is no value at '{path}' that could vary", "write one into the file first")
+        raise _Problem(f"there is no value at '{path}' that could vary", _to_write(leaf.parts))
     if len(nominal) != len(values) or not nominal:
         raise _Problem(f"'{path}' is no number, and no list of numbers")
     whole = all(isinstance(one, int) for one in nominal)
@@ -291,14 +304,25 @@ def _below(value: object, annotation: object, metadata: Sequence[object], done: 
     if part == EVERY and not isinstance(value, BaseModel):
         there = [leaf for name, child in known.items() for leaf in _tried(*child, (*done, name), further)]
         if not there:
-            raise _Problem(f"nothing stands at '{'.'.join((*done, *rest))}'")
+            raise _Problem(f"nothing stands at '{'.'.join((*done, *rest))}'", _to_write((*done, *rest)))
         yield from there
         return
     if part not in known:
         where = f"'{'.'.join(done)}'" if done else "the file"
-        holds = f"there is no '{escape(part)}' in {where}" if known else f"{where} has nothing in it"
-        raise _Problem(holds, did_you_mean(part, known, kind="there are"))
+        if not known:
+            raise _Problem(f"{where} has nothing in it", _to_write((*done, *rest)) if value in (None, {}) else None)
+        raise _Problem(f"there is no '{escape(part)}' in {where}", did_you_mean(part, known, kind="there are"))
     yield from _below(*known[part], (*done, part), further)
+
+
+def _to_write(parts: Path) -> str:
+    """What the file lacks: `write it into the robot file first, as actuators: {NAME: {latency: ...}}`."""
+    file = "task" if parts[0] in _TASK_KEYS else "controllers" if parts[0] == "controllers" else "robot"
+    *above, last = ("NAME" if part == EVERY else escape(part) for part in parts)
+    written = f"{last}: ..."
+    for part in reversed(above):
+        written = f"{part}: {{{written}}}"
+    return f"write it into the {file} file first, as `{written}`"
 
 
 def _tried(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> list[_Leaf]:

@@ -192,9 +192,13 @@ MISTAKES = (
     ("scen.block.mass: {uniform: [0, 1]}", "'scen' cannot be varied", "did you mean 'scene'?"),
     ("steps.0.wait: {uniform: [0, 1]}", "'steps' cannot be varied, only scene, frames", None),
     ("scene.block.rests_on: {uniform: [0, 1]}", "'scene.block.rests_on' is no number", None),
+    ("robot.actuators.*.latency: {uniform: [0, 1]}", "nothing stands at 'actuators.*.latency'",
+     "write it into the robot file first, as `actuators: {NAME: {latency: ...}}`"),
+    ("robot.actuators.a.friction: {uniform: [0, 1]}", "'actuators' has nothing in it", "{a: {friction: ...}}`"),
     ("scene.block: {uniform: [0, 1]}", "'scene.block' is no number", None),
     ("scene.block.fixed: {choice: [0, 1]}", "'scene.block.fixed' is no number", None),
-    ("scene.table.mass: {uniform: [1, 2]}", "there is no value at 'scene.table.mass'", "write one into the file"),
+    ("scene.table.mass: {uniform: [1, 2]}", "there is no value at 'scene.table.mass'",
+     "write it into the task file first, as `scene: {table: {mass: ...}}`"),
     ("scene.block.at.2: {uniform: [0, 1]}", "there is no '2' in 'scene.block.at'", "there are: 0, 1"),
     ("scene.*.mas: {uniform: [0, 1]}", "nothing stands at 'scene.*.mas'", None),
     ("robot.frictio: {uniform: [0, 1]}", "there is no 'frictio' in the file", "did you mean 'friction'?"),
@@ -234,14 +238,34 @@ def test_one_number_is_varied_once(write: Callable[[str], Path]) -> None:
 
 
 def test_a_drawn_value_that_cannot_be_is_told_where_it_is_varied(write: Callable[[str], Path]) -> None:
-    path = write("scene.block.mass: {offset: {uniform: [-2, -1]}}")
+    path = write("scene.block.mass: {offset: {normal: [-2, 0.1]}}")
     with pytest.raises(InvalidInput) as caught:
         load_task(path, sample=4)
     (finding,) = caught.value.findings
-    assert finding.message.startswith("scene.block.mass: must be more than 0, not -1.")
+    assert finding.message.startswith("scene.block.mass: must be more than 0, not -")
     assert finding.message.endswith("(sample 4)")
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (12, 3)
+
+
+OUT_OF_RANGE = (
+    ("scene.block.friction: {uniform: [-1, 1]}", "scene.block.friction: must be at least 0, not -1.0, which may be"),
+    ("scene.block.mass: {choice: [1, 2, -3]}", "scene.block.mass: must be more than 0, not -3"),
+    ("scene.peg.mass: {scale: {grid: [1, 0]}}", "scene.peg.mass: must be more than 0, not 0"),
+    ("scene.peg.friction: {offset: {uniform: [-100, 0]}}", "scene.peg.friction: must be at least 0, not -"),
+    ("robot.limits.panda_joint1.acceleration: {choice: [-1]}", "limits.panda_joint1.acceleration: must be more than 0"),
+    ("controllers.arm_controller.gains.*.p: {offset: {uniform: [-1e6, 0]}}", "panda_joint7.p: must be at least 0"),
+)  # fmt: skip
+
+
+def test_what_a_field_refuses_of_a_law_is_told_before_anything_is_drawn(write: Callable[[str], Path]) -> None:
+    told = _told(write("\n".join(line for line, _ in OUT_OF_RANGE)))
+    for k, (_, message) in enumerate(OUT_OF_RANGE):
+        assert any(one.startswith(f"{12 + k}: ") and message in one for one in told), (message, told)
+
+
+def test_an_end_that_is_never_drawn_may_be_what_the_field_refuses(write: Callable[[str], Path]) -> None:
+    load_task(write("scene.block.mass: {uniform: [0, 1 kg]}"), sample=0)
 
 
 def test_a_task_that_does_not_vary_has_no_samples(tmp_path: Path) -> None:
