@@ -212,13 +212,14 @@ class Planner:
     def refusal(self, situation: Situation, hit: CollisionHit, verb: str, when: str) -> NotPlannable:
         """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`."""
         carried = situation.carried
-        hint = "no way around is searched for: `move` to a pose from which the way is free"
-        if carried is not None and hit.time <= 0.0 and carried.body in (hit.a, hit.b):
-            hint = f"`lift` '{carried.body}' first"
-        if carried is None and hit.time <= 0.0 and hit.distance < 0.0:
-            hint = "put them apart, or let the robot begin elsewhere: `start: POSE` in the task"
+        begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
+        if begins and hit.distance < 0.0 and not held:
+            hint = "put them apart; a task may begin elsewhere: `start: POSE`"
             overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
-            return NotPlannable(f"{overlap} where the robot begins, {when}", hint=hint)
+            return NotPlannable(f"{overlap} already, {when}", hint=hint)
+        hint = "no way around is searched for: `move` to a pose from which the way is free"
+        if begins and held and carried is not None:
+            hint = f"`lift` '{carried.body}' first"
         near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
         clearance = f"{1000 * CLEARANCE:.0f} mm"
         return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)
