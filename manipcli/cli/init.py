@@ -23,6 +23,8 @@ FILES: Final = {
     "controllers/panda.yaml": "controllers/panda.yaml",
 }
 """What is written, and from which template."""
+MAY_BE_THERE: Final = ("README.md", ".gitignore")
+"""What a folder has before it is a project: kept as it is."""
 
 
 def init(
@@ -33,11 +35,13 @@ def init(
     """Write a small project that works.
 
     A robot whose description comes with PyBullet, its controllers, a task with expectations, JSON schemas for editors
-    and a workflow for GitHub Actions. Nothing is written where one of the files is there already.
+    and a workflow for GitHub Actions. A README.md and a .gitignore that are there are kept; nothing is written where
+    another of the files is there already.
     """
     files = _files(folder)
-    there = [str(path) for path in files if path.exists() or path.is_symlink()]
-    if there and not force:
+    kept = [] if force else [path for name in MAY_BE_THERE if os.path.lexists(path := folder / name)]
+    there = [] if force else [str(path) for path in files if path not in kept and os.path.lexists(path)]
+    if there:
         are = "is" if len(there) == 1 else "are"
         message = f"{listed(there)} {are} there already; nothing was written"
         raise InvalidInput(
@@ -46,6 +50,9 @@ def init(
     from manipcli.core.whole_file import write_whole
 
     for path, data in files.items():
+        if path in kept:
+            console.result(f"kept: {path}")
+            continue
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
         console.result(f"written: {path}")

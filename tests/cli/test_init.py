@@ -63,6 +63,20 @@ def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest
     assert capsys.readouterr().err == "next: manipcli test\n"
 
 
+def test_what_a_folder_has_before_it_is_a_project_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("README.md", ".gitignore"):
+        (tmp_path / name).write_text("mine")
+    assert main(["init"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert [line for line in told if line.startswith("kept: ")] == ["kept: README.md", "kept: .gitignore"]
+    assert "written: README.md" not in told
+    assert {(tmp_path / name).read_text() for name in ("README.md", ".gitignore")} == {"mine"}
+    assert main(["check", "tasks/pick_place.yaml"]) == 0
+
+
 def test_every_template_is_written_somewhere() -> None:
     templates = {str(path.relative_to(TEMPLATES)) for path in TEMPLATES.rglob("*") if path.is_file()}
     assert templates == {*FILES.values()}
