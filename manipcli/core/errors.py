@@ -91,15 +91,18 @@ class NotPlannable(ManipcliError):
     exit_code = ExitCode.FAILED
     code = "PLAN100"
 
-    def __init__(self, cause: str, *, step: str | None = None, hint: str | None = None) -> None:
+    def __init__(
+        self, cause: str, *, step: str | None = None, hint: str | None = None, place: Place | None = None
+    ) -> None:
         self.cause = cause
         self.step = step
         self.hint = hint
+        self.place = place
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        return (Finding(code=self.code, message=str(self), hint=self.hint),)
+        return (Finding(code=self.code, message=str(self), place=self.place, hint=self.hint),)
 
 
 class SimulationFailed(ManipcliError):

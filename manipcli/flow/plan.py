@@ -152,7 +152,11 @@ def start_position(task: Task) -> Array:
 def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[str], None]) -> Iterator[PlannedStep]:
     for k, step in enumerate(task.spec.steps):
         doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{step.id}'")
-        planned = plan_step(planner, step, situation)
+        try:
+            planned = plan_step(planner, step, situation)
+        except NotPlannable as refusal:
+            at = task.file.place("steps", k)
+            raise NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at) from refusal
         yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned, place=task.log_place("steps", k))
         situation = planned.end
 
