@@ -74,6 +74,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert _loaded("import manipcli.cli.app") & HEAVY == set()
 
 
+@pytest.mark.slow
 def test_reading_a_file_loads_no_arrays_and_no_physics() -> None:
     names = [_name(module) for module in MODULES if module.parent == PACKAGE / "spec"]
     assert _loaded(f"import {', '.join(names)}") & (HEAVY - {"pydantic", "yaml", "rich"}) == set()

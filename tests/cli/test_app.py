@@ -86,6 +86,7 @@ ERRORS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("error", "code", "verdict"), ERRORS, ids=lambda value: type(value).__name__)
 def test_an_error_becomes_a_message_and_an_exit_code(
     pipeline: SimpleNamespace,

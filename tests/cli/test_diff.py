@@ -42,6 +42,7 @@ def test_a_log_and_its_copy_are_the_same(
     assert "+" not in out.split("no difference")[0].split("step")[1]
 
 
+@pytest.mark.slow
 def test_another_motion_is_told_by_step_and_from_when_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     a, b = (str(folder / f"{name}.mcap") for name in "ab")
     assert main(["diff", a, b, "--format", "json"]) == 1

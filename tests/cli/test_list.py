@@ -68,6 +68,7 @@ def test_words_are_those_of_the_registries(capsys: pytest.CaptureFixture[str], k
 TASK = str(Path(__file__).parents[2] / "tasks" / "pour.yaml")
 
 
+@pytest.mark.slow
 def test_the_controllers_of_a_task_and_who_claims_what(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "controllers", TASK]) == 0
     header, *rows = capsys.readouterr().out.splitlines()

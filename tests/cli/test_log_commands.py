@@ -158,6 +158,7 @@ def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: p
     assert "/joint_states" in text
 
 
+@pytest.mark.slow
 def test_the_log_to_stdout_is_the_log_and_the_report_goes_to_stderr(
     task: Path, log: Path, capfdbinary: pytest.CaptureFixture[bytes]
 ) -> None:

@@ -33,6 +33,7 @@ def test_an_overview_comes_to_the_terminal(log: Path, capsys: pytest.CaptureFixt
     assert "\x1b" not in told.out
 
 
+@pytest.mark.slow
 def test_a_table_to_stdout_and_to_a_file_is_the_same(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,6 +68,7 @@ def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsy
     assert {row.partition(",")[0] for row in told.out.splitlines()} == {"log", "home", "other"}
 
 
+@pytest.mark.slow
 def test_the_axes_of_a_vector_share_a_panel_and_words_with_commas_too(log: Path) -> None:
     def panels(*words: str) -> list[tuple[str, str, tuple[str, ...]]]:
         return [(one.title, one.axis, one.labels) for one in open_chart([log], words).panels]
@@ -90,6 +92,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
     assert "tf.transform.translation.x" in fields
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     [

@@ -41,6 +41,7 @@ def test_a_moment_all_steps_and_a_film_are_drawn_at_once(
         assert 20 < (middle.max(axis=2) < 90).sum() < middle[..., 0].size // 4
 
 
+@pytest.mark.slow
 def test_a_log_without_its_end_is_drawn_too(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

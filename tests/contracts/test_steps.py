@@ -110,6 +110,7 @@ def test_begins_where_the_robot_is_and_goes_on_where_it_got(task: Task, planned:
     np.testing.assert_allclose(case.plan.end.position[arm], q[arm], atol=1e-9)
 
 
+@pytest.mark.slow
 @every_case
 def test_every_trajectory_rests_at_both_ends(planned: dict[str, Planned], name: str) -> None:
     for motion in planned[name].plan.motions:

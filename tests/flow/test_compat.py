@@ -31,6 +31,7 @@ def first_command(compat: str, gain: float) -> float:
     return float(arm.update(PERIOD, PERIOD, rest).command[0])
 
 
+@pytest.mark.slow
 def test_the_integral_acts_one_step_earlier_by_the_rules_of_ros_1() -> None:
     assert first_command("ros1", 0.0) == first_command("ros2", 0.0)
     early = first_command("ros1", I_GAIN) - first_command("ros2", I_GAIN)

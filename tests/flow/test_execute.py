@@ -52,6 +52,7 @@ def test_a_task_without_expectations_passes_and_says_so(run: Run) -> None:
     assert "no expectations" in verdict.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "body"),
     [
@@ -97,6 +98,7 @@ def test_a_goal_that_leaves_its_tolerance_ends_the_run_with_joint_value_limit_an
     assert verdict.simulated_time == pytest.approx(moved.ended + steps_run.AFTERMATH, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_move_of_one_joint_leaves_the_others_where_they_are(run: Run, tmp_path: Path) -> None:
     verdict = run(scene(TABLE, steps="move: {to: {joint_3: 0.3}}\n  - move: {to: {joint_1: -0.4}}"))
     assert verdict.verdict == "passed"
@@ -138,6 +140,7 @@ def test_until_that_holds_ends_the_step_and_one_that_does_not_fails_it(run: Run)
     assert "until" in missed.steps[0].text
 
 
+@pytest.mark.slow
 def test_the_time_for_an_until_ends_with_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """What follows in the step (a cup tilted back) may take longer than was left to wait."""
     plan_task = pipeline.plan_task
@@ -205,6 +208,7 @@ def test_physics_that_ends_a_run_is_a_failed_step_with_its_cause(run: Run) -> No
     assert verdict.steps[0].text == "it flew at t = 0.200 s"
 
 
+@pytest.mark.slow
 def test_physics_that_ends_after_the_last_step_is_no_pass(run: Run) -> None:
     verdict = run(scene(TABLE, steps="wait: 0.1 s"), progress=Stopping(0.3, SimulationFailed("it flew", time=0.3)))
     assert verdict.steps[0].outcome == "done"

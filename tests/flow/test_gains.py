@@ -30,6 +30,7 @@ def test_the_gains_of_the_tasks_here_give_no_doubt(name: str) -> None:
     assert findings(task=ROOT / "tasks" / f"{name}.yaml") == ()
 
 
+@pytest.mark.slow
 def test_too_much_damping_is_told_with_the_gain_that_would_do() -> None:
     (finding,) = findings("controllers.arm_controller.gains.joint_7.d=5")
     told = re.fullmatch(

@@ -60,6 +60,7 @@ def everything_in(path: Path) -> bytes:
     return b"\0".join(parts)
 
 
+@pytest.mark.slow
 def test_no_log_names_a_folder_or_the_name_of_this_machine(log: Path) -> None:
     written = everything_in(log)
     here = [ROOT, Path.cwd(), log.parent, Path(os.path.expanduser("~")), Path(os.sep) / "home", Path(os.sep) / "tmp"]  # noqa: PTH111

@@ -11,6 +11,7 @@ from manipcli.flow.check import check_files
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm7_hand3", "iiwa7", "panda"])
 def test_no_pose_of_the_robots_here_is_told(name: str) -> None:
     findings = check_files([ROBOTS / name / "robot.yaml"])

@@ -37,6 +37,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run.mcap"
 
 
+@pytest.mark.slow
 def test_expectations_and_watches_stand_where_the_user_wrote_them(log: Path) -> None:
     page = log_page(log)
     lines = TASK.splitlines()
@@ -48,6 +49,7 @@ def test_expectations_and_watches_stand_where_the_user_wrote_them(log: Path) -> 
     assert "task.yaml:" not in render_page(page)
 
 
+@pytest.mark.slow
 def test_the_page_tells_what_was_drawn(log: Path) -> None:
     page = log_page(log)
     assert page.verdict.drawn is not None

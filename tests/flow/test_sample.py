@@ -35,6 +35,7 @@ def test_without_a_sample_nothing_is_varied() -> None:
     assert task.scene.body("block").mass == 0.08
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["mass", "friction", "rolling_friction", "restitution"])
 def test_what_a_body_does_in_contact_is_known_to_the_world_alone(path: str) -> None:
     task = _sample(f"{{scene.block.{path}: {{choice: [0.25]}}}}")
@@ -81,6 +82,7 @@ def test_limits_and_named_poses_of_the_robot_are_planned_for() -> None:
     assert task.true.robot.X_WB.p[2] == 0.001
 
 
+@pytest.mark.slow
 def test_the_engine_gets_the_mass_and_the_plan_does_not() -> None:
     task = _sample("{scene.block.mass: {choice: [200 g]}}")
     plan, nominal = plan_task(task), plan_task(NOMINAL)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from manipcli.core.errors import Finding
 from manipcli.pipeline import run_task
 from manipcli.record.reading import open_recording
@@ -48,6 +50,7 @@ def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Pat
     assert 0 < int(told[1]) <= min(int(told[2]), counts["joint_2"])
 
 
+@pytest.mark.slow
 def test_a_run_in_which_nothing_is_cut_says_nothing(tmp_path: Path) -> None:
     listener, log = Listener(), tmp_path / "home.mcap"
     assert run_task(HOME, log=log, progress=listener).verdict.verdict == "passed"

@@ -43,6 +43,7 @@ def told(file: Path) -> list[str]:
     return []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "step",
     [
@@ -130,6 +131,7 @@ GRIPPERS = (
 )
 
 
+@pytest.mark.slow
 def test_a_hand_is_moved_by_the_gripper_that_is_active(tmp_path: Path) -> None:
     grasp = "  - release: {}\n"
     assert told(task_file(tmp_path, grasp, more=GRIPPERS)) == []

@@ -61,6 +61,7 @@ def test_an_arm_and_a_hand_with_a_controller_each_can_do_every_step(tmp_path: Pa
     assert told(tmp_path, WHOLE, step) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ACROSS)
 def test_joints_of_two_controllers_are_refused_at_the_step_with_both_names(tmp_path: Path, step: str) -> None:
     (found,) = told(tmp_path, SPLIT, step)

@@ -33,6 +33,7 @@ def test_a_watch_without_its_topic_is_a_warning_at_its_place() -> None:
     assert any(message.startswith("'rests_on' cannot be judged") for message in told)
 
 
+@pytest.mark.slow
 def test_an_until_that_needs_physics_is_a_warning_where_there_is_none() -> None:
     task = load_task(POUR, overrides=["simulation.engine=kinematic"])
     (finding,) = (one for one in task.findings if one.code == "TASK237")

@@ -220,6 +220,7 @@ MISSHAPEN = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistakes", [MISTAKES, MISSHAPEN], ids=["of paths and amounts", "of form"])
 def test_every_mistake_is_told_at_its_line(
     write: Callable[[str], Path], mistakes: tuple[tuple[str, str, str | None], ...]

@@ -32,12 +32,14 @@ def of_pybullet(name: str) -> Path:
     return Path(pybullet_data.getDataPath()) / DESCRIPTIONS[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DESCRIPTIONS)
 def test_the_findings_of_a_known_description_are_those_of_its_list(name: str) -> None:
     expected = (HERE / f"{name}.findings").read_text(encoding="utf-8").splitlines()
     assert found(of_pybullet(name)) == expected
 
 
+@pytest.mark.slow
 def test_there_is_nothing_to_say_of_the_robot_of_this_project() -> None:
     assert found(ARM) == []
 

@@ -128,6 +128,7 @@ def test_a_robot_file_states_soft_limits(tmp_path: Path) -> None:
     assert built(tmp_path, description(LIMIT + SAFETY), velocity=1.0).joints[0].limits.soft == SOFT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("own", "told"),
     [

@@ -79,6 +79,7 @@ def test_cup_has_centre_and_inertia_of_its_cells() -> None:
     np.testing.assert_allclose(made.inertia, inertia, atol=0.015 * np.max(inertia))
 
 
+@pytest.mark.slow
 def test_tray_has_centre_and_inertia_of_its_cells() -> None:
     shape = body_shapes.tray(TraySpec(size=(0.3, 0.2, 0.05), wall=0.01), WHITE)
     made = union(shape.geometries, 0.4)

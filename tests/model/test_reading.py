@@ -117,6 +117,7 @@ def holds(formula: Node | Leaf, k: int) -> bool | None:
     return None if None in members else not decides
 
 
+@pytest.mark.slow
 @given(formulas)
 @settings(max_examples=150, deadline=None)
 def test_every_tick_is_that_of_its_deciding_member(formula: Node | Leaf) -> None:

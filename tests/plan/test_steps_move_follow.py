@@ -106,6 +106,7 @@ def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:
     assert slow.duration > 1.2 * fast.duration
 
 
+@pytest.mark.slow
 def test_a_move_past_a_limit_names_joint_value_limit_and_time(bench: Make) -> None:
     cause = bench().refused("move", {"to": {"joint_4": 3.0}}).cause
     upper = bench().robot.joint("joint_4").limits.upper

@@ -250,6 +250,7 @@ def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any)
         np.testing.assert_allclose(panda.body("thing").p, [0.5, 0.2, 0.2 + height], atol=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [-7.0, 7.0])
 def test_a_cup_that_turned_in_the_hand_is_put_down_on_its_edge_where_the_arm_would_touch_the_desk(
     story: Story, degrees: float

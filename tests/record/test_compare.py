@@ -36,6 +36,7 @@ def _last_double(data: bytes, change: float) -> bytes:
     return data[:-8] + struct.pack("<d", value + change)
 
 
+@pytest.mark.slow
 def test_the_same_log_in_other_chunks_is_the_same(log: Path, tmp_path: Path, rewrite_log: Rewrite) -> None:
     other = rewrite_log(log, tmp_path / "other.mcap", chunk_size=20_000)
     assert other.read_bytes() != log.read_bytes()
@@ -91,6 +92,7 @@ def test_every_planted_difference_is_counted(log: Path, tmp_path: Path, rewrite_
     assert set(planted) == {"/joint_states", "/tf", "/arm/controller_state"}
 
 
+@pytest.mark.slow
 def test_topics_of_one_log_alone_and_logs_that_end_earlier(log: Path, tmp_path: Path, rewrite_log: Rewrite) -> None:
     def early(topic: str, one: Message) -> bytes | None:
         return None if topic == "/contacts" or one.log_time >= 500_000_000 else one.data

@@ -91,6 +91,7 @@ def test_types_that_double_with_each_level_cost_nothing() -> None:
     assert read_definition("p/Root", text).fields[0].name == "root"
 
 
+@pytest.mark.slow
 def test_all_of_jazzy_is_read() -> None:
     store = get_typestore(Stores.ROS2_JAZZY)
     read = 0

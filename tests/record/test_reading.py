@@ -113,6 +113,7 @@ def test_spans_are_the_chunks_of_the_file_and_their_velocities_know_no_seams(sma
             span.states.body_linear[0, 0] = 1.0
 
 
+@pytest.mark.slow
 def test_going_through_a_recording_takes_memory_for_a_few_spans(tmp_path: Path, make_run: MakeRun) -> None:
     """A chunk of half a second is 0.9 MB here; the ticks alone of three times as long a run would be 3 MB more."""
     run = make_run(500)
@@ -189,6 +190,7 @@ def test_a_killed_run_loses_at_most_its_last_two_blocks(tmp_path: Path, make_run
     assert len(read_recording(recorder.partial_path).states.time) == 1203
 
 
+@pytest.mark.slow
 def test_truncated_anywhere_a_prefix_is_read(small: tuple[Any, Path], tmp_path: Path) -> None:
     _, path = small
     data = path.read_bytes()
@@ -215,6 +217,7 @@ def test_truncated_anywhere_a_prefix_is_read(small: tuple[Any, Path], tmp_path: 
         assert_same(recording, whole, ticks=ticks)
 
 
+@pytest.mark.slow
 def test_a_single_flipped_bit_is_noticed_anywhere(small: tuple[Any, Path], tmp_path: Path) -> None:
     _, path = small
     data = path.read_bytes()

@@ -116,6 +116,7 @@ def test_every_message_decodes_to_what_was_put_in(log: tuple[Any, Path]) -> None
     )
 
 
+@pytest.mark.slow
 def test_actuators_stand_on_the_other_side_of_their_transmissions(log: tuple[Any, Path]) -> None:
     """Position and velocity grow by the reduction (-50 at the joint times 2 at the actuator), power is kept."""
     run, path = log
@@ -203,6 +204,7 @@ def test_events_and_contacts_stand_at_their_time(log: tuple[Any, Path]) -> None:
     assert times == [(k * 1_000_000, both if (k // 100) % 2 else []) for k in range(100, T, 100)]
 
 
+@pytest.mark.slow
 def test_mcap_readers_accept_checksums_indexes_statistics_and_order(log: tuple[Any, Path]) -> None:
     _, path = log
     with path.open("rb") as file:

@@ -136,6 +136,7 @@ def _points(svg: str) -> list[np.ndarray]:
     return [line for line in lines if len(line) > 40]
 
 
+@pytest.mark.slow
 def test_the_line_in_a_figure_has_the_shape_of_the_numbers() -> None:
     chart = replace(CHART, panels=(Panel("a", "a", "", (SINE,)),))
     (line,) = _points(figure.render(chart, "svg").decode())

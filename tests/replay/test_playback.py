@@ -134,6 +134,7 @@ def test_steps_and_phases_stand_where_the_events_say(log: Path, playback: Playba
     assert playback.verdict is not None and playback.lost is None
 
 
+@pytest.mark.slow
 def test_curves_of_a_window_are_those_of_the_whole_there(log: Path, playback: Playback) -> None:
     whole = {one.name: one for one in playback.tables()}
     np.testing.assert_array_equal(whole["joint position"].values, read_recording(log).states.position)
@@ -166,6 +167,7 @@ def test_a_log_that_was_cut_is_shown_as_far_as_it_goes(log: Path, tmp_path: Path
     assert cut.verdict is not None and cut.verdict.verdict == "error"
 
 
+@pytest.mark.slow
 def test_a_package_that_is_not_there_is_told_and_something_is_drawn_all_the_same(
     log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 import time
 from collections.abc import Callable
@@ -87,6 +88,12 @@ def test_the_page_of_its_own_plays(browser: Page, playback: Playback, tmp_path: 
         turned = matrix_from_quat([one["q"] for one in found])
         np.testing.assert_allclose(turned, matrix_from_quat(poses.quat_xyzw[k]), atol=1e-5)
     assert len(found) == len(drawing.frames)
+
+    # Numbers that round to nothing have no sign.
+    legend = "document.querySelector('[data-part=legend]').textContent"
+    told = [str(browser.evaluate(f"{player}.seek({time}), {legend}")) for time in (0.0, 0.01, 0.5, 1.0)]
+    assert " rad" in told[0]
+    assert not [text for text in told if re.search(r"-0\.0+ ", text)]
 
     labels = [step.label for step in playback.steps]
     shown = browser.evaluate("[...document.querySelectorAll('.steps button')].map(e => e.innerText).join('\\n')")

@@ -118,6 +118,7 @@ def test_things_are_where_the_camera_says() -> None:
         assert (depth > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", [*VIEWS, "90,0", "-45,60", "10,-20", "0,90"])
 def test_all_of_the_run_is_in_view_from_everywhere(view: str) -> None:
     playback = run()
@@ -134,6 +135,7 @@ def test_azimuth_turns_from_the_front_to_the_left() -> None:
     assert direction("0,90") == pytest.approx((0.0, 0.0, 1.0), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_what_stands_still_is_drawn_once_and_looks_the_same() -> None:
     playback = run()
     placing, drawing = Placing(None, SCENE), draw(None, SCENE)
@@ -169,6 +171,7 @@ def test_step_time_and_timeline_are_written_in() -> None:
     assert blue[1.5] == blue[2.0] == pytest.approx(0.5 * 306, abs=3)
 
 
+@pytest.mark.slow
 def test_a_long_name_is_cut_and_a_tiny_picture_is_drawn() -> None:
     steps = (replace(STEPS[0], label="x" * 500 + "\x1b"),)
     for size in ((64, 64), (320, 240)):

@@ -162,6 +162,7 @@ def test_what_is_drawn_has_the_size_of_what_collides(link: ElementTree.Element) 
     np.testing.assert_allclose(drawn(link).bounds, collides.bounds, atol=0.017)
 
 
+@pytest.mark.slow
 def test_committed_meshes_are_what_the_generator_makes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Positions are written to 0.01 mm; the rest is for another machine's sine."""
     monkeypatch.syspath_prepend(str(ROBOT / "meshes"))

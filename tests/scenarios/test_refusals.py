@@ -212,6 +212,7 @@ def test_a_wrong_override_names_itself_and_what_was_meant(call: Call, tmp_path: 
     assert not files(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_log_is_not_overwritten_without_being_told(call: Call, tmp_path: Path) -> None:
     task = written(tmp_path, HEAD + "start: home\n" + HOME)
     log = written(tmp_path, "precious", "x.mcap")

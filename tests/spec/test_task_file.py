@@ -720,6 +720,7 @@ def test_the_schema_offers_each_verb_once_and_takes_expressions() -> None:
     assert count["type"] == ["integer", "string"]
 
 
+@pytest.mark.slow
 def test_the_spec_layer_starts_without_numpy() -> None:
     code = "import sys, manipcli.spec.load, manipcli.spec.schema; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -188,6 +188,7 @@ def test_any_bytes_are_a_tree_or_refused(data: bytes) -> None:
         assert error.findings
 
 
+@pytest.mark.slow
 @given(st.text(st.sampled_from("ab:-[]{}&*!|>'\"#\n ,?.0"), max_size=40))
 def test_the_parser_in_python_agrees_with_libyaml(text: str) -> None:
     def outcome() -> object:

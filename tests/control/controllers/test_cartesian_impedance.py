@@ -93,6 +93,7 @@ def test_a_force_displaces_the_tool_by_its_share_of_the_stiffness(wrench):
     np.testing.assert_allclose(controller.error, -moved, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_axes_of_the_tool_turn_with_it():
     arm, controller = Arm(BENT, 2e-3), make(axes="tool", posture_stiffness=40.0)
     before = arm.tool()
@@ -124,6 +125,7 @@ def test_energy_does_not_grow(posture, damping):
     assert energies[-1] < 0.25 * energies[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("q", [np.zeros(7), np.array([0.3, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0])])
 def test_a_stretched_arm_stays_finite_and_comes_to_rest(q):
     """Straight up the Jacobian has lost a direction; the pose asked for lies out of reach along it."""
