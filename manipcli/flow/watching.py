@@ -11,7 +11,7 @@ from manipcli.core.units import readable
 from manipcli.flow.live import Live, Probe
 from manipcli.judge.expectation import ROUNDING, labels
 from manipcli.model.moments import Moments
-from manipcli.model.reading import Reading, opposite
+from manipcli.model.reading import Reading, never
 from manipcli.spec.condition import ExpectationSpec, WatchSpec
 
 
@@ -71,7 +71,7 @@ class Watching:
 
 def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Reading) -> Broken | None:
     """The first of these moments that breaks a watch."""
-    answer = opposite(reading) if watch.quantifier == "never" else reading
+    answer = never(reading) if watch.quantifier == "never" else reading
     bad = answer.applies & ~(answer.order >= 0.0)
     if watch.steps:
         bad &= _during(watch.steps, moments)

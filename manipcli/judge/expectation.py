@@ -21,7 +21,7 @@ from manipcli.model.condition import Condition, Problem, Setting, World
 from manipcli.model.conditions.step_done import StepDoneSpec
 from manipcli.model.formula import absent, opened, problems, scopes
 from manipcli.model.moments import Moments
-from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, opposite
+from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, never
 from manipcli.spec.condition import END, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
@@ -121,7 +121,7 @@ class Expected:
 
     def _answer(self, moments: Moments) -> Reading:
         answer = self._gauge(moments)
-        return opposite(answer) if self._spec.quantifier == "never" else answer
+        return never(answer) if self._spec.quantifier == "never" else answer
 
     def _keep(self, moments: Moments) -> None:
         """As many as it takes to hold the last `END_WINDOW` seconds."""

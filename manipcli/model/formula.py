@@ -29,7 +29,7 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
     def look(moments: Moments) -> Reading:
         readings = [member(moments) for member in members]
         if spec.name == "not":
-            return opposite(readings[0], word="not ")
+            return opposite(readings[0])
         return least(readings) if spec.name == "all" else greatest(readings)
 
     return look

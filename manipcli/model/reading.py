@@ -92,7 +92,8 @@ def reading(
     every = np.broadcast_to(margins, np.shape(times))
 
     def found(k: int) -> Measured:
-        return Measured(float(every[k]), unit, float(times[k]) if at is None else at(k), say(k))
+        margin = float(every[k]) + 0.0  # never -0
+        return Measured(margin, unit, float(times[k]) if at is None else at(k), say(k))
 
     everywhere = np.ones(np.shape(times), dtype=bool) if applies is None else applies
     return Reading(every, every / scale, (unit,), everywhere, idle, found)
@@ -108,14 +109,26 @@ def greatest(readings: Sequence[Reading]) -> Reading:
     return _picked(readings, np.argmax)
 
 
-def opposite(of: Reading, *, word: str = "") -> Reading:
+def opposite(of: Reading, *, word: str = "not ") -> Reading:
     """`not`: the same margin with the other sign; `word` is said before what was found."""
 
     def found(k: int) -> Measured:
         one = of.found(k)
-        return replace(one, margin=-one.margin, text=f"{word}{one.text}")
+        return replace(one, margin=0.0 - one.margin, text=f"{word}{one.text}")  # never -0
 
-    return replace(of, margins=-of.margins, relative=-of.relative, found=found)
+    return replace(of, margins=0.0 - of.margins, relative=0.0 - of.relative, found=found)
+
+
+def never(of: Reading) -> Reading:
+    """`never`: the opposite, and what is asked is told as such: `'cup' moved by 38 mm; never at least 60 mm`."""
+    against = opposite(of, word="")
+
+    def found(k: int) -> Measured:
+        one = against.found(k)
+        measured, between, asked = one.text.rpartition("; ")
+        return replace(one, text=f"{measured}; never {asked}") if between else one
+
+    return replace(against, found=found)
 
 
 def named(of: Reading, word: str) -> Reading:

@@ -91,7 +91,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
 
 def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str, str]) -> Element:
     case = _case(verdict, "expect", one.name, 0.0, attributes)
-    margin = "" if one.margin is None else f"margin {one.margin:+.9g} {one.unit}".rstrip()
+    margin = "" if one.margin is None else f"margin {one.margin:+z.9g} {one.unit}".rstrip()
     when = "" if one.at is None else f"at {one.at:.3f} s"
     if one.outcome == "failed":
         size = f" by {quantity(abs(one.margin), one.unit)}" if one.margin else ""

@@ -22,5 +22,5 @@ def quantity(value: float, unit: str) -> str:
     name, scale = (unit, 1.0) if unit == "m" and abs(value) >= 1.0 else _CUSTOMARY.get(unit, (unit, 1.0))
     number = value * scale
     size = abs(number)
-    digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:.2g}"
+    digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:z.2g}"
     return f"{digits} {name}".rstrip()

@@ -154,6 +154,12 @@ def test_a_watch_that_breaks_in_the_last_ticks_of_its_step_fails_that_step(run: 
     assert broken.step == "wait_1"
 
 
+def test_a_watch_tells_what_must_never_be_as_that(run: Run) -> None:
+    verdict = run(f"steps:\n{AWAY}watch:\n  - never: {{tool_speed: {{below: 1 m/s, link: hand}}}}\n")
+    assert "; never below 1 m/s" in verdict.text
+    assert "; never below 1 m/s" in verdict.expectations[0].text
+
+
 def test_a_watch_wins_over_a_retry(run: Run) -> None:
     verdict = run(f"steps:\n{AWAY}    on_fail: {{retry: 5, then: continue}}\n{WATCH}")
     assert verdict.verdict == "failed"

@@ -214,6 +214,7 @@ def test_what_never_may_hold_and_what_never_came_true_say_how_close_it_was() -> 
     never = judged(recording(), {"never": NEAR, "during": "b"})
     assert never.name == "never_near"
     assert never.text.startswith("during 'b': 'cube' is at [")
+    assert never.text.endswith("; never within 500 mm")
     ramp = np.linspace(-0.4, -0.1, T)
     late = judged(recording(np.concatenate([[0.5], ramp[1:]])), {"eventually": NEAR, "during": "b", "within": "200 ms"})
     assert (late.outcome, late.at) == ("failed", 0.8)

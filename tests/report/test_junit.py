@@ -76,6 +76,8 @@ def test_a_run_that_passed_is_a_case_a_step_and_an_expectation() -> None:
     assert (suite.get("failures"), suite.get("errors"), suite.get("skipped")) == ("0", "0", "0")
     assert _case(suite, "pick_1").get("time") == "1.945"
     assert "margin +0.0137 m" in str(_case(suite, "near").findtext("system-out"))
+    untouched = replace(PASSED, expectations=(ExpectationOutcome("no_collision", "passed", -0.0, "N", None, "never"),))
+    assert _case(_read(untouched), "no_collision").findtext("system-out") == "margin +0 N, never"
 
 
 def test_a_failure_tells_the_margin_and_where_it_was_written() -> None:

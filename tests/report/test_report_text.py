@@ -43,6 +43,7 @@ FAILED = replace(
         (0.25, "s", "0.25 s"),
         (3.0, "", "3.0"),
         (math.inf, "m", "unlimited"),
+        (-0.0, "N", "0 N"),
     ],
 )
 def test_quantities_are_in_customary_units(value: float, unit: str, text: str) -> None:

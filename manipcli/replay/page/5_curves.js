@@ -16,6 +16,9 @@ function curves() {
   return found;
 }
 
+// Without the sign of what rounds to nothing.
+const fixed = (v, digits) => v.toFixed(digits).replace(/^-(?=[0.]+$)/, "");
+
 const value = (one, k) => one.table.values[k * one.table.columns.length + one.c];
 
 function range() {
@@ -105,7 +108,7 @@ function drawPlot() {
     }
     const v = between(one.table.values, one.table.columns.length, one.c, k, fraction);
     entry.firstChild.style.background = one.colour;
-    const text = Number.isNaN(v) ? "–" : Math.abs(v) >= 100 ? v.toFixed(1) : v.toFixed(Math.abs(v) < 0.1 ? 4 : 3);
+    const text = Number.isNaN(v) ? "–" : Math.abs(v) >= 100 ? fixed(v, 1) : fixed(v, Math.abs(v) < 0.1 ? 4 : 3);
     entry.lastChild.textContent = `${one.name} ${text} ${one.table.units[one.c]}`;
   });
 }
