@@ -5,12 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal, TypeVar
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, escape
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import substitute
@@ -21,7 +21,7 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros import rewrite
 from manipcli.spec.salvage import salvage
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import MappingNode, Node
+from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.yaml import MAX_BYTES, parse
 
 M = TypeVar("M", bound=Model)
@@ -138,7 +138,23 @@ def _task_source(
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     source, findings = _changed(_source(text, name, "TASK", "task"), wanted, model)
     root, more = substitute(source.root, "TASK")
-    return Source(name, root, "TASK"), [*findings, *more]
+    source = Source(name, root, "TASK")
+    return source, [*findings, *more, *_taken_twice(source)]
+
+
+def _taken_twice(source: Source) -> Iterator[Finding]:
+    """Ids that two steps, expectations or watches have: looked for here, so that no other mistake hides them."""
+    for key, named in (("steps", "steps in the log"), ("expect", "expectations"), ("watch", "watches")):
+        items = child(source.root, key)
+        first: dict[str, int] = {}
+        for k, item in enumerate(items.items if isinstance(items, SequenceNode) else ()):
+            own = child(item, "id")
+            if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
+                continue
+            if own.value in first:
+                message = f"the id '{escape(own.value)}' is taken by {key}[{first[own.value]}]"
+                yield source.finding(210, (key, k, "id"), message, hint=f"ids name {named}: give another")
+            first.setdefault(own.value, k)
 
 
 def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:

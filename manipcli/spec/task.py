@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
@@ -42,7 +41,9 @@ class SimulationSpec(Model):
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
         (0.0, 0.0, -9.81), description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
     )
-    settle: Annotated[Time, Field(ge=0, le=60, description="Simulated before the start, 0 to 60 s. Default 0.5 s.")] = 0.5
+    settle: Annotated[Time, Field(ge=0, le=60, description="Simulated before the start, 0 to 60 s. Default 0.5 s.")] = (
+        0.5
+    )
 
     @model_validator(mode="after")
     def _whole_steps(self) -> SimulationSpec:
@@ -326,50 +327,20 @@ class TaskSpec(Model):
             raise problem("conflict", f"{name[:100]!r} cannot be the name of a task: it names its log", hint=hint)
         return name
 
-    @field_validator("expect", mode="after")
-    @classmethod
-    def _labelled(cls, expect: tuple[ExpectationSpec, ...]) -> tuple[ExpectationSpec, ...]:
-        """No id twice."""
-        _refuse_twice(expect, "expect")
-        return expect
-
-    @field_validator("watch", mode="after")
-    @classmethod
-    def _labelled_watch(cls, watch: tuple[WatchSpec, ...]) -> tuple[WatchSpec, ...]:
-        """No id twice."""
-        _refuse_twice(watch, "watch")
-        return watch
-
     @field_validator("steps", mode="after")
     @classmethod
     def _named(cls, steps: tuple[StepSpec, ...]) -> tuple[StepSpec, ...]:
         """Every step gets an id: its own, or its verb and the next free number."""
-        first: dict[str, int] = {}
+        given = {step.id for step in steps}
         for index, step in enumerate(steps):
-            if step.id is None:
-                continue
-            if not ID.fullmatch(step.id):
+            if step.id is not None and not ID.fullmatch(step.id):
                 raise problem("conflict", f"'{step.id}' cannot be an id", at=(index, "id"), hint=ID_HINT)
-            if step.id in first:
-                message = f"the id '{step.id}' is taken by steps[{first[step.id]}]"
-                raise problem("duplicate", message, at=(index, "id"), hint="ids name steps in the log: give another")
-            first[step.id] = index
         counts: dict[str, int] = {}
         named: list[StepSpec] = []
         for step in steps:
             number = counts.get(step.verb, 0) + 1
-            while step.id is None and f"{step.verb}_{number}" in first:
+            while step.id is None and f"{step.verb}_{number}" in given:
                 number += 1
             counts[step.verb] = number
             named.append(step if step.id else step.model_copy(update={"id": f"{step.verb}_{number}"}))
         return tuple(named)
-
-
-def _refuse_twice(expect: Sequence[ExpectationSpec], key: str) -> None:
-    first: dict[str, int] = {}
-    for index, one in enumerate(expect):
-        if one.id in first:
-            message = f"the id '{one.id}' is taken by {key}[{first[one.id]}]"
-            raise problem("duplicate", message, at=(index, "id"), hint="ids name expectations: give another")
-        if one.id is not None:
-            first[one.id] = index

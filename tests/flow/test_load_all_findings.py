@@ -50,6 +50,42 @@ expect:
         assert hint in text
 
 
+def test_ids_that_are_taken_are_told_with_everything_else(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+steps:
+  - id: a
+    wait: 1 s
+  - id: a
+    move: {to: hom}
+  - id: a
+    moove: {to: home}
+  - move: {to: hom}
+expect:
+  - duration: {below: 1 s}
+    id: b
+  - tool_speed: {below: 1 m/s, link: tol}
+    id: b
+""",
+    )
+    told = [f"{line} {text}" for line, _, text in found]
+    taken = [
+        "7 steps[1].id: the id 'a' is taken by steps[0]",
+        "9 steps[2].id: the id 'a'",
+        "16 expect[1].id: the id 'b'",
+    ]
+    for start in (
+        *taken,
+        "8 steps[1].move.to: ",
+        "10 steps[2]: unknown verb",
+        "11 steps[3].move.to: ",
+        "15 expect[1].",
+    ):
+        assert any(one.startswith(start) for one in told), (start, told)
+    assert len(told) == 7
+
+
 def test_an_item_keeps_its_number_when_the_one_before_it_is_faulty(tmp_path: Path) -> None:
     found = findings(tmp_path, "steps:\n  - moove: {}\n  - move: {to: hom}\n")
     assert [text.split(":")[0] for _, _, text in found] == ["steps[0]", "steps[1].move.to"]
