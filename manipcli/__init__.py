@@ -12,8 +12,9 @@ costs nothing.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from manipcli.core.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, SimulationFailed
@@ -70,14 +71,7 @@ _HOMES = {
 """The module in which each public name is defined, or which offers it."""
 
 
-def __getattr__(name: str) -> object:
-    """A public name, from its module; from then on an ordinary attribute."""
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    found: object = getattr(import_module(f"{__name__}.{home}"), name)
-    globals()[name] = found
-    return found
+__getattr__ = lazy_exports(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -5,8 +5,9 @@ The transmissions are public here, each imported when it is first used (PEP 562)
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from manipcli.core.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from manipcli.model.transmission import Transmission
@@ -24,11 +25,4 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> object:
-    """A public name, from its module; from then on an ordinary attribute."""
-    home = _HOMES.get(name)
-    if home is None:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    found: object = getattr(import_module(f"{__name__}.{home}"), name)
-    globals()[name] = found
-    return found
+__getattr__ = lazy_exports(__name__, _HOMES)

@@ -1,0 +1,26 @@
+"""Public names of a package that are imported when they are first used (PEP 562)."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
+
+
+def lazy_exports(package: str, homes: Mapping[str, str]) -> Callable[[str], object]:
+    """The `__getattr__` of a package.
+
+    Args:
+        package: its `__name__`.
+        homes: the public names, each with the module below the package that defines or offers it.
+    """
+
+    def get(name: str) -> object:
+        home = homes.get(name)
+        if home is None:
+            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+        found: object = getattr(import_module(f"{package}.{home}"), name)
+        setattr(sys.modules[package], name, found)  # from now on an ordinary attribute
+        return found
+
+    return get
