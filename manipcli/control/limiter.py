@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
-from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity
+from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.model.robot import JointLimits, SoftLimits
@@ -59,7 +59,7 @@ class _Limits:
             return np.array([default if value is None else value for value in values], dtype=np.float64)
 
         soft = [limit.soft or _NO_SOFT for limit in limits]
-        return cls(
+        found = cls(
             lower=bound([limit.lower for limit in limits], -math.inf),
             upper=bound([limit.upper for limit in limits], math.inf),
             velocity=bound([limit.velocity for limit in limits], math.inf),
@@ -70,6 +70,11 @@ class _Limits:
             k_position=np.array([one.k_position for one in soft]),
             k_velocity=np.array([one.k_velocity for one in soft]),
         )
+        refuse_limits(
+            found.lower, found.upper, velocity=found.velocity, acceleration=found.acceleration, effort=found.effort,
+            k_position=found.k_position, k_velocity=found.k_velocity,
+        )  # fmt: skip
+        return found
 
     def at(self, where: npt.NDArray[np.intp]) -> _Limits:
         """Of some joints."""
@@ -293,6 +298,9 @@ class JointLimiter:
     Args:
         limits: (n) of the joints.
         joints: (n) their names, for errors; by default their numbers.
+
+    Raises:
+        InvalidArgument: see `refuse_limits`.
     """
 
     def __init__(self, limits: Sequence[JointLimits], joints: Sequence[str] | None = None) -> None:

@@ -67,8 +67,9 @@ def limit_position(
 
     Raises:
         InvalidArgument: a measured position is more than `OUT_OF_BOUNDS` beyond its limits; neither `previous` nor
-            `position`, or no `dt`, is given while a limit needs it; a dt that is not above 0.
+            `position`, or no `dt`, is given while a limit needs it; a dt that is not above 0; see `refuse_limits`.
     """
+    refuse_limits(lower, upper, velocity=velocity, acceleration=acceleration, k_position=k_position)
     low, high = _floats(lower), _floats(upper)
     if position is not None:
         _refuse_out_of_bounds(_floats(position), low, high)
@@ -124,8 +125,9 @@ def limit_velocity(
         (n)
 
     Raises:
-        InvalidArgument: a dt that is not above 0, or none where it is needed.
+        InvalidArgument: a dt that is not above 0, or none where it is needed; see `refuse_limits`.
     """
+    refuse_limits(lower, upper, velocity=velocity, acceleration=acceleration, k_position=k_position)
     fastest = _floats(velocity)
     if dt is None:
         if position is not None or previous is not None:
@@ -178,6 +180,7 @@ def limit_effort(
     Returns:
         (n)
     """
+    refuse_limits(lower, upper, effort=effort, max_velocity=max_velocity, k_position=k_position, k_velocity=k_velocity)
     most = _floats(effort)
     lowest, highest = -most, most
     if velocity is not None:
@@ -219,6 +222,7 @@ def limit_acceleration(
     Returns:
         (n)
     """
+    refuse_limits(acceleration=acceleration, deceleration=deceleration)
     wanted, most = _floats(command), _floats(acceleration)
     if deceleration is not None and velocity is not None:
         most = np.where(wanted * _floats(velocity) < 0.0, _floats(deceleration), most)
@@ -229,6 +233,22 @@ def _are_idle(velocity: npt.ArrayLike, acceleration: npt.ArrayLike, k_position: 
     """Whether nothing limits how fast a position may change."""
     endless = np.isinf(_floats(velocity)).all() and np.isinf(_floats(acceleration)).all()
     return bool(endless and not np.any(_floats(k_position) > 0.0))
+
+
+def refuse_limits(
+    lower: npt.ArrayLike = -math.inf, upper: npt.ArrayLike = math.inf, **sizes: npt.ArrayLike | None
+) -> None:
+    """Limits that nothing keeps.
+
+    Raises:
+        InvalidArgument: one of `sizes` (None: there is none) is below 0, `lower` is above `upper`, or one is NaN.
+    """
+    for name, size in sizes.items():
+        if size is not None and not (_floats(size) >= 0.0).all():
+            raise InvalidArgument("CTRL194", f"the limit `{name}` is {_floats(size)}; expected 0 or more")
+    least, most = _floats(lower), _floats(upper)
+    if not (least <= most).all():
+        raise InvalidArgument("CTRL194", f"the limits are {least} to {most}; expected no lower one above its upper one")
 
 
 def _refuse_time(dt: float) -> None:

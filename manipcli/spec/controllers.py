@@ -126,7 +126,6 @@ class UpsamplingSpec(Model):
     """Velocities for goals that give positions alone."""
 
     enable: bool = Field(False, description="Follow the cubic spline through the positions. Default false.")
-    policy_frequency: float = Field(0.0, description="Ignored: references are made for every control tick.")
 
 
 class JointTrajectorySpec(ControllerSpec):

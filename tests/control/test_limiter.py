@@ -8,6 +8,7 @@ import pytest
 from manipcli.control import JointLimiter, NotFinite, limit_effort, limit_position, limit_velocity
 from manipcli.control.command import JointCommand
 from manipcli.control.limiter import SLACK
+from manipcli.core.errors import InvalidArgument
 from manipcli.model.robot import JointLimits, SoftLimits
 
 HARD = {"lower": -1.0, "upper": 1.0}
@@ -135,3 +136,12 @@ def test_efforts_and_soft_limits_stop_a_thrown_joint_before_its_hard_limit():
         highest = max(highest, float(q[0]))
     assert highest < 0.85
     assert q[0] == pytest.approx(0.8, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [JointLimits(1, -1), JointLimits(velocity=-2), JointLimits(effort=math.nan), JointLimits(lower=math.nan, upper=1)],
+)
+def test_limits_that_nothing_keeps_are_refused_before_any_tick(limits):
+    with pytest.raises(InvalidArgument, match=r"CTRL194"):
+        JointLimiter([JointLimits(), limits])

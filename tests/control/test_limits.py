@@ -63,6 +63,36 @@ def test_time_is_asked_for_only_where_something_changes_with_it():
                 limited(wrong)
 
 
+@pytest.mark.parametrize("wrong", [-1.0, math.nan, [1.0, -0.5], [math.nan, 1.0]])
+def test_a_limit_below_nothing_is_refused(wrong):
+    for limited in (
+        lambda: limit_position([0.0, 0.0], velocity=wrong, previous=0.0, dt=1.0),
+        lambda: limit_position([0.0, 0.0], acceleration=wrong, previous=0.0, dt=1.0),
+        lambda: limit_position([0.0, 0.0], k_position=wrong, previous=0.0, dt=1.0),
+        lambda: limit_velocity([0.0, 0.0], velocity=wrong),
+        lambda: limit_velocity([0.0, 0.0], acceleration=wrong, previous=0.0, dt=1.0),
+        lambda: limit_effort([0.0, 0.0], effort=wrong),
+        lambda: limit_effort([0.0, 0.0], max_velocity=wrong, velocity=0.0),
+        lambda: limit_effort([0.0, 0.0], k_velocity=wrong, velocity=0.0),
+        lambda: limit_acceleration([0.0, 0.0], acceleration=wrong),
+        lambda: limit_acceleration([0.0, 0.0], deceleration=wrong, velocity=1.0),
+    ):
+        with pytest.raises(InvalidArgument, match="expected 0 or more"):
+            limited()
+
+
+@pytest.mark.parametrize("ends", [(1.0, -1.0), (math.nan, 1.0), (0.0, math.nan), ([0.0, 1.0], [1.0, 0.5])])
+def test_a_lower_limit_above_the_upper_one_is_refused(ends):
+    lower, upper = ends
+    for limited in (
+        lambda: limit_position([0.0, 0.0], lower=lower, upper=upper),
+        lambda: limit_velocity([0.0, 0.0], lower=lower, upper=upper, position=0.0, dt=1.0),
+        lambda: limit_effort([0.0, 0.0], lower=lower, upper=upper, position=0.0, velocity=0.0),
+    ):
+        with pytest.raises(InvalidArgument, match="expected no lower one above its upper one"):
+            limited()
+
+
 def test_soft_limits_of_positions():
     """Case 54 (ros_control's PositionJointSoftLimits): dt 0.1, v_max 2, soft 0.8 with k 20, hard 1."""
     law = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "k_position": 20.0, "dt": 0.1}

@@ -173,7 +173,7 @@ PARAMETERS = """\
     decelerate_on_cancel: true
     a: {goal: 0.05, trajectory: 0.1, max_deceleration_on_cancel: 2.0}
   speed_scaling: {initial_scaling_factor: 0.5}
-  positions_upsampling: {enable: true, policy_frequency: 50.0}
+  positions_upsampling: {enable: true}
 """
 
 
@@ -199,7 +199,7 @@ def test_every_parameter_of_a_trajectory_controller_that_is_served_is_passed_on(
         "allow_nonzero_velocity_at_trajectory_end": True, "allow_integration_in_goal_trajectories": True,
         "allow_trajectory_replacement": False, "interpolation_method": "none", "interpolate_from_desired_state": False,
         "cmd_timeout": 3.0, "update_rate": 500.0, "speed_scaling": {"initial_scaling_factor": 0.5},
-        "positions_upsampling": {"enable": True, "policy_frequency": 50.0},
+        "positions_upsampling": {"enable": True},
     }  # fmt: skip
 
 
@@ -396,6 +396,7 @@ def test_a_mistake_is_told_at_its_place(given: str, message: str) -> None:
         "gains: {a: {p: 1, i_clamp_max: .inf, i_clamp_min: -.inf, u_clamp_max: .inf, u_clamp_min: -.inf}}",
         "gains: {a: {p: 1, angle_wraparound: false}}",
         'speed_scaling: {state_interface: "", command_interface: ""}',
+        "positions_upsampling: {enable: true, policy_frequency: 0.0}",
     ],
 )
 def test_values_that_say_no_more_than_nothing_are_not_told(given: str) -> None:
@@ -409,6 +410,9 @@ def test_a_value_that_ros_knows_and_manipcli_does_not_is_a_warning() -> None:
     _, findings = loaded(f"x: {{{JTC}, joints: [a], gains: {{a: {{p: 1, antiwindup_strategy: legacy}}}}}}")
     (line,) = told(findings)
     assert "x.gains.a: ROS knows 'antiwindup_strategy: legacy', manipcli does not serve it" in line
+    _, findings = loaded(f"x: {{{JTC}, joints: [a], positions_upsampling: {{enable: true, policy_frequency: 30.0}}}}")
+    (line,) = told(findings)
+    assert "x.positions_upsampling: ROS knows 'policy_frequency', manipcli does not serve it" in line
 
 
 def test_types_that_manipcli_does_not_serve_are_left_out_and_unknown_ones_are_errors() -> None:

@@ -55,6 +55,9 @@ JOINT_TRAJECTORY: Final = Table(
         inner={
             "gains": Block(joint=_GAINS),
             "constraints": Block(inner={"joints": Block(joint=Block())}),
+            "positions_upsampling": Block(
+                known=frozenset({"policy_frequency"}), neutral={"policy_frequency": (0, 0.0)}
+            ),
             "speed_scaling": Block(
                 known=frozenset({"state_interface", "command_interface"}),
                 neutral={"state_interface": ("",), "command_interface": ("",)},
