@@ -1,9 +1,10 @@
-"""Which tasks there are: YAML files with a text under the top-level key `task`, below the folders that are named."""
+"""Which tasks there are: YAML files with a name under the top-level key `task`, and the key `robot`, below the folders
+that are named."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
     except InvalidInput as invalid:
         return Case(name, path.stem, findings=invalid.findings)
     task = root.get("task") if isinstance(root, MappingNode) else None
-    if not isinstance(root, MappingNode) or not isinstance(task, ScalarNode):
+    if not isinstance(root, MappingNode) or not isinstance(task, ScalarNode) or not isinstance(task.value, str):
         message = "`task:` is no name; expected a text"
         return Case(name, path.stem, findings=(Finding("TASK200", message, task.place if task is not None else None),))
     tags = root.get("tags")
@@ -62,10 +63,18 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
     engine_name = engine.value if isinstance(engine, ScalarNode) else SimulationSpec.model_fields["engine"].default
     return Case(
         file=name,
-        task=str(task.value),
+        task=task.value,
         tags=(*tagged, f"engine_{engine_name}"),
         varied=root.get("vary") is not None,
     )
+
+
+def failed_of(case: Case, failed: Collection[str]) -> tuple[Case, ...]:
+    """The task as it is written and its samples, of those whose ids are among `failed`."""
+    numbers = [one.removeprefix(f"{case.id}[").removesuffix("]") for one in failed if one.startswith(f"{case.id}[")]
+    samples = sorted(int(one) for one in numbers if one.isdecimal()) if case.varied else ()
+    candidates = (case, *(replace(case, sample=number) for number in samples))
+    return tuple(one for one in candidates if one.id in failed)
 
 
 def samples_of(case: Case, count: int | None) -> tuple[Case, ...]:
@@ -97,7 +106,7 @@ def _no_task(path: Path) -> tuple[Finding, ...]:
         read_bytes(path)
     except InvalidInput as invalid:
         return invalid.findings
-    if looks_like_a_task(path):
+    if looks_like_a_task(path, named=True):
         return ()
-    message = "this is no task file: a YAML file with a name under the top-level key `task` was expected"
+    message = "this is no task file: a YAML file with the top-level keys `task` and `robot` was expected"
     return (Finding("USE105", message, Place(str(path), 1, 1)),)

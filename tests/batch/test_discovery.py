@@ -1,4 +1,4 @@
-"""Which files are tests: those with a name under the top-level key `task`, and no others."""
+"""Which files are tests: those with a name under the top-level key `task` and a robot, and no others."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from manipcli.core.errors import InvalidInput
 TASKS = {
     "a.yaml": "task: a\nrobot: r.yaml\n",
     "tasks/late.yml": "robot: r.yaml\nsteps: []\ntask: late  # the order is free\n",
-    "tasks/quoted.yaml": '"task": quoted\n',
+    "tasks/quoted.yaml": '"task": quoted\n"robot": r.yaml\n',
     "tasks/flow.yaml": "{task: flow, robot: r.yaml}\n",
-    "tasks/windows.yaml": "\ufeff# a comment\r\ntask: windows\r\n",
-    "tasks/broken.yaml": "task: broken\nsteps: [\n",
+    "tasks/more.yaml": '{\n  "robot": "r.yaml",\n  "steps": [{"wait": 1}],\n  "task": "more"\n}\n',
+    "tasks/nullable.yaml": "task: nullable\nrobot: r.yaml\n",
+    "tasks/windows.yaml": "\ufeff# a comment\r\ntask: windows\r\nrobot: r.yaml\r\n",
+    "tasks/broken.yaml": "task: broken\nrobot: r.yaml\nsteps: [\n",
 }
 OTHERS = {
     "robots/r.yaml": "robot: r\ndescription: r.urdf\n",
@@ -26,14 +28,20 @@ OTHERS = {
     "ci.yaml": "on: push\njobs:\n  task:\n    steps: []\n",
     "ansible.yaml": "- name: x\n  task: y\n",
     "taskfile.yml": "version: 3\ntasks:\n  task: no\n",
-    "group.yaml": "task:\n  name: a mapping\n",
-    "comment.yaml": "# task: no\ntask: # nothing\n",
-    "notes.txt": "task: no\n",
-    ".hidden/h.yaml": "task: h\n",
-    "tasks/.hidden.yaml": "task: h\n",
-    "runs/old.yaml": "task: old\n",
-    "node_modules/m.yaml": "task: m\n",
-    "my_env/lib/v.yaml": "task: v\n",
+    "group.yaml": "task:\n  name: a mapping\nrobot: r.yaml\n",
+    "comment.yaml": "# task: no\ntask: # nothing\nrobot: r.yaml\n",
+    "robotless.yaml": "task: hello\nsteps: {robot: r}\nvars:\n  robot: r\n",
+    "map.yaml": "task: {a: b}\nrobot: r.yaml\n",
+    "list.yaml": "task: [1, 2]\nrobot: r.yaml\n",
+    "null.yaml": "task: ~\nrobot: r.yaml\n",
+    "word.yaml": "task: null # as well\nrobot: r.yaml\n",
+    "number.yaml": "task: 5\nrobot: r.yaml\n",
+    "notes.txt": "task: no\nrobot: r.yaml\n",
+    ".hidden/h.yaml": "task: h\nrobot: r.yaml\n",
+    "tasks/.hidden.yaml": "task: h\nrobot: r.yaml\n",
+    "runs/old.yaml": "task: old\nrobot: r.yaml\n",
+    "node_modules/m.yaml": "task: m\nrobot: r.yaml\n",
+    "my_env/lib/v.yaml": "task: v\nrobot: r.yaml\n",
     "my_env/pyvenv.cfg": "home = /usr/bin\n",
 }
 
@@ -71,9 +79,17 @@ def test_a_file_that_is_named_and_is_no_task_is_refused(folder: Path, named: str
     assert [finding.code for finding in refused.value.findings] == [code]
 
 
+@pytest.mark.parametrize("named", ["robotless.yaml", "map.yaml", "null.yaml", "number.yaml", "comment.yaml"])
+def test_a_file_that_is_named_is_a_case_that_tells_what_is_wrong(folder: Path, named: str) -> None:
+    assert task_files([Path(named)]) == (Path(named),)
+    case = read_case(Path(named))
+    assert case.task == ("hello" if named == "robotless.yaml" else Path(named).stem)
+    assert [one.code for one in case.findings] == ([] if named == "robotless.yaml" else ["TASK200"])
+
+
 def test_only_the_beginning_of_a_foreign_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "large.yaml"
-    path.write_text("a: 1\n" * 100_000 + "task: late\n")
+    path.write_text("robot: r\n" + "a: 1\n" * 100_000 + "task: late\n")
     assert not looks_like_a_task(path)
     assert not looks_like_a_task(tmp_path / "absent.yaml")
 
@@ -100,7 +116,7 @@ def test_a_file_that_cannot_be_read_is_a_case_with_its_findings(folder: Path) ->
     assert case.id == "tasks/broken.yaml::broken"
     (finding,) = case.findings
     assert finding.place is not None
-    assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 3)
+    assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 4)
 
 
 def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:
