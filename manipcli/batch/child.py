@@ -49,6 +49,7 @@ class _Beats:
     """The progress of a run, as signs of life."""
 
     def __init__(self, parent: Parent) -> None:
+        self.warnings: tuple[Finding, ...] = ()
         self._parent = parent
         self._doing = ""
         self._at = 0.0
@@ -59,7 +60,12 @@ class _Beats:
         self._parent.send(Beat(what))
 
     def warned(self, findings: Sequence[Finding]) -> None:
+        self.warnings = tuple(findings)
         self.doing("planned")
+
+    def judged(self) -> None:
+        """From here on the time is not that of the run."""
+        self._parent.send(Beat("judged", judged=True))
 
     def told(self, text: str, *, detail: bool) -> None:
         """A step was planned again, which may have taken long, or is tried again."""
@@ -87,7 +93,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     from manipcli import pipeline
     from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
 
-    beats.doing("loading and planning")
+    beats.doing("loading")
     settings = job.settings
     job.log.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -104,15 +110,17 @@ def _end_of(job: Job, beats: _Beats) -> End:
         )
     except InvalidInput as invalid:
         return End(None, invalid.findings)
+    beats.judged()
     found = troubles(job, report.verdict)
+    findings: tuple[Finding, ...] = ()
     notes: list[str] = []
     if report.verdict.verdict == "passed" and job.nominal and settings.baseline:
         beats.doing("comparing with the baseline")
         try:
             found, better = against_baseline(job, report.verdict)
+            notes += better
         except InvalidInput as invalid:
-            return End(report, invalid.findings, troubles_of(invalid.findings))
-        notes += better
+            findings, found = invalid.findings, troubles_of(invalid.findings)
     if found and report.log is not None:
         beats.doing("drawing a picture")
         notes += _noted(
@@ -127,9 +135,9 @@ def _end_of(job: Job, beats: _Beats) -> End:
         )
     if job.page is not None:
         beats.doing("writing a page")
-        notes += _noted("no page", lambda: write_page(job, report))
+        notes += _noted("no page", lambda: write_page(job, report, found))
     told = junit(job, report) if settings.junit else b""
-    return End(report, troubles=found, junit=told, notes=tuple(notes))
+    return End(report, findings, found, beats.warnings, told, tuple(notes))
 
 
 def _noted(what: str, make: Callable[[], None]) -> list[str]:

@@ -112,10 +112,12 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Beat:
-    """A sign of life: what is done, and at which time of the run [s]."""
+    """A sign of life: what is done, and at which time of the run [s]. `judged`: the run has its verdict, and what is
+    left is to tell of it."""
 
     doing: str
     at: float | None = None
+    judged: bool = False
 
     def __str__(self) -> str:
         return self.doing if self.at is None else f"{self.doing} at {self.at:.2f} s"
@@ -129,6 +131,7 @@ class End:
         report: None where nothing was run.
         findings: why nothing was run.
         troubles: why it did not pass, with places in the task file.
+        warnings: what was doubted before it began.
         junit: the file about it, where one is wanted.
         notes: what could not be made of it.
     """
@@ -136,6 +139,7 @@ class End:
     report: RunReport | None
     findings: tuple[Finding, ...] = ()
     troubles: tuple[Trouble, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     junit: bytes = b""
     notes: tuple[str, ...] = ()
 

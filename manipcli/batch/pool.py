@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from multiprocessing.connection import wait
+from pathlib import Path
 
 from manipcli.batch.job import Job
 from manipcli.batch.process import Process
@@ -62,6 +65,13 @@ def run_jobs(
     finally:
         for process in running:
             process.forget()
+
+
+def remove_empty(folder: Path) -> None:
+    """Removes folders that hold nothing: `folder`, and those below it."""
+    for place, _, _ in os.walk(folder, topdown=False):
+        with suppress(OSError):
+            Path(place).rmdir()
 
 
 def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:

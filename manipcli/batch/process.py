@@ -41,6 +41,8 @@ DRAWING_TIME = 30.0
 """[s] that drawing may take."""
 LAST_WORDS = 0.5
 """[s] that a process has to write down where it is, before it is ended."""
+TELLING_TIME = 60.0
+"""[s] that whatever is made of a run that is over may be silent, where the run itself may be so no longer."""
 HALF_SAID = 5.0
 """[s] that a process may stop in the middle of a message, and take to be gone once it has said all."""
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
@@ -68,6 +70,7 @@ class Process:
         self.job = job
         self.doing = Beat("starting")
         self._end: End | None = None
+        self._judged: float | None = None
         self.connection: Connection[Job, Message]
         self.connection, childs = Pipe()
         with socket(fileno=os.dup(self.connection.fileno())) as one:
@@ -91,14 +94,22 @@ class Process:
 
     @property
     def elapsed(self) -> float:
-        """[s] since it was started."""
-        return time.monotonic() - self._began
+        """[s] since it was started, until it was judged."""
+        return (time.monotonic() if self._judged is None else self._judged) - self._began
 
     @property
     def patience(self) -> float:
         """[s] until it will be given up on, as far as is known now."""
-        settings = self.job.settings
-        return min(settings.silence - (time.monotonic() - self._heard), settings.timeout - self.elapsed)
+        quiet = time.monotonic() - self._heard
+        if self._judged is not None:
+            return self._silence - quiet
+        return min(self._silence - quiet, self.job.settings.timeout - self.elapsed)
+
+    @property
+    def _silence(self) -> float:
+        """[s] that it may say nothing."""
+        silence = self.job.settings.silence
+        return silence if self._judged is None else max(silence, TELLING_TIME)
 
     def hear(self) -> CaseReport | None:
         """Takes what the process has said; what came of it once it is gone."""
@@ -110,6 +121,7 @@ class Process:
                     self._end = message
                 else:
                     self.doing = message
+                    self._judged = self._heard if message.judged else self._judged
         except BlockingIOError:
             return self.give_up("it stopped in the middle of a message")
         except (EOFError, OSError):  # also in the middle of a message
@@ -118,9 +130,9 @@ class Process:
 
     def give_up(self, why: str = "") -> CaseReport:
         """Ends the process, which is taking too long or is silent for too long, or `why` else."""
-        settings = self.job.settings
-        over = self.elapsed >= settings.timeout
-        limit = f"it took longer than {settings.timeout:g} s" if over else f"no progress for {settings.silence:g} s"
+        timeout = self.job.settings.timeout
+        over = self._judged is None and self.elapsed >= timeout
+        limit = f"it took longer than {timeout:g} s" if over else f"no progress for {self._silence:g} s"
         self._process.send_signal(signal.SIGUSR1)
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(LAST_WORDS)
@@ -157,7 +169,7 @@ class Process:
         return self._report(word, end.report.verdict.text, end=end)
 
     def _report(self, outcome: CaseWord, text: str, *, end: End | None = None, verb: str = "run") -> CaseReport:
-        job = self.job
+        job, took = self.job, self.elapsed
         end = end if end is not None else End(None, troubles=(Trouble(text, at=self.doing.at),))
         if outcome == "passed" and not job.settings.keep_logs:
             job.log.unlink(missing_ok=True)
@@ -171,12 +183,13 @@ class Process:
         return CaseReport(
             case=job.case,
             outcome=outcome,
-            duration=self.elapsed,
+            duration=took,
             command=job.command(verb),
             text=text,
             run=end.report,
             findings=end.findings,
             troubles=end.troubles or troubles_of(end.findings),
+            warnings=end.warnings,
             log=kept[job.log] or kept[job.partial],
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,

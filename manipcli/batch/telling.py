@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from manipcli.batch.baseline import Key, baseline_path, compared, measured, read_baseline
@@ -18,6 +19,7 @@ from manipcli.replay.image import png_bytes
 from manipcli.replay.shots import Shots
 from manipcli.report.html import render_page
 from manipcli.report.junit import render_junit
+from manipcli.report.run_page import Cause, RunPage, Written
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step
@@ -98,8 +100,9 @@ def draw(
     write_whole(picture, png_bytes(image))
 
 
-def write_page(job: Job, report: RunReport) -> None:
-    """The page about the run, as `manipcli run --report` makes it.
+def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
+    """The page about the run, as `manipcli run --report` makes it. What is `found` to be worse than its baseline in a
+    run that passed is why the test failed.
 
     Raises:
         ManipcliError: the log shows nothing.
@@ -120,12 +123,25 @@ def write_page(job: Job, report: RunReport) -> None:
         page = log_page(
             job.log, task_file=job.path, package_path=settings.package_path, allow_outside=settings.allow_outside
         )
+    if report.verdict.verdict == "passed" and found:
+        page = replace(page, verdict=replace(page.verdict, verdict="failed"), causes=_causes(page, found))
     job.page.parent.mkdir(parents=True, exist_ok=True)
     write_whole(job.page, render_page(page).encode())
 
 
+def _causes(page: RunPage, found: Sequence[Trouble]) -> tuple[Cause, ...]:
+    """Troubles for a page, those of steps and expectations with their lines."""
+    lines = {one.place: one for one in (*page.steps, *page.expectations)}
+
+    def written(place: Place | None) -> Written | None:
+        if place is None:
+            return None
+        return lines.get(f"{Path(place.file).name}:{place.line}", Written(str(place)))
+
+    return tuple(Cause(one.message, "", one.at, written(one.place)) for one in found)
+
+
 def junit(job: Job, report: RunReport) -> bytes:
-    """The run as `manipcli run --junit` tells it."""
+    """The run as `manipcli run --junit` tells it, but for its log, which may not be kept."""
     places = file_places(job.path, job.settings.overrides)
-    log = job.log.name if report.log is not None else ""
-    return render_junit(report.verdict, *places, log=log, file=job.case.file)
+    return render_junit(report.verdict, *places, file=job.case.file)

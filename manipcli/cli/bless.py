@@ -38,8 +38,8 @@ def bless(
     with Interrupts():
         from manipcli.batch.discovery import read_case, shown_path, task_files
         from manipcli.batch.job import Job, Settings
-        from manipcli.batch.pool import run_jobs
-        from manipcli.report.suite_text import render_failure
+        from manipcli.batch.pool import remove_empty, run_jobs
+        from manipcli.report.suite_text import render_case
 
         settings = Settings(
             folder=Path("runs") / "bless",
@@ -60,8 +60,9 @@ def bless(
             if done.passed:
                 console.result("\n".join(_blessed(job, done)))
             else:
-                console.result(f"{render_failure(done)}\n  nothing is blessed")
+                console.result(f"{render_case(done)}\n  nothing is blessed")
                 code = ExitCode.USAGE if ExitCode.USAGE in (code, _code(done)) else ExitCode.FAILED
+        remove_empty(settings.folder)
         return code
 
 

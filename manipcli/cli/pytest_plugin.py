@@ -13,7 +13,7 @@ import pytest
 
 if TYPE_CHECKING:
     from manipcli.batch.job import Settings
-    from manipcli.report.run_report import RunReport
+    from manipcli.report.judged_run import JudgedRun
     from manipcli.report.suite import Case, CaseReport
 
 SUFFIXES = (".yaml", ".yml")
@@ -43,12 +43,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile | None:
-    """The files that `manipcli test` takes, and no others."""
+    """The files that `manipcli test` takes, and no others.
+
+    That is one that is named, and has the top-level key `task`; of others, those with a name there and the key `robot`.
+    """
     if file_path.suffix not in SUFFIXES:
         return None
     from manipcli.batch.first_look import looks_like_a_task
 
-    if not looks_like_a_task(file_path) or not _is_looked_for(file_path, parent.session):
+    named = parent.session.isinitpath(file_path)
+    if not looks_like_a_task(file_path, named=named) or not _is_looked_for(file_path, parent.session):
         return None
     return TaskFile.from_parent(parent, path=file_path)
 
@@ -97,10 +101,10 @@ class TaskItem(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None) -> str:
         """What `manipcli test` tells of it, instead of a traceback."""
         if isinstance(excinfo.value, TaskFailed):
-            from manipcli.report.suite_text import failure_lines, gist
+            from manipcli.report.suite_text import case_lines, gist
 
             report = excinfo.value.report
-            return "\n".join([f"{report.outcome}: {gist(report)}", "", *failure_lines(report)])
+            return "\n".join([f"{report.outcome}: {gist(report)}", "", *case_lines(report)])
         return str(super().repr_failure(excinfo))
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
@@ -120,29 +124,30 @@ class RunTask(Protocol):
 
     def __call__(
         self, path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, sample: int | None = None
-    ) -> RunReport: ...
+    ) -> JudgedRun: ...
 
 
 @pytest.fixture
 def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
-    """Runs a task in a process of its own: `report = run_task("pour.yaml", overrides=["scene.cup.mass=80 g"])`.
+    """Runs a task in a process of its own: `run = run_task("pour.yaml", overrides=["scene.cup.mass=80 g"])`.
 
     A relative path is looked for beside the file of the test, then below the root of pytest. The log is below
-    `tmp_path`, and `report.log` names it. A task that fails fails no test: `report.verdict.verdict` says it. A crash or
-    a hang does, and a file that cannot be used raises `manipcli.InvalidInput`.
+    `tmp_path`, and `run.log` names it. A task that fails fails no test: `assert run.passed, run.text` does, and tells
+    what went wrong. A crash or a hang does, too, and a file that cannot be used raises `manipcli.InvalidInput`.
     """
     count = 0
 
     def run(
         path: Path | str, *, overrides: Sequence[str] = (), seed: int | None = None, sample: int | None = None
-    ) -> RunReport:
+    ) -> JudgedRun:
         __tracebackhide__ = True
         nonlocal count
         from dataclasses import replace
 
         from manipcli.batch.discovery import read_case, shown_path
         from manipcli.core.errors import InvalidInput
-        from manipcli.report.suite_text import render_failure
+        from manipcli.report.judged_run import JudgedRun
+        from manipcli.report.suite_text import render_case
 
         beside, below = request.path.parent / path, request.config.rootpath / path
         found = beside if beside.exists() or not below.exists() else below
@@ -158,8 +163,8 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
         if report.findings:
             raise InvalidInput(report.findings)
         if report.run is None:
-            pytest.fail(render_failure(report), pytrace=False)
-        return report.run
+            pytest.fail(render_case(report), pytrace=False)
+        return JudgedRun.of(report.run, passed=report.passed, text=render_case(report), picture=report.picture)
 
     return run
 

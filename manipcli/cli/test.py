@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,9 +14,10 @@ from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.text import number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from manipcli.batch.job import Job, Settings
     from manipcli.batch.process import Process
@@ -64,13 +66,15 @@ def test(
 ) -> ExitCode:
     """Run tasks as tests, several at a time, each in a process of its own.
 
-    Tests are the YAML files with a name under the top-level key `task`; hidden folders, `runs`, virtual environments
-    and node_modules are not entered. Logs and pictures of what failed go to runs/test.
+    Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, `runs`,
+    virtual environments and node_modules are not entered. Logs and pictures of what failed go to runs/test. Tasks that
+    are run as they are written, without --set, --seed and --samples, are compared with their baselines, see `bless`.
     """
     from manipcli.cli.interrupts import Interrupts
 
     with Interrupts():
         from manipcli.batch.job import Settings, limit
+        from manipcli.batch.pool import remove_empty
 
         settings = Settings(
             overrides=tuple(overrides or ()),
@@ -86,10 +90,12 @@ def test(
         check_outputs(("--junit", junit))
         _check_replaced(junit)
         _check_folder(report)
-        chosen = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
+        chosen, among = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
         at_once = min(jobs or _cores(), max(1, len(chosen)))
         lines = _Lines(chosen, text=format_ == "text", quiet=quiet)
         suite = _run(chosen, at_once, lines, first=first)
+        suite = replace(suite, notes=(*suite.notes, *_notes(chosen, among, keyword)))
+        remove_empty(settings.folder)
         lines.clear()
         _write(suite, junit, report)
         _tell(suite, format_, github=github)
@@ -98,23 +104,36 @@ def test(
 
 def _jobs(
     paths: Sequence[Path], settings: Settings, *, keyword: str, samples: int | None, last_failed: bool
-) -> tuple[Job, ...]:
-    """What is to be run, in order."""
-    from manipcli.batch.discovery import read_case, samples_of, shown_path, task_files
+) -> tuple[tuple[Job, ...], int]:
+    """What is to be run, in order; and how many there were to choose from."""
+    from manipcli.batch.discovery import failed_of, read_case, samples_of, shown_path, task_files
     from manipcli.batch.job import Job
     from manipcli.batch.last_failed import last_failed as known
     from manipcli.batch.selection import chosen_by
 
-    chosen = chosen_by(keyword) if keyword else None
-    found = [
-        Job(case, file, settings)
-        for file in task_files(paths)
-        for case in samples_of(read_case(file, shown=shown_path(file)), samples)
-        if chosen is None or chosen(case)
-    ]
+    chosen = chosen_by(keyword) if keyword else lambda _: True
     failed = known(settings.folder) if last_failed else frozenset()
-    again = tuple(job for job in found if job.case.id in failed)
-    return again or tuple(found)
+    found: list[Job] = []
+    again: list[Job] = []
+    for file in task_files(paths):
+        case = read_case(file, shown=shown_path(file))
+        cases = samples_of(case, samples)
+        found += (Job(one, file, settings) for one in cases)
+        again += (Job(one, file, settings) for one in failed_of(case, failed) if samples is None or one in cases)
+    matching = [[job for job in jobs if chosen(job.case)] for jobs in (again, found)]
+    return tuple(matching[0] or matching[1]), len(found)
+
+
+def _notes(jobs: Sequence[Job], among: int, keyword: str) -> Iterator[str]:
+    """What a user would miss."""
+    from manipcli.batch.baseline import baseline_path
+
+    if keyword and among and not jobs:
+        yield f"-k '{keyword}' matches none of {number_of(among, 'test')}"
+    uncompared = sum(not job.nominal and baseline_path(job.path).exists() for job in jobs)
+    if uncompared:
+        why = "it is that of the task as it is written, without --set, --seed and --samples"
+        yield f"{number_of(uncompared, 'test')} not compared with the baseline: {why}"
 
 
 def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Suite:
@@ -125,6 +144,7 @@ def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Su
     began = time.monotonic()
     reports: list[CaseReport] = []
     stopped: Literal["", "interrupted", "first failure"] = ""
+    notes: tuple[str, ...] = ()
     running = run_jobs(jobs, at_once=at_once, onlooker=lines.running)
     try:
         for done in running:
@@ -135,6 +155,7 @@ def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Su
                 break
     except KeyboardInterrupt:
         stopped = "interrupted"
+        notes = tuple(f"interrupted: {one.job.case.id}: {one.doing}" for one in lines.now)
     finally:
         running.close()
     if reports:
@@ -144,7 +165,7 @@ def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Su
             console.talk(f"what failed is not remembered: {error}")
     order = {job.case.id: k for k, job in enumerate(jobs)}
     reports.sort(key=lambda one: order[one.case.id])
-    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped)
+    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped, notes)
 
 
 class _Lines:
@@ -157,8 +178,10 @@ class _Lines:
         self._width = id_width([job.case for job in jobs])
         self._text, self._quiet = text, quiet
         self._live = console.is_live() and not quiet
+        self.now: Sequence[Process] = ()
 
     def running(self, processes: Sequence[Process]) -> None:
+        self.now = processes
         if self._live:
             told = "   ".join(f"{one.job.case.name}: {one.doing}" for one in processes)
             console.redraw(f"[{self._done}/{self._total}] {told}")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manipcli.report.suite import CaseReport
+from manipcli.report.suite_text import once_a_file
 
 
 def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None = None) -> str:
@@ -24,7 +25,7 @@ def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None 
             message=trouble.message,
             workspace=workspace,
         )
-        for report in reports
+        for report in once_a_file(reports)
         if not report.passed
         for trouble in report.troubles
     )

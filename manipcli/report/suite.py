@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from manipcli.core.errors import ExitCode, Finding, Place
+from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome
 from manipcli.report.run_report import RunReport
 
@@ -64,7 +65,8 @@ class CaseReport:
         run: None where there is no verdict.
         findings: why nothing was run.
         troubles: what went wrong, the first cause first.
-        duration: wall time [s].
+        warnings: what was doubted before the run began.
+        duration: wall time [s], without what it took to draw and write about the run.
         log, picture, page, output: files that were kept; `output` is what a process said that did not come to its end.
         command: what does the same again.
         junit: the run as `manipcli run --junit` tells it, where that was asked for.
@@ -79,6 +81,7 @@ class CaseReport:
     run: RunReport | None = None
     findings: tuple[Finding, ...] = ()
     troubles: tuple[Trouble, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     log: str | None = None
     picture: str | None = None
     page: str | None = None
@@ -89,6 +92,11 @@ class CaseReport:
     @property
     def passed(self) -> bool:
         return self.outcome == "passed"
+
+    @property
+    def drawn(self) -> Drawn | None:
+        """Of a sample, its values."""
+        return self.run.verdict.drawn if self.run is not None else None
 
     @property
     def tightest(self) -> ExpectationOutcome | None:
@@ -103,13 +111,14 @@ class CaseReport:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """All of it. `total`: how many there were to run; `stopped`: why some were not."""
+    """All of it. `total`: how many there were to run; `stopped`: why some were not; `notes`: what else to know."""
 
     reports: tuple[CaseReport, ...]
     total: int
     jobs: int
     duration: float
     stopped: Literal["", "interrupted", "first failure"] = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def exit_code(self) -> ExitCode:

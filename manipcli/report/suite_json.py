@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from manipcli.core.errors import Place
-from manipcli.report.json import Json, dumps, number, render_run
+from manipcli.report.json import Json, dumps, finding_object, number, render_run
 from manipcli.report.suite import CaseReport, Suite
 
 
@@ -21,6 +21,7 @@ def render_suite(suite: Suite) -> str:
             "passed": sum(report.passed for report in suite.reports),
             "jobs": suite.jobs,
             "wall_time": number(suite.duration),
+            "notes": list(suite.notes),
             "cases": [_case(report) for report in suite.reports],
         }
     )
@@ -41,6 +42,7 @@ def _case(report: CaseReport) -> Json:
         if tightest is None
         else {"name": tightest.name, "margin": number(tightest.margin), "unit": tightest.unit},
         "troubles": [{"message": one.message, "at": number(one.at), **_place(one.place)} for one in report.troubles],
+        "warnings": [finding_object(one) for one in report.warnings],
         "run": json.loads(render_run(report.run)) if report.run is not None else None,
         "log": report.log,
         "picture": report.picture,

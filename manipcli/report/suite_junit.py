@@ -1,4 +1,8 @@
-"""Many runs as one JUnit file: the suites that each run has by itself, and one for each that has no verdict."""
+"""Many runs as one JUnit file: the suites that each run has by itself, and one for each that has no verdict.
+
+Times are those on the wall, and stand with the case `run` of each: the simulated time of a step is no time that a test
+took.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,14 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostr
 
 from manipcli.core.text import escape
 from manipcli.report.suite import CaseReport, Suite
+from manipcli.report.suite_text import beforehand
 
 COUNTED = ("tests", "failures", "errors", "skipped")
 _NO_XML = re.compile("[\ufffe\uffff]")
 
 
 def render_junit(suite: Suite) -> bytes:
-    """The file; counts and times of its root are the sums over the suites."""
+    """The file; counts of its root are the sums over the suites."""
     root = Element("testsuites", {"name": "manipcli"})
     for report in suite.reports:
         found = fromstring(report.junit).findall("testsuite") if report.junit else [_without_verdict(report)]
@@ -21,18 +26,40 @@ def render_junit(suite: Suite) -> bytes:
             one.set("name", _safe(report.case.id))
             if report.outcome == "failed" and report.run is not None and report.run.verdict.verdict == "passed":
                 _add_baseline(one, report)
+            _add_properties(one, report)
+            one.set("time", f"{report.duration:.3f}")
             for case in one.iter("testcase"):
+                case.set("time", one.get("time", "") if case.get("classname", "").endswith(".run") else "0.000")
                 if report.case.sample is not None:
                     case.set("classname", f"{case.get('classname', '')}.sample_{report.case.sample}")
+                for told in (*case.iter("failure"), *case.iter("error")):
+                    told.text = "\n".join([told.text or "", *map(_safe, beforehand(report))])
             if not report.passed:
                 SubElement(one, "system-out").text = _safe(f"again: {report.command}")
             root.append(one)
     for count in COUNTED:
         root.set(count, str(sum(int(one.get(count, "0")) for one in root)))
-    root.set("time", f"{sum(float(one.get('time', '0')) for one in root):.3f}")
+    root.set("time", f"{suite.duration:.3f}")
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
+
+
+def _add_properties(suite: Element, report: CaseReport) -> None:
+    """What only is known when a run is over: whether its log was kept; and the values that were drawn for it."""
+    told = {"log": report.log} if report.log is not None else {}
+    if report.run is not None:
+        told["simulated_time"] = f"{report.run.verdict.simulated_time:.3f}"
+    if report.drawn is not None:
+        told["sample"] = str(report.drawn)
+    if not told:
+        return
+    properties = suite.find("properties")
+    if properties is None:
+        properties = Element("properties")
+        suite.insert(0, properties)
+    for name, value in told.items():
+        SubElement(properties, "property", {"name": name, "value": _safe(value)})
 
 
 def _add_baseline(suite: Element, report: CaseReport) -> None:

@@ -11,7 +11,7 @@ from manipcli.replay.player import POLICY
 from manipcli.report.html_parts import mark, table
 from manipcli.report.markup import Markup, element, joined
 from manipcli.report.suite import CaseReport, Suite
-from manipcli.report.suite_text import gist, render_summary
+from manipcli.report.suite_text import beforehand, gist, render_summary
 
 COLUMNS = ("verdict", "task", "sample", "margin or cause", "took")
 
@@ -52,7 +52,10 @@ def render_page(suite: Suite, folder: Path) -> str:
                 element("p", render_summary(suite), class_="says"),
             ),
             element(
-                "main", element("section", table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",)))
+                "main",
+                element(
+                    "section", table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",), stacks=True)
+                ),
             ),
         ),
         lang="en",
@@ -64,11 +67,11 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     name: str = report.case.file
     if report.page is not None:
         name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
-    again = None if report.passed else element("div", element("code", report.command))
+    more = [] if report.passed else [*beforehand(report), element("code", report.command)]
     return (
         mark(report.passed, report.outcome),
         joined(name, element("div", report.case.task)) if report.case.task else name,
         "" if report.case.sample is None else str(report.case.sample),
-        joined(gist(report), again),
+        element("div", gist(report), *(element("div", line) for line in more), class_="whole"),
         f"{report.duration:.1f} s",
     )

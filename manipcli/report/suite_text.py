@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from manipcli.core.errors import Finding
 from manipcli.core.text import shorten
 from manipcli.report.quantity import quantity
 from manipcli.report.suite import Case, CaseReport, Suite
-from manipcli.report.text import FAIL, PASS
+from manipcli.report.text import FAIL, PASS, describe
 
 LONGEST = 60
 """Characters of an id that the other columns make room for."""
@@ -44,21 +45,29 @@ def gist(report: CaseReport) -> str:
     return cause
 
 
-def render_failure(report: CaseReport) -> str:
-    """A case that did not pass: its id, and what is wrong with it."""
-    return "\n".join([f"{FAIL} {report.case.id} {report.outcome}", *(f"  {line}" for line in failure_lines(report))])
+def render_case(report: CaseReport) -> str:
+    """What came of a case: its id, what is wrong with it, and where to look."""
+    mark = PASS if report.passed else FAIL
+    return "\n".join([f"{mark} {report.case.id} {report.outcome}", *(f"  {line}" for line in case_lines(report))])
 
 
-def failure_lines(report: CaseReport) -> list[str]:
+def case_lines(report: CaseReport) -> list[str]:
     """All that is wrong with a case, what is not, where to look, and how to see it again."""
     lines = []
     for trouble in report.troubles:
         where = f"{trouble.place}: " if trouble.place is not None else ""
         lines.append(f"{where}{trouble.message}")
+    lines += beforehand(report)
     lines += judged_lines(report)
     kept = (("log", report.log), ("picture", report.picture), ("report", report.page), ("output", report.output))
     lines += [f"{name}: {path}" for name, path in kept if path is not None]
     return [*lines, *report.notes, f"again: {report.command}"]
+
+
+def beforehand(report: CaseReport) -> list[str]:
+    """What was known before anything moved: the values that were drawn, and the warnings."""
+    warned = [line for one in report.warnings for line in describe(one).split("\n")]
+    return [str(report.drawn), *warned] if report.drawn is not None else warned
 
 
 def judged_lines(report: CaseReport) -> list[str]:
@@ -86,6 +95,18 @@ def render_summary(suite: Suite) -> str:
 
 
 def render_suite(suite: Suite) -> str:
-    """What is left to say when all lines are out."""
-    failures = [render_failure(report) for report in suite.reports if not report.passed]
-    return "\n\n".join([*failures, render_summary(suite)])
+    """What is left to say when all lines are out. What is wrong with a file is told once, and not for each sample."""
+    failures = [render_case(one) for one in once_a_file(suite.reports) if not one.passed]
+    return "\n\n".join([*failures, "\n".join([*suite.notes, render_summary(suite)])])
+
+
+def once_a_file(reports: Sequence[CaseReport]) -> list[CaseReport]:
+    """Of samples that cannot be run for the same reasons only the first."""
+    seen: set[tuple[str, tuple[Finding, ...]]] = set()
+    kept = []
+    for one in reports:
+        why = (one.case.file, one.findings)
+        if one.outcome != "invalid" or why not in seen:
+            kept.append(one)
+        seen.add(why)
+    return kept

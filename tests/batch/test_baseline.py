@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -156,13 +157,28 @@ def test_bless_then_test_passes_until_something_is_worse(
 
     old["steps"]["move_1"] /= 2.0
     baseline_path(task).write_text(json.dumps(old))
-    assert main(["test", "--junit", "j.xml"]) == 1
+    assert main(["test", "--junit", "j.xml", "--report", "pages"]) == 1
     out = capsys.readouterr().out
     assert "nod.yaml:6:5: worse than the baseline: step 'move_1' takes" in out
     assert "(100 % longer)" in out
     (failure,) = ET.parse(tmp_path / "j.xml").getroot().iter("failure")
     assert "step 'move_1' takes" in str(failure.get("message"))
+    page, index = (html.unescape((tmp_path / "pages" / f"{name}.html").read_text()) for name in ("nod", "index"))
+    assert "<title>✗ nod failed</title>" in page
+    assert "Why it failed" in page
+    assert all("worse than the baseline: step 'move_1' takes" in one for one in (page, index))
+    assert all(f"its baseline is {old['steps']['move_1']:.2f} s" in one for one in (page, index))
     assert main(["test", "--set", "simulation.seed=1"]) == 0  # not the task as it is written
+    assert "1 test not compared with the baseline: " in capsys.readouterr().out
+
+    baseline_path(task).write_text("{")
+    assert main(["test", "--junit", "j.xml", "--report", "pages"]) == 1
+    assert "nod.baseline.json: error[USE087]: this is no baseline" in capsys.readouterr().out
+    assert "this is no baseline" in (tmp_path / "pages" / "nod.html").read_text()
+    assert {one.get("name") for one in ET.parse(tmp_path / "j.xml").getroot().iter("testcase")} == {
+        "run", "move_1", "duration", "baseline",
+    }  # fmt: skip
+    baseline_path(task).write_text(json.dumps(old))
 
     task.write_text(TASK + "baseline: {tolerance: {duration: 150 %}}\n")
     assert main(["test"]) == 0

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from manipcli.batch.child import _Beats
 from manipcli.batch.job import End, Job, Settings, limit
-from manipcli.batch.pool import run_jobs
+from manipcli.batch.pool import remove_empty, run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
@@ -158,6 +158,26 @@ def test_signs_of_life_are_no_silence_but_do_not_stop_the_clock(tmp_path: Path) 
 
 
 @pytest.mark.slow
+def test_what_is_made_of_a_run_that_is_over_is_not_its_time(tmp_path: Path) -> None:
+    code = f"parent.send(Beat('judged', judged=True)); time.sleep(2.5); {END}"
+    (job,) = jobs(tmp_path, code, timeout=2.0)
+    (report,) = run([replace(job, settings=replace(job.settings, silence=2.0))])
+    assert report.outcome == "invalid"
+    assert report.duration < 2.0
+
+
+def test_warnings_arrive_with_the_end(tmp_path: Path) -> None:
+    doubt = Finding("CTRL153", "weak", Place("c.yaml", 1, 2), severity="warning")
+    end = pickle.dumps(End(None, warnings=(doubt,)))
+    (report,) = run(jobs(tmp_path, f"import pickle; parent.send(pickle.loads({end!r}))"))
+    assert report.warnings == (doubt,)
+    _, childs = Pipe()
+    beats = _Beats(childs)
+    beats.warned([doubt])
+    assert beats.warnings == (doubt,)
+
+
+@pytest.mark.slow
 def test_a_process_that_takes_no_signal_is_ended_too(tmp_path: Path) -> None:
     (job,) = jobs(tmp_path, "os.kill(os.getpid(), signal.SIGSTOP)")
     (report,) = run([replace(job, settings=replace(job.settings, silence=1.0))])
@@ -258,6 +278,17 @@ def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path
     (job,) = jobs(tmp_path, "sys.exit(3)")
     (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "runs"))])
     assert (report.log, report.picture, report.page) == (None, None, None)
+
+
+def test_folders_that_hold_nothing_are_removed(tmp_path: Path) -> None:
+    (tmp_path / "runs" / "test" / "a" / "b").mkdir(parents=True)
+    (tmp_path / "runs" / "test" / "c").mkdir()
+    (tmp_path / "runs" / "test" / "c" / "x.mcap").touch()
+    remove_empty(tmp_path / "runs" / "test")
+    assert {path.name for path in tmp_path.rglob("*")} == {"runs", "test", "c", "x.mcap"}
+    (tmp_path / "runs" / "test" / "c" / "x.mcap").unlink()
+    remove_empty(tmp_path / "runs" / "test")
+    assert {path.name for path in tmp_path.rglob("*")} == {"runs"}
 
 
 def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:

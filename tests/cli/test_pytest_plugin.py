@@ -48,10 +48,12 @@ def project(pytester: pytest.Pytester) -> pytest.Pytester:
     files = {
         "tasks/good.yaml": TASK.format(name="good", tags="slow, nightly", below="10 s"),
         "tasks/late.yaml": TASK.format(name="late", tags="", below="0.1 s"),
-        "tasks/broken.yaml": "task: broken\nsteps: [\n",
+        "tasks/broken.yaml": "task: broken\nrobot: r.yaml\nsteps: [\n",
         "tasks/robot.yaml": "robot: r\ndescription: r.urdf\n",
-        "tasks/.hidden.yaml": "task: hidden\n",
-        "runs/old.yaml": "task: old\n",
+        "tasks/.hidden.yaml": "task: hidden\nrobot: r.yaml\n",
+        "runs/old.yaml": "task: old\nrobot: r.yaml\n",
+        "hello.yaml": "task: hello\n",
+        "null.yaml": "task: ~\nrobot: r.yaml\n",
         "ci.yaml": "on: push\n",
     }
     for name, text in files.items():
@@ -72,6 +74,7 @@ def test_task_files_and_no_others_are_tests(project: pytest.Pytester) -> None:
     assert collected(project, "tasks") == everything
     assert collected(project, "tasks/good.yaml::good") == ["tasks/good.yaml::good"]
     assert collected(project, "runs") == ["runs/old.yaml::old"]  # it was named
+    assert collected(project, "hello.yaml", "null.yaml") == ["hello.yaml::hello", "null.yaml::null"]
 
 
 def test_the_files_are_those_of_the_command(project: pytest.Pytester) -> None:
@@ -105,7 +108,7 @@ def test_the_plugin_loads_nothing_but_itself() -> None:
     script = f"import sys, {PLUGIN}; print(*(name for name in sys.modules if name.startswith('manipcli')))"
     environment = {"PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment)
-    assert set(done.stdout.split()) == {"manipcli", "manipcli.cli", PLUGIN}
+    assert set(done.stdout.split()) == {"manipcli", "manipcli.core", "manipcli.core.lazy", "manipcli.cli", PLUGIN}
 
 
 def test_foreign_yaml_loads_nothing_but_the_first_look(pytester: pytest.Pytester) -> None:
@@ -115,7 +118,8 @@ def test_foreign_yaml_loads_nothing_but_the_first_look(pytester: pytest.Pytester
     )
     result = pytester.runpytest_subprocess(*LOADED, *ALONE, "-s")
     result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines([f"*loaded manipcli manipcli.batch manipcli.batch.first_look manipcli.cli {PLUGIN}"])
+    loaded = f"manipcli manipcli.batch manipcli.batch.first_look manipcli.cli {PLUGIN} manipcli.core manipcli.core.lazy"
+    result.stdout.fnmatch_lines([f"*loaded {loaded}"])
 
 
 @pytest.mark.slow
@@ -127,7 +131,7 @@ def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pyte
     assert "tasks/late.yaml:9:5: duration: fails by" in told
     assert "✓ tracking: 2.9 deg to spare" in told
     assert "again: manipcli run tasks/late.yaml" in told
-    assert "tasks/broken.yaml:3:1: error[YAML100]" in told
+    assert "tasks/broken.yaml:4:1: error[YAML100]" in told
     assert "Traceback" not in told
     assert "pytest_plugin.py" not in told
     assert (project.path / "runs" / "test" / "tasks" / "late.mcap").is_file()
@@ -156,14 +160,21 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
         def test_failure_is_no_exception(run_task):
             assert run_task("tasks/late.yaml").verdict.verdict == "failed"
 
+        def test_failure_shows_what_went_wrong(run_task):
+            run = run_task("tasks/late.yaml")
+            assert repr(run).startswith("<failed late '")
+            assert run.passed, run.text
+
         def test_refusal_is_one(run_task):
-            with pytest.raises(manipcli.InvalidInput, match="broken.yaml:3:1"):
+            with pytest.raises(manipcli.InvalidInput, match="broken.yaml:4:1"):
                 run_task("tasks/broken.yaml")
         """
     )
-    project.runpytest_subprocess(*LOADED, "test_a_python_test_runs_a_task_and_looks_at_its_report.py").assert_outcomes(
-        passed=3
-    )
+    result = project.runpytest_subprocess(*LOADED, "test_a_python_test_runs_a_task_and_looks_at_its_report.py")
+    result.assert_outcomes(passed=3, failed=1)
+    told = result.stdout.str()
+    for line in ("tasks/late.yaml:9:5: duration: fails by", "✓ tracking: 2.9 deg to spare", "log: /", "picture: /"):
+        assert line in told
 
 
 @pytest.mark.slow

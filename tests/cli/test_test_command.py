@@ -48,6 +48,7 @@ def test_nothing_to_run_is_5(folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert capsys.readouterr().out == "✗ nothing to run in 0.0 s, 1 process\n"
     write(folder, "a")
     assert main(["test", "-k", "nothing_like_it"]) == 5
+    assert capsys.readouterr().out.startswith("-k 'nothing_like_it' matches none of 1 test\n✗ nothing to run in ")
 
 
 @pytest.mark.parametrize(
@@ -77,15 +78,15 @@ def test_only_earlier_results_are_replaced_by_results(
 ) -> None:
     (folder / "robots").mkdir()
     write(folder, "a")
-    (folder / name).write_text("task: a\nsteps: [\n")
+    (folder / name).write_text("task: a\nrobot: r.yaml\nsteps: [\n")
     assert main(["test", ".", "--junit", name]) == 4
     assert f"error[USE089]: --junit '{name}': there is a file that is no JUnit XML" in capsys.readouterr().err
-    assert (folder / name).read_text() == "task: a\nsteps: [\n"
+    assert (folder / name).read_text() == "task: a\nrobot: r.yaml\nsteps: [\n"
 
 
 def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
     (folder / "out.xml").touch()
-    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
     for _ in range(2):
         assert main(["test", "--junit", "out.xml"]) == 4
         assert parse(folder / "out.xml").getroot().get("errors") == "1"
@@ -95,7 +96,7 @@ def test_a_folder_that_cannot_be_written_to_takes_nothing_from_the_answer(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (folder / "runs").touch()
-    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
     write(folder, "a")
     assert main(["test", "-n", "1"]) == 4
     told = capsys.readouterr()
@@ -112,12 +113,37 @@ def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, monkeypatch: pyte
     assert (given[0].settings.silence, given[0].settings.timeout) == (math.inf, math.inf)
 
 
+@pytest.mark.parametrize(
+    ("words", "ids"),
+    [
+        (["--lf"], ["v.yaml::v[1]", "v.yaml::v[11]"]),
+        (["--lf", "--samples", "4"], ["v.yaml::v[1]"]),
+        (["--lf", "-k", "a.yaml"], ["a.yaml::a"]),  # of these none failed
+        ([], ["a.yaml::a", "v.yaml::v"]),
+    ],
+)
+def test_samples_that_failed_last_are_run_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], ids: list[str]
+) -> None:
+    write(folder, "a")
+    write(folder, "v")
+    with (folder / "v.yaml").open("a") as file:
+        file.write("vary: {simulation.settle: {uniform: [0.1 s, 0.2 s]}}\n")
+    (folder / "runs" / "test").mkdir(parents=True)
+    failed = ["v.yaml::v[1]", "v.yaml::v[11]", "a.yaml::a[3]", "v.yaml::v[x]", "gone.yaml::gone"]
+    (folder / "runs" / "test" / "last_failed.json").write_text(json.dumps(failed))
+    given: list[Job] = []
+    monkeypatch.setattr("manipcli.batch.pool.run_jobs", lambda jobs, **_: (one for one in given.extend(jobs) or ()))
+    main(["test", *words])
+    assert [job.case.id for job in given] == ids
+
+
 def test_a_broken_task_is_told_with_its_place(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "b.yaml").write_text("task: b\nsteps: [\n")
+    (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
     assert main(["test", "--github"]) == 4
     out = capsys.readouterr().out
-    assert "b.yaml:3:1: error[YAML100]" in out
-    assert "::error file=b.yaml,line=3,col=1,title=b invalid::" in out
+    assert "b.yaml:4:1: error[YAML100]" in out
+    assert "::error file=b.yaml,line=4,col=1,title=b invalid::" in out
     assert main(["test", "--format", "json"]) == 4
     told = capsys.readouterr()
     assert json.loads(told.out)["cases"][0]["outcome"] == "invalid"
@@ -253,6 +279,7 @@ def test_an_interruption_ends_the_runs_and_still_sums_up(folder: Path, number: s
     code, out = started.end()
     assert code == 2
     assert re.search(r"✗ 1 not run in \d+\.\d s, 1 process; interrupted", out)
+    assert "interrupted: a.yaml::a: step 1 of 1, 'wait_1' at " in out
     assert not Path(f"/proc/{child}").exists()
     assert not list((folder / "runs").rglob("a.*"))
 

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from manipcli.core.errors import Finding, Place
+from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report import suite_json
 from manipcli.report.github import render_annotations
@@ -20,7 +21,7 @@ from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, signal_name, troubles_of
 from manipcli.report.suite_junit import render_junit
 from manipcli.report.suite_page import render_page
-from manipcli.report.suite_text import gist, render_failure, render_line, render_suite, render_summary
+from manipcli.report.suite_text import gist, render_case, render_line, render_suite, render_summary
 
 NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5)
 UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4)
@@ -73,11 +74,11 @@ def test_a_line_says_verdict_margin_and_time() -> None:
     assert gist(report("passed")) == "nothing expected"
     long = report("crashed", troubles=(Trouble("x" * 500),))
     assert len(render_line(long)) < 170
-    assert "x" * 500 in render_failure(long)
+    assert "x" * 500 in render_case(long)
 
 
 def test_a_failure_says_where_what_held_and_how_to_see_it_again() -> None:
-    lines = render_failure(FAILED).splitlines()
+    lines = render_case(FAILED).splitlines()
     assert lines[0] == "✗ tasks/pour.yaml::pour failed"
     assert lines[1].startswith("  tasks/pour.yaml:21:5: inside: fails by 3.0 mm")
     assert "  ✓ near: 15.6 mm to spare" in lines
@@ -132,14 +133,8 @@ def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest
     assert "file=project/tasks/pour.yaml," in render_annotations([FAILED], workspace=tmp_path)
 
 
+@pytest.mark.slow
 def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
-    def with_junit(one: CaseReport) -> CaseReport:
-        assert one.run is not None
-        verdict = one.run.verdict
-        written = [Written("pour.yaml:3")] * 3
-        xml = render_run_junit(verdict, written[:1], written[: len(verdict.expectations)], file=one.case.file)
-        return replace(one, junit=xml)
-
     sampled = replace(PASSED, case=replace(PASSED.case, sample=7))
     root = fromstring(render_junit(Suite((with_junit(sampled), with_junit(FAILED), CRASHED), 3, 1, 1.0)))
     suites = root.findall("testsuite")
@@ -156,6 +151,66 @@ def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
     assert error is not None
     assert (error.get("type"), error.get("message")) == ("crashed", "crashed by signal 11 (SIGSEGV)")
     assert "again: manipcli run tasks/pour.yaml" in [one.text for one in suites[2].findall("system-out")]
+
+
+def with_junit(one: CaseReport) -> CaseReport:
+    assert one.run is not None
+    verdict = one.run.verdict
+    written = [Written("pour.yaml:3")] * 3
+    xml = render_run_junit(verdict, written[:1], written[: len(verdict.expectations)], file=one.case.file)
+    return replace(one, junit=xml)
+
+
+def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -> None:
+    weak = Finding("CTRL153", "joint_4: kp 5", Place("weak.yaml", 12, 16), hint="kd 3 gives 0.7", severity="warning")
+    assert FAILED.run is not None
+    drawn = replace(FAILED.run, verdict=replace(FAILED.run.verdict, drawn=Drawn(3, (("scene.cup.mass", 0.25),))))
+    odd = with_junit(replace(FAILED, run=drawn, warnings=(weak,)))
+    told = [
+        "sample 3: scene.cup.mass=0.25",
+        "weak.yaml:12:16: warning[CTRL153]: joint_4: kp 5",
+        "  hint: kd 3 gives 0.7",
+    ]
+    lines = render_case(odd).splitlines()
+    assert [line.removeprefix("  ") for line in lines[3:6]] == told
+    (failure,) = fromstring(render_junit(Suite((odd,), 1, 1, 1.0))).iter("failure")
+    assert str(failure.text).splitlines()[-3:] == told
+    assert all(line in render_page(Suite((odd,), 1, 1, 1.0), Path()) for line in told)
+    (case,) = json.loads(suite_json.render_suite(Suite((odd,), 1, 1, 1.0)))["cases"]
+    assert [(one["code"], one["hint"]) for one in case["warnings"]] == [("CTRL153", "kd 3 gives 0.7")]
+
+
+def test_junit_has_times_of_the_wall_and_names_a_log_that_was_kept() -> None:
+    hung = report("hung", text="hung: it took longer than 4 s", log="runs/test/tasks/pour.mcap.partial")
+    root = fromstring(render_junit(Suite((with_junit(PASSED), with_junit(FAILED), hung), 3, 1, 9.0)))
+    for suite in root:
+        times = [float(case.get("time", "")) for case in suite.iter("testcase")]
+        assert sum(times) == times[0] == float(suite.get("time", "")) == 3.5
+    logs = [one.findtext("properties/property[@name='log']") is not None for one in root]
+    values = [[one.get("value") for one in suite.findall(".//property[@name='log']")] for suite in root]
+    assert (logs, values) == (
+        [False, True, True], [[], ["runs/test/tasks/pour.mcap"], ["runs/test/tasks/pour.mcap.partial"]],
+    )  # fmt: skip
+
+
+def test_what_is_wrong_with_a_file_is_told_once_for_all_samples() -> None:
+    wrong = (Finding("TASK201", "unknown key", Place("tasks/pour.yaml", 3, 4)),)
+    own = (Finding("SCN101", "too heavy (sample 2)", Place("tasks/pour.yaml", 3, 4)),)
+    invalid = tuple(
+        report("invalid", sample=k, findings=why, troubles=troubles_of(why))
+        for k, why in enumerate([wrong, wrong, own])
+    )
+    suite = Suite(invalid, 3, 1, 1.0)
+    assert [line for line in render_suite(suite).splitlines() if line.startswith("✗")] == [
+        "✗ tasks/pour.yaml::pour[0] invalid", "✗ tasks/pour.yaml::pour[2] invalid", "✗ 3 invalid in 1.0 s, 1 process",
+    ]  # fmt: skip
+    assert len(render_annotations(invalid).splitlines()) == 2
+
+
+def test_what_else_there_is_to_know_stands_above_the_summary() -> None:
+    suite = Suite((PASSED,), 1, 1, 1.0, notes=("not compared",))
+    assert render_suite(suite).splitlines() == ["not compared", "✓ 1 passed in 1.0 s, 1 process"]
+    assert json.loads(suite_json.render_suite(suite))["notes"] == ["not compared"]
 
 
 def test_json_tells_of_each_case_what_a_run_tells() -> None:
@@ -175,6 +230,7 @@ def test_the_page_leads_to_the_others_and_escapes_what_it_shows(tmp_path: Path) 
     assert "a&lt;b&gt;.yaml" in page
     assert "x&amp;y" in page
     assert page.index("a&lt;b") < page.index("tasks/pour.yaml")  # what failed comes first
+    assert 'class="scroll stacks"' in page  # no column is cut off where it is narrow
     assert not re.findall(r'(?:src|href)="(?!data:|sub/|#)', page)
 
 
