@@ -2,7 +2,7 @@
 
 The rules are those of ros2_control's `joint_limits` for hard limits and of ROS 1's `joint_limits_interface` for soft
 ones. All arguments broadcast; infinite (or, for `k_position` and `k_velocity`, 0) means that there is no such limit. A
-command that is NaN stays NaN.
+command that is NaN stays NaN. Limits are such as `refuse_limits` lets pass; it is asked once, not at every tick.
 
 A soft limit bounds the velocity v near it, before the hard one is met:
 
@@ -67,9 +67,8 @@ def limit_position(
 
     Raises:
         InvalidArgument: a measured position is more than `OUT_OF_BOUNDS` beyond its limits; neither `previous` nor
-            `position`, or no `dt`, is given while a limit needs it; a dt that is not above 0; see `refuse_limits`.
+            `position`, or no `dt`, is given while a limit needs it; a dt that is not above 0.
     """
-    refuse_limits(lower, upper, velocity=velocity, acceleration=acceleration, k_position=k_position)
     low, high = _floats(lower), _floats(upper)
     if position is not None:
         _refuse_out_of_bounds(_floats(position), low, high)
@@ -125,9 +124,8 @@ def limit_velocity(
         (n)
 
     Raises:
-        InvalidArgument: a dt that is not above 0, or none where it is needed; see `refuse_limits`.
+        InvalidArgument: a dt that is not above 0, or none where it is needed.
     """
-    refuse_limits(lower, upper, velocity=velocity, acceleration=acceleration, k_position=k_position)
     fastest = _floats(velocity)
     if dt is None:
         if position is not None or previous is not None:
@@ -180,7 +178,6 @@ def limit_effort(
     Returns:
         (n)
     """
-    refuse_limits(lower, upper, effort=effort, max_velocity=max_velocity, k_position=k_position, k_velocity=k_velocity)
     most = _floats(effort)
     lowest, highest = -most, most
     if velocity is not None:
@@ -222,7 +219,6 @@ def limit_acceleration(
     Returns:
         (n)
     """
-    refuse_limits(acceleration=acceleration, deceleration=deceleration)
     wanted, most = _floats(command), _floats(acceleration)
     if deceleration is not None and velocity is not None:
         most = np.where(wanted * _floats(velocity) < 0.0, _floats(deceleration), most)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.control import limit_acceleration, limit_effort, limit_position, limit_velocity
+from manipcli.control import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
 from manipcli.core.errors import InvalidArgument
 
 PI = math.pi
@@ -64,33 +64,18 @@ def test_time_is_asked_for_only_where_something_changes_with_it():
 
 
 @pytest.mark.parametrize("wrong", [-1.0, math.nan, [1.0, -0.5], [math.nan, 1.0]])
-def test_a_limit_below_nothing_is_refused(wrong):
-    for limited in (
-        lambda: limit_position([0.0, 0.0], velocity=wrong, previous=0.0, dt=1.0),
-        lambda: limit_position([0.0, 0.0], acceleration=wrong, previous=0.0, dt=1.0),
-        lambda: limit_position([0.0, 0.0], k_position=wrong, previous=0.0, dt=1.0),
-        lambda: limit_velocity([0.0, 0.0], velocity=wrong),
-        lambda: limit_velocity([0.0, 0.0], acceleration=wrong, previous=0.0, dt=1.0),
-        lambda: limit_effort([0.0, 0.0], effort=wrong),
-        lambda: limit_effort([0.0, 0.0], max_velocity=wrong, velocity=0.0),
-        lambda: limit_effort([0.0, 0.0], k_velocity=wrong, velocity=0.0),
-        lambda: limit_acceleration([0.0, 0.0], acceleration=wrong),
-        lambda: limit_acceleration([0.0, 0.0], deceleration=wrong, velocity=1.0),
-    ):
-        with pytest.raises(InvalidArgument, match="expected 0 or more"):
-            limited()
+@pytest.mark.parametrize("name", ["velocity", "acceleration", "deceleration", "effort", "k_position", "k_velocity"])
+def test_a_limit_below_nothing_is_refused(name, wrong):
+    with pytest.raises(InvalidArgument, match=f"the limit `{name}` is .*; expected 0 or more"):
+        refuse_limits(**{name: wrong})
+    refuse_limits(**{name: [0.0, math.inf]})
 
 
 @pytest.mark.parametrize("ends", [(1.0, -1.0), (math.nan, 1.0), (0.0, math.nan), ([0.0, 1.0], [1.0, 0.5])])
 def test_a_lower_limit_above_the_upper_one_is_refused(ends):
-    lower, upper = ends
-    for limited in (
-        lambda: limit_position([0.0, 0.0], lower=lower, upper=upper),
-        lambda: limit_velocity([0.0, 0.0], lower=lower, upper=upper, position=0.0, dt=1.0),
-        lambda: limit_effort([0.0, 0.0], lower=lower, upper=upper, position=0.0, velocity=0.0),
-    ):
-        with pytest.raises(InvalidArgument, match="expected no lower one above its upper one"):
-            limited()
+    with pytest.raises(InvalidArgument, match="expected no lower one above its upper one"):
+        refuse_limits(*ends)
+    refuse_limits([0.0, -math.inf], [0.0, math.inf])
 
 
 def test_soft_limits_of_positions():
