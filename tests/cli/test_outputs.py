@@ -33,7 +33,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ["tune", "a.png", "c.yaml", "--force", "--write"],
         ["judge", "a.png", "--report"],
         ["run", "a.png", "--junit"],
-        ["test", "a.png", "--junit"],
         ["replay", "x.mcap", "--html", "a.png", "--sheet"],
     ],
 )
