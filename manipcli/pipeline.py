@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
@@ -25,7 +25,6 @@ from manipcli.flow.sample import load_task
 from manipcli.flow.verify import compared, refused_as_unlike
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.record.reading import open_recording
-from manipcli.record.recorder import Recorder
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
 
@@ -163,26 +162,20 @@ def _recorded(
     """Simulate into a log that is judged before it gets its name; the verdict, when the simulation was over, and how
     long it was held up by planning."""
     manager = controllers(task, plan.planner.kinematics)
+    replanning = Stopwatch()
     recorder = open_log(task, plan, manager, where, overwrite=overwrite, embed_meshes=embed_meshes)
     try:
-        status, cause, planning = _carried_out(task, plan, manager, recorder, progress)
+        status, cause = "complete", ""
+        try:
+            simulate(task, plan, manager, recorder, progress, replanning)
+        except SimulationFailed as failure:
+            status, cause = "failed", str(failure)
+        except KeyboardInterrupt:
+            status, cause = "interrupted", "interrupted by the user"
         recorder.metadata("run", {"status": status, "cause": cause})
         simulated = time.perf_counter()
         verdict = judge_log(recorder.partial_path, being_written=True, doing=_told(progress))
         recorder.finish(verdict_metadata(verdict))
     finally:
         recorder.close_partial()
-    return verdict, simulated, planning
-
-
-def _carried_out(
-    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
-) -> tuple[str, str, float]:
-    """Simulate; how the run ended, why where it did not go to its end, and how long [s] steps were planned again."""
-    try:
-        planning = simulate(task, plan, manager, recorder, progress)
-    except SimulationFailed as failure:
-        return "failed", str(failure), 0.0
-    except KeyboardInterrupt:
-        return "interrupted", "interrupted by the user", 0.0
-    return "complete", "", planning
+    return verdict, simulated, replanning.seconds

@@ -49,14 +49,19 @@ class Files:
 
 
 def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Finding, ...]:
-    """What the fields of the files refuse of the ends and items of each law; a normal law has no ends."""
+    """What the fields of the files refuse of the ends and items of each law; a normal law has no ends.
+
+    All laws take their ends together, the shorter ones their last one again, so that fields which must fit each other
+    are not compared with values that are never drawn.
+    """
+    written = {files.task.source.key_place("vary", one.key) for one in varied}
 
     def refused(area: Area, k: int, inside: float) -> tuple[Finding, ...]:
         ends = ((one, one.ends(inside)) for one in varied if one.area == area)
         try:
-            files.changed([(one, values[k]) for one, values in ends if k < len(values)])
+            files.changed([(one, values[min(k, len(values) - 1)]) for one, values in ends if values])
         except InvalidInput as invalid:
-            return invalid.findings
+            return tuple(one for one in invalid.findings if one.severity == "error" and one.place in written)
         return ()
 
     found: list[Finding] = []

@@ -9,6 +9,7 @@ import numpy as np
 from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.live import Live
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Onlooker, Progress
@@ -42,12 +43,16 @@ def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerM
 
 
 def simulate(
-    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress | None
-) -> float:
+    task: Task,
+    plan: Plan,
+    manager: ControllerManager,
+    recorder: Recorder,
+    progress: Progress | None,
+    replanning: Stopwatch | None = None,
+) -> None:
     """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
 
-    Returns:
-        How long [s] of that went into planning steps again, of the clock on the wall.
+    `replanning` runs while steps are planned again.
 
     Raises:
         SimulationFailed: the world does not stand still before the start, or leaves the plausible.
@@ -72,7 +77,8 @@ def simulate(
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
             onlooker = Onlooker(recorder, live, progress, simulation.control_period)
             session.restart_clock(onlooker)
-            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal)
+            watch = replanning if replanning is not None else Stopwatch()
+            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal, replanning=watch)
             try:
                 run.steps()
             finally:
@@ -80,7 +86,6 @@ def simulate(
                     counts = {name: str(count) for name, count in ticks.items() if count}
                     if counts:
                         recorder.metadata(kind, counts)
-            return run.planning
     finally:
         engine.close()
 
@@ -88,7 +93,7 @@ def simulate(
 def _world(task: Task, plan: Plan, session: Session) -> World:
     """What live conditions are asked in, which is what the log will tell the judge; now is time 0."""
     return World(
-        task.true.robot,
+        task.robot,
         task.true.scene,
         start=session.engine.read().map(np.copy),
         physics=ENGINES[task.spec.simulation.engine].physics == "full",

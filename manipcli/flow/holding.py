@@ -42,4 +42,4 @@ class Holding:
         weight = body.mass * float(np.linalg.norm(self._scene.gravity))
         grasp = f"the hand took it with {readable(pressed, 'N')}, of which friction {friction:.3g}"
         shares = f"({body.friction:.3g} x {self._robot.friction:.3g} of the hand)"
-        return f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it weighs {readable(weight, 'N')}"
+        return f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it alone weighs {readable(weight, 'N')}"

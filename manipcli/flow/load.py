@@ -222,7 +222,7 @@ def named_scene(spec: TaskSpec) -> Scene:
         for name in (*(("floor",) if spec.floor else ()), *spec.scene)
     )  # fmt: skip
     frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
-    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, 0.0]))
+    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
 
 
 def load_libraries(task: Task) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time as wall_clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 
 from manipcli.control.action import GoalHandle
 from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.holding import Holding
 from manipcli.flow.live import Live
 from manipcli.flow.load import Task
@@ -57,6 +57,7 @@ class StepsRun:
         live: asks the conditions that steps wait for; is told of steps.
         progress: is told of steps, and of what was not planned.
         told: is told of every goal, see `Executor`.
+        replanning: runs while a step is planned again.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class StepsRun:
         progress: Progress | None,
         *,
         told: Callable[[str, GoalHandle], None],
+        replanning: Stopwatch,
     ) -> None:
         self._task = task
         self._live = live
@@ -85,8 +87,7 @@ class StepsRun:
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
         self._holding = Holding(task.true.robot, task.true.scene)
         self._believed = plan.start
-        self.planning = 0.0
-        """How long [s] planning again took, of the clock on the wall."""
+        self._replanning = replanning
         self._failed = False
         self._over = False
         self._at: PlannedStep | None = None
@@ -159,7 +160,8 @@ class StepsRun:
             return end
         self._executor.stop()
         self._live.step_ended(planned.id, "failed")
-        return MotionEnd("failed", f"stopped: {broken}")
+        before = f"; before that: {end.outcome}: {end.text}" if end.outcome != "done" else ""
+        return MotionEnd("failed", f"stopped: {broken}{before}")
 
     @property
     def _may_go_on(self) -> bool:
@@ -199,15 +201,13 @@ class StepsRun:
         differences = self._measured.differences(planned_start, now, step)
         anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
         if anew:
-            began = wall_clock.perf_counter()
             try:
-                planned = replace(planned, plan=plan_step(self._plan.planner, step, now))
+                with self._replanning:
+                    planned = replace(planned, plan=plan_step(self._plan.planner, step, now))
             except NotPlannable as refusal:
                 self._believed = now
                 why = f", where {'; '.join(differences)}" if differences else ""
                 return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}")
-            finally:
-                self.planning += wall_clock.perf_counter() - began
             why = "; ".join(differences) or "it is tried again"
             self._event("replanned", planned, "", why)
             self._tell(f"planned again: {why}", detail=True)
@@ -241,7 +241,7 @@ class StepsRun:
                 end = self._executor.run(motion, until=until, deadline=over)
                 if end.outcome != "done":
                     return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
-                if motion.grip is not None and planned.plan.end.carried is not None:
+                if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touched)
                 awaited = awaited and not motion.awaits
                 texts += [end.text] if end.text else []

@@ -44,7 +44,7 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
                     hint=f"add {topic} to record.topics",
                     severity="warning",
                 )
-    live = World(robot, scene, start, physics=physics, steps=steps)
+    live = World(robot, scene, start, physics=physics, referenced=frozenset(robot.joint_names), steps=steps)
     for k, step in enumerate(task.spec.steps):
         reason = None if step.until is None else absent(step.until, live, CONDITIONS)
         if reason is not None:

@@ -1,6 +1,7 @@
 """What a condition may look at: successive control ticks of one run, live or recorded, in the same form.
 
-A live run hands on its last ten ticks, a recording half a second: a condition gives the same answer either way.
+A live run hands on what was not yet seen, up to half a second, a recording half a second at a time: a condition gives
+the same answer either way.
 """
 
 from __future__ import annotations

@@ -120,11 +120,16 @@ def opposite(of: Reading, *, word: str = "not ") -> Reading:
 
 
 def never(of: Reading) -> Reading:
-    """`never`: the opposite, and what is asked is told as such: `'cup' moved by 38 mm; never at least 60 mm`."""
+    """`never`: the opposite, and what is asked is told as such: `'cup' moved by 38 mm; never at least 60 mm`.
+
+    Never not is always.
+    """
     against = opposite(of, word="")
 
     def found(k: int) -> Measured:
         one = against.found(k)
+        if one.text.startswith("not "):
+            return replace(one, text=one.text.removeprefix("not "))
         measured, between, asked = one.text.rpartition("; ")
         return replace(one, text=f"{measured}; never {asked}") if between else one
 

@@ -214,7 +214,7 @@ class Planner:
         carried = situation.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         if begins and hit.distance < 0.0 and not held:
-            hint = "put them apart; a task may begin elsewhere: `start: POSE`"
+            hint = "put them apart (a task begins elsewhere with `start: POSE`)"
             overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
             return NotPlannable(f"{overlap} already, {when}", hint=hint)
         hint = "no way around is searched for: `move` to a pose from which the way is free"

@@ -61,8 +61,8 @@ class Engine(Protocol):
         ...
 
     def touches_changed(self) -> bool:
-        """Whether the robot touches other things than when `robot_contacts` was last asked, or is knocked; cheaper than
-        to ask it."""
+        """Whether the robot touches other things than when `robot_contacts` was last asked, or some point of contact
+        carries much more than any did; cheaper than to ask it."""
         ...
 
     def robot_contacts(self) -> tuple[Contact, ...]:

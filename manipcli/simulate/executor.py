@@ -24,7 +24,7 @@ Alarm = Callable[[WorldState], str]
 """What is wrong with the state of a tick, for which everything stops at once; nothing where it may go on."""
 
 UNTIL_TICKS: Final = SLOW
-"""Control ticks between two looks at an `until`: at those whose state has the velocities of the bodies."""
+"""Control ticks between two looks at an `until`."""
 REST: Final = 0.5
 """How long [s] the robot holds still after it was stopped."""
 PATIENCE: Final = 30.0

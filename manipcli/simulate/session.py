@@ -27,7 +27,7 @@ from manipcli.simulate.engine import Engine
 
 SLOW: Final = 10
 """Control ticks between two looks at what need not be seen at every one: the velocities of bodies (at the last tick
-before a multiple of it, where an `until` asks), all contacts, the plausibility of the state."""
+before a multiple of it), all contacts, the plausibility of the state."""
 RUNAWAY_FACTOR: Final = 3.0
 """A joint this many times faster than its velocity limit has left its controller."""
 RUNAWAY_SPEED: Final = 90.0
@@ -169,8 +169,8 @@ class Session:
     def _touch(self, state: WorldState) -> None:
         """What touches, and the force on what each joint moves.
 
-        Everything at every tenth tick; what the robot touches at once when that changes and for ten ticks then, so that
-        no short touch and no knock is lost, and at every tick while a controller asks for forces.
+        Everything at every tenth tick. What the robot touches at every tick while a controller asks for forces, and
+        for ten ticks from when that changes or a point is pressed much harder than any was: no short touch is lost.
         """
         ticks = self.ticks
         slow = ticks % SLOW == 0

@@ -63,6 +63,7 @@ def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest
     assert capsys.readouterr().err == "next: manipcli test\n"
 
 
+@pytest.mark.slow
 def test_what_a_folder_has_before_it_is_a_project_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -238,6 +238,12 @@ def test_one_number_is_varied_once(write: Callable[[str], Path]) -> None:
     assert "'scene.block.at.0' is varied by 'scene.block.at' already" in told
 
 
+def test_values_that_must_fit_each_other_are_compared_as_they_are_drawn(write: Callable[[str], Path]) -> None:
+    """A step of 2 ms does not fit the control period of 1 ms in the file, but that is not drawn."""
+    steps = "simulation.step: {choice: [0.5 ms, 1 ms, 2 ms]}"
+    assert load_task(write(f"{steps}\nsimulation.control_period: {{choice: [2 ms, 4 ms]}}"), sample=3)
+
+
 def test_a_drawn_value_that_cannot_be_is_told_where_it_is_varied(write: Callable[[str], Path]) -> None:
     path = write("scene.block.mass: {offset: {normal: [-2, 0.1]}}")
     with pytest.raises(InvalidInput) as caught:

@@ -427,6 +427,8 @@ def test_a_step_is_not_done_before_its_end() -> None:
         (spec,) = expectations({"step_done": {"step": "wait_1"}, **scope})
         (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
         assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
+    (either,) = expectations({"eventually": {"step_done": {"step": "go"}}, "during": ["go", "wait_1"]})
+    assert expectation_problems(either, SETTING, CONDITIONS) == ()
     (later,) = expectations({"step_done": {"step": "go"}, "at": "wait_1"})
     assert expectation_problems(later, SETTING, CONDITIONS) == ()
 

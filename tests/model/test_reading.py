@@ -19,6 +19,7 @@ from manipcli.model.reading import (
     greatest,
     least,
     named,
+    never,
     opposite,
     reading,
 )  # fmt: skip
@@ -167,6 +168,17 @@ def test_signs_come_before_sizes_where_units_differ() -> None:
     extreme = Extreme("least")
     extreme.add(both, TIMES[:2])
     assert extreme.found == Measured(-0.001, "rad", 0.1, "tilt")
+
+
+def test_never_is_told_as_it_was_asked_and_never_not_as_always() -> None:
+    def of(text: str) -> Reading:
+        return reading(np.array([1.0]), np.array([0.0]), unit="m", scale=1.0, say=lambda k: text)
+
+    assert (
+        never(of("'cup' moved by 38 mm; at least 60 mm")).found(0).text == "'cup' moved by 38 mm; never at least 60 mm"
+    )
+    told = never(opposite(named(of("'hand' moves; below 1 mm/s"), "tool_speed"))).found(0)
+    assert (told.text, told.margin) == ("tool_speed: 'hand' moves; below 1 mm/s", 1.0)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

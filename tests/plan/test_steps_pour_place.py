@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform
+from manipcli.plan.steps.place import _leaning
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
 Story = Any
@@ -267,10 +269,30 @@ def test_a_cup_that_turned_in_the_hand_is_put_down_on_its_edge_where_the_arm_wou
     bodies[cup] = turned
     bench.now = replace(before, bodies=tuple(bodies), carried=carried)
     plan = bench.plan("place", {"object": "cup"})
-    stands = bench.body("cup", plan.end)
-    lean = np.degrees(np.arccos(stands.R[2, 2]))
-    assert lean == pytest.approx(LEANING[degrees], abs=0.01)
-    # The lowest point of the bottom is on the desk.
+    X_TO = np.linalg.inv(bench.tool(bench.now.position)) @ turned.matrix
+    down = bench.tools(bench.now, plan, "lower")[-1] @ X_TO
+    assert np.degrees(np.arccos(down[2, 2])) == pytest.approx(LEANING[degrees], abs=0.01)
     angle = np.linspace(0.0, 2 * np.pi, 3600)
-    bottom = stands.apply(np.column_stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), np.zeros(3600)]))
-    assert bottom[:, 2].min() == pytest.approx(0.4, abs=2e-4)
+    bottom = np.column_stack([RADIUS * np.cos(angle), RADIUS * np.sin(angle), np.zeros(3600)]) @ down[:3, :3].T
+    assert bottom[:, 2].min() + down[2, 3] == pytest.approx(0.4, abs=2e-4), "the lowest of it is on the desk"
+    np.testing.assert_allclose(
+        bench.body("cup", plan.end).matrix, story.steps["place"][1].end.bodies[cup].matrix, atol=1e-3
+    )
+
+
+@pytest.mark.parametrize("yaw", [0.0, 30.0, 45.0, 90.0])
+@pytest.mark.parametrize("kind", ["cylinder", "box"])
+def test_what_leans_stands_on_its_lowest_edge_however_it_is_turned(yaw: float, kind: str) -> None:
+    """A box of 4 x 20 x 10 cm, or a cylinder; a hand that points along x."""
+    size = np.array([0.04, 0.2, 0.1]) if kind == "box" else np.array([0.08, 0.08, 0.1])
+    body = SimpleNamespace(kind=kind, size=size, centre=np.zeros(3))
+    X_WG = Transform.of(xyz=(0.5, 0.1, 0.45), rpy=(0.0, 0.0, np.radians(yaw)))
+    X_WT = Transform.of(xyz=(0.5, 0.1, 0.45), R=np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]))
+    X_OT = X_WG.inverse() @ X_WT
+    X_WO = _leaning(cast(Any, body), X_WG, X_OT, np.radians(4.0))
+    angle = np.linspace(0.0, 2 * np.pi, 3600)
+    rim = np.column_stack([0.04 * np.cos(angle), 0.04 * np.sin(angle), np.full(3600, -0.05)])
+    corners = np.array([[x, y, -0.05] for x in (-0.02, 0.02) for y in (-0.1, 0.1)])
+    assert X_WO.apply(corners if kind == "box" else rim)[:, 2].min() == pytest.approx(0.4, abs=1e-6)
+    assert np.degrees(np.arccos(X_WO.R[2, 2])) == pytest.approx(4.0)
+    assert (X_WO @ X_OT).R[2, 2] == pytest.approx(-np.sin(np.radians(4.0))), "the hand points down"

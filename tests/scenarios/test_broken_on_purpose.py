@@ -111,7 +111,7 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     force = re.search(grasp, verdict.text)
     assert force is not None, verdict.text
     assert float(force[2]) == pytest.approx(0.05 * float(force[1]), rel=0.01)
-    assert verdict.text.endswith("; it weighs 1.47 N")
+    assert verdict.text.endswith("; it alone weighs 1.47 N")
 
 
 CUP = Mover("pick_1", ("cup", "ball"), (0.0, -0.1, 0.0))

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_pose
 from manipcli.plan.planner import CLEARANCE, Planner
+from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
@@ -32,6 +34,8 @@ UPRIGHT = np.cos(np.radians(5.0))
 """What stands straighter than this (cosine of its tilt) can be placed on."""
 LEANS = tuple(np.radians([0.0, 2.0, 4.0]))
 """How far [rad] an object may lean when it is let go."""
+ROUND = ("cup", "cylinder", "sphere")
+"""Bodies as wide along their diagonal as along their axes."""
 POINTING = 0.5
 """A tool that points less than this (cosine) along the ground points up or down."""
 
@@ -88,11 +92,12 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft.open(spec.posture)
         X_WT = planner.tool_pose(draft.now)
         draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
-        return draft.plan()
+        planned = draft.plan()
+        return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
     near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
-    leans = LEANS if _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
+    leans = LEANS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
     candidates = itertools.product(leans, (True,) if near else (False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
@@ -105,16 +110,19 @@ def _horizontal(X_WT: Transform) -> Array | None:
 
 
 def _leaning(body: Body, X_WG: Transform, X_OT: Transform, lean: float) -> Transform:
-    """X_WO of a body that stands at X_WG and is tilted on its edge by `lean` [rad], so that the arm behind the tool
-    is higher."""
+    """X_WO of a body that stands at X_WG, tilted on its far edge by `lean` [rad], so that the arm behind the tool is
+    higher."""
     h = _horizontal(X_WG @ X_OT)
     if h is None or lean == 0.0:
         return X_WG
     foot = X_WG @ Transform.of(xyz=(body.centre[0], body.centre[1], body.centre[2] - body.size[2] / 2))
+    x, y, _ = np.abs(X_WG.R.T @ h)
+    width, depth, _ = body.size
+    edge = max(width, depth) / 2 if body.kind in ROUND else (x * width + y * depth) / 2
     # z x h turns h downwards; the far edge stays on the ground.
     R = matrix_from_axis_angle(np.cross([0.0, 0.0, 1.0], h), lean)
-    edge = max(body.size[0], body.size[1]) / 2 * np.sin(lean)
-    about = Transform.of(xyz=foot.p + np.array([0.0, 0.0, edge]), R=R) @ Transform.of(xyz=-foot.p)
+    up = np.array([0.0, 0.0, edge * np.sin(lean)])
+    about = Transform.of(xyz=foot.p + up, R=R) @ Transform.of(xyz=-foot.p)
     return about @ X_WG
 
 
