@@ -24,7 +24,7 @@ def _pair(value: object) -> object:
     return value if isinstance(value, list | tuple) else (value, value)
 
 
-Range = Annotated[tuple[Length, Length], BeforeValidator(_pair)]
+Range = Annotated[tuple[Length, Length], BeforeValidator(_pair, json_schema_input_type=Length | tuple[Length, Length])]
 """A range of lengths [least, most] [m], or one length."""
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 Mistake = Literal["name", "range", "type", "count", "unit", "conflict", "verb", "duplicate"]
@@ -41,6 +42,20 @@ class Model(BaseModel):
         schema = handler(source)
         _make_strict(schema)
         return schema
+
+
+def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *short: JsonSchemaValue) -> JsonSchemaValue:
+    """The JSON Schema of a model of which a validator reads something `short`, too.
+
+    Args:
+        schema, handler: of `__get_pydantic_json_schema__`.
+        short: schemas of what may stand in the place of the whole block.
+    """
+    whole = handler.resolve_ref_schema(handler(schema))
+    long = dict(whole)
+    whole.clear()
+    whole |= {"description": long.pop("description", ""), "anyOf": [*short, long]}
+    return whole
 
 
 def problem(

@@ -134,7 +134,9 @@ def _tag(name: str) -> str:
 def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object]) -> type[KeyedSpec]:
     """`base` with the one field `name`, which holds the member's spec."""
     about = " ".join((spec.__doc__ or "").strip().partition("\n\n")[0].split())
-    return _keyed(base, name, Annotated[spec, BeforeValidator(_nothing_is_default)], about, **fields)
+    empty = not any(field.is_required() for field in spec.model_fields.values())
+    default = BeforeValidator(_nothing_is_default, json_schema_input_type=spec | None if empty else spec)
+    return _keyed(base, name, Annotated[spec, default], about, **fields)
 
 
 def _keyed(base: type[KeyedSpec], name: str, holds: object, about: str, **fields: object) -> type[KeyedSpec]:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
-from manipcli.spec.base import Model, problem
+from manipcli.spec.base import Model, or_short, problem
 
 Amount = float | str
 """A number (SI), or a text with a unit."""
@@ -28,6 +30,10 @@ class NormalSpec(Model):
     @classmethod
     def _pair(cls, value: object) -> object:
         return {"mean": value[0], "sd": value[1]} if isinstance(value, list) and len(value) == 2 else value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        return or_short(schema, handler, TypeAdapter(tuple[Value, Value]).json_schema())
 
 
 class DistributionSpec(Model):

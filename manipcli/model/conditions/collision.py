@@ -15,7 +15,7 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair
-from manipcli.spec.base import Model, problem
+from manipcli.spec.base import Model, or_short, problem
 from manipcli.spec.quantity import Force
 
 Pair = tuple[str, str]
@@ -52,12 +52,8 @@ class CollisionSpec(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
-        whole = handler.resolve_ref_schema(handler(schema))
-        long = dict(whole)
-        short = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
-        whole.clear()
-        whole |= {"description": long.pop("description", ""), "anyOf": [short, long]}
-        return whole
+        names = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
+        return or_short(schema, handler, names)
 
 
 def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:

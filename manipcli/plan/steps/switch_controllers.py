@@ -11,9 +11,11 @@ done as a whole or refused; with `best_effort` names that cannot be switched are
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, TypeAdapter, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
@@ -21,13 +23,22 @@ from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unknown_controller
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepMember, StepPlan, Strictness, Switch
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, or_short
+
+Names = str | tuple[str, ...]
+
+
+def _names(value: object) -> object:
+    """`{to: arm}` is short for `{to: [arm]}`."""
+    return [value] if isinstance(value, str) else value
 
 
 class SwitchControllersSpec(Model):
     """Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them."""
 
-    to: tuple[str, ...] = Field((), description="These are active afterwards, and nobody else on their joints.")
+    to: Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=Names)] = Field(
+        (), description="These are active afterwards, and nobody else on their joints."
+    )
     activate: tuple[str, ...] = Field((), description="Controllers to activate.")
     deactivate: tuple[str, ...] = Field((), description="Controllers to deactivate.")
     strictness: Strictness = Field(
@@ -37,12 +48,12 @@ class SwitchControllersSpec(Model):
     @model_validator(mode="before")
     @classmethod
     def _short(cls, value: Any) -> Any:
-        """`switch_controllers: arm` and `{to: arm}` are short for `{to: [arm]}`."""
-        if isinstance(value, str | list):
-            value = {"to": value}
-        if isinstance(value, dict) and isinstance(value.get("to"), str):
-            value = value | {"to": [value["to"]]}
-        return value
+        """`switch_controllers: arm` is short for `{to: arm}`."""
+        return {"to": value} if isinstance(value, str | list) else value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        return or_short(schema, handler, TypeAdapter(Names).json_schema())
 
     @model_validator(mode="after")
     def _one_way(self) -> SwitchControllersSpec:

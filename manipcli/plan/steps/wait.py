@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
@@ -17,7 +19,7 @@ from manipcli.plan.claims import Claims
 from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Time
 
 
@@ -31,6 +33,10 @@ class WaitSpec(Model):
     def _scalar(cls, value: Any) -> Any:
         """`wait: 1 s` is short for `wait: {duration: 1 s}`."""
         return {"duration": value} if isinstance(value, str | int | float) else value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        return or_short(schema, handler, TypeAdapter(Time).json_schema() | {"minimum": 0})
 
 
 def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:
