@@ -52,7 +52,7 @@ def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> 
             file=path,
             package_path=package_path,
             allow_outside=allow_outside,
-            place=lambda loc: file.place(*loc),
+            source=file.source,
         )
         return (*file.findings, *notes, *posture_findings(file, robot))
     except InvalidInput as invalid:
@@ -62,7 +62,7 @@ def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> 
 def kind_of(path: Path) -> load.FileKind | None:
     """Which of the three files this is; None if it is none, or cannot be read."""
     try:
-        return load.kind_of(path)
+        return load.kind_of(path, sure=True)
     except InvalidInput:
         return None
 

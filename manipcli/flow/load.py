@@ -26,6 +26,7 @@ from manipcli.model.build_scene import build_scene
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.formula import problems
+from manipcli.model.joint_units import misread_units
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
@@ -140,7 +141,7 @@ def load_task(
                 file=robot_path,
                 package_path=package_path,
                 allow_outside=allow_outside,
-                place=lambda loc: robot_file.place(*loc),
+                source=robot_file.source,
             )
         )
     )
@@ -174,14 +175,17 @@ def load_task(
 def unusable(
     task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
 ) -> tuple[Finding, ...]:
-    """What each of these is sound without and what they do not have together: names that are not there, what the
-    engine refuses, what no controller commands. Warnings and notes are among it."""
+    """What each of these is sound without and what they do not have together: names that are not there, units
+    that fit no joint, what the engine refuses, what no controller commands. Warnings and notes are among it."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
     claims = None if misclaimed or not controllers else Claims.of(controllers.spec)
     unusable = _unusable(task, robot, scene, claims)
     warned = () if unusable else unjudged(task, robot, scene)
-    return (*unusable, *_refused(task, robot), *claimed, *warned)
+    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
+    if controllers:
+        misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
+    return (*unusable, *_refused(task, robot), *claimed, *misread, *warned)
 
 
 class Gathered:

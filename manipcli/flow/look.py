@@ -70,6 +70,6 @@ def load_sight(
         file=path,
         package_path=package_path,
         allow_outside=allow_outside,
-        place=lambda loc: file.place(*loc),
+        source=file.source,
     )
     return Sight(robot, None, posture(robot), (*file.findings, *notes))

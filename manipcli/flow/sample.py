@@ -67,7 +67,7 @@ def load_task(
             file=robot_path,
             package_path=package_path,
             allow_outside=allow_outside,
-            place=lambda loc: file.place(*loc),
+            source=file.source,
         )[0],
         scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), resolve=packages.resolve),
     )

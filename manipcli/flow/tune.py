@@ -86,7 +86,7 @@ def tune(
         file=robot_path,
         package_path=package_path,
         allow_outside=allow_outside,
-        place=lambda loc: robot_file.place(*loc),
+        source=robot_file.source,
     )
     file = load.load_controllers(controllers_path)
     tuner = _Tuner(robot, file, wish, step)

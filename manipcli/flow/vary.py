@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from statistics import NormalDist
-from typing import Final, get_args, get_origin
+from typing import Final
 
 from pydantic import BaseModel
 
@@ -24,6 +24,7 @@ from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.fields import children, unit_of
 from manipcli.spec.located import Area, Located
 from manipcli.spec.quantity import Unit
 from manipcli.spec.robot import RobotSpec
@@ -297,10 +298,10 @@ def _leaves(root: BaseModel, parts: Path) -> list[_Leaf]:
 
 def _below(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> Iterator[_Leaf]:
     if not rest:
-        yield _Leaf(done, value, _unit(annotation, metadata))
+        yield _Leaf(done, value, unit_of(annotation, metadata))
         return
     part, further = rest[0], rest[1:]
-    known = _children(value, annotation)
+    known = children(value, annotation)
     if part == EVERY and not isinstance(value, BaseModel):
         there = [leaf for name, child in known.items() for leaf in _tried(*child, (*done, name), further)]
         if not there:
@@ -331,28 +332,3 @@ def _tried(value: object, annotation: object, metadata: Sequence[object], done: 
         return [leaf for leaf in _below(value, annotation, metadata, done, rest) if leaf.value is not None]
     except _Problem:
         return []
-
-
-def _children(value: object, annotation: object) -> dict[str, tuple[object, object, Sequence[object]]]:
-    """What stands directly below a value, by name: value, annotation and metadata."""
-    if isinstance(value, BaseModel):
-        return {
-            field.alias or name: (getattr(value, name), field.annotation, field.metadata)
-            for name, field in type(value).model_fields.items()
-        }
-    if isinstance(value, dict):
-        return {str(name): (one, annotation, ()) for name, one in value.items()}
-    if isinstance(value, tuple):
-        return {str(k): (one, annotation, ()) for k, one in enumerate(value)}
-    return {}
-
-
-def _unit(annotation: object, metadata: Sequence[object]) -> Unit | None:
-    """The unit that a field's type states, however deep in it."""
-    for one in (*metadata, *getattr(annotation, "__metadata__", ())):
-        if isinstance(one, Unit):
-            return one
-    if get_origin(annotation) is None:
-        return None
-    units = (_unit(one, ()) for one in get_args(annotation))
-    return next((unit for unit in units if unit is not None), None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
@@ -13,6 +13,7 @@ from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.checks import CHECKS
 from manipcli.model.description import Description
 from manipcli.model.examine import examine
+from manipcli.model.joint_units import misread_units
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
 from manipcli.model.packages import NotFound, Packages, Unread
@@ -28,17 +29,17 @@ from manipcli.model.robot import (
     TransmissionTag,
 )
 from manipcli.model.urdf import Parts, read_parts
+from manipcli.spec.located import Source
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
 
 Loc = tuple[str | int, ...]
-PlaceOf = Callable[[Loc], Place | None]
 
 
 class Reporter:
     """Gathers findings about the robot file, each with the place of the value it is about."""
 
-    def __init__(self, place: PlaceOf | None) -> None:
-        self._place = place
+    def __init__(self, source: Source | None) -> None:
+        self.source = source
         self.findings: list[Finding] = []
 
     def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
@@ -48,7 +49,7 @@ class Reporter:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
 
     def place(self, loc: Loc) -> Place | None:
-        return self._place(loc) if self._place is not None else None
+        return self.source.place(*loc) if self.source is not None else None
 
     def stop(self) -> None:
         """Raises InvalidInput when an error was found."""
@@ -62,7 +63,7 @@ def build_robot(
     file: Path,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
-    place: PlaceOf | None = None,
+    source: Source | None = None,
 ) -> tuple[RobotModel, tuple[Finding, ...]]:
     """The robot that a robot file describes.
 
@@ -71,7 +72,7 @@ def build_robot(
         file: where it is; its relative paths start there.
         package_path: more folders to look for packages in.
         allow_outside: lets meshes and includes lie outside of packages and the description's folder.
-        place: line and column of a value in the robot file, by its path of keys.
+        source: of the robot file, for the places and units of what is written.
 
     Returns:
         The robot, and what a user should know about it: warnings and notes.
@@ -79,7 +80,7 @@ def build_robot(
     Raises:
         InvalidInput: every error of the descriptions at once; or, where those are sound, of the robot file.
     """
-    reporter = Reporter(place)
+    reporter = Reporter(source)
     sources = Packages(file, package_path=package_path, allow_outside=True)
     read = _Descriptions(reporter, sources, file, tuple(package_path), allow_outside)
     main = read.parts(spec.description, spec.args, ("description",))
@@ -140,6 +141,8 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
     groups = build_groups(reporter, spec, links, joints)
+    if reporter.source is not None:
+        reporter.findings += misread_units(spec, reporter.source, joints, groups)
     poses = build_poses(reporter, spec, groups, moving)
     tool = _tool(reporter, spec, groups, links)
     for k, pair in enumerate(spec.collision_ignore):

@@ -30,7 +30,7 @@ every_controller = pytest.mark.parametrize("member", list(CONTROLLERS), ids=lamb
 @cache
 def robot() -> RobotModel:
     file = load_robot(ROBOT)
-    return build_robot(file.spec, file=ROBOT, place=lambda loc: file.place(*loc))[0]
+    return build_robot(file.spec, file=ROBOT, source=file.source)[0]
 
 
 @cache

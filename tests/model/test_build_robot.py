@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import InvalidInput, Place
+from manipcli.core.errors import InvalidInput
 from manipcli.model.build_robot import build_robot, rebuild_robot
 from manipcli.model.normalise import engine_urdf, massless_joints
 from manipcli.model.robot import RobotModel
+from manipcli.spec.load import load_robot_text
 from manipcli.spec.robot import RobotSpec
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -202,18 +203,17 @@ def test_the_tool_is_the_tip_of_the_first_group_unless_said(file: Path) -> None:
 
 
 def test_findings_carry_the_place_of_the_value(file: Path) -> None:
-    asked: list[tuple[str | int, ...]] = []
-
-    def place(loc: tuple[str | int, ...]) -> Place:
-        asked.append(loc)
-        return Place("robot.yaml", len(asked), 1)
-
-    content = spec(groups=GROUPS, poses={"p": {"arm": [0.0, 1.5]}}, tool={"link": "x"})
+    written = load_robot_text(
+        "robot: r\ndescription: arm.urdf\ngroups: {arm: {joints: [j1, j2]}}\n"
+        "poses:\n  p:\n    arm:\n      - 0.0\n      - 1.5\ntool:\n  link: x\n",
+        "robot.yaml",
+    )
     with pytest.raises(InvalidInput) as caught:
-        build_robot(content, file=file, place=place)
-    assert ("poses", "p", "arm", 1) in asked
-    assert ("tool", "link") in asked
-    assert all(finding.place is not None for finding in caught.value.findings)
+        build_robot(written.spec, file=file, source=written.source)
+    assert [str(finding.place) for finding in caught.value.findings if finding.severity == "error"] == [
+        "robot.yaml:8:9",
+        "robot.yaml:10:9",
+    ]
 
 
 def test_errors_of_all_descriptions_are_told_at_once(file: Path) -> None:
@@ -291,6 +291,6 @@ def test_a_joint_that_moves_no_mass_is_no_matter_for_physics(file: Path) -> None
     (file.parent / "arm.urdf").write_text(ARM.replace(link("wrist"), link("wrist", "")))
     robot = build(file)
     assert massless_joints(robot) == ("slide",)
-    with pytest.raises(InvalidInput, match="'slide' moves nothing that has mass"):
+    with pytest.raises(InvalidInput, match=r"arm.urdf:.*link 'wrist', which joint 'slide' moves, has no mass"):
         engine_urdf(robot, file.parent)
     assert massless_joints(build(file, **HANDED)) == ()  # the hand is fixed to it

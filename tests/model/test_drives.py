@@ -50,7 +50,7 @@ def built(folder: Path, drives: str) -> RobotModel:
 def read(folder: Path, drives: str, more: str = "") -> tuple[RobotModel, tuple[Finding, ...]]:
     (folder / "r.urdf").write_text(arm(drives), encoding="utf-8")
     located = load_robot_text(f"robot: r\ndescription: r.urdf\n{more}", "robot.yaml")
-    return build_robot(located.spec, file=folder / "robot.yaml", place=lambda loc: located.place(*loc))
+    return build_robot(located.spec, file=folder / "robot.yaml", source=located.source)
 
 
 def refused(folder: Path, drives: str, more: str = "") -> str:

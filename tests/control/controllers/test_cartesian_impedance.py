@@ -27,7 +27,7 @@ STIFFNESS = np.array([900.0, 500.0, 700.0, 40.0, 30.0, 50.0])
 @cache
 def robot():
     file = load_robot(ROBOT)
-    return build_robot(file.spec, file=ROBOT, place=lambda loc: file.place(*loc))[0]
+    return build_robot(file.spec, file=ROBOT, source=file.source)[0]
 
 
 @cache

@@ -28,7 +28,7 @@ HOME = np.array([0.2, 0.4, -0.3, -1.2, 0.5, 0.6, -0.4])
 @pytest.fixture(scope="module")
 def robot():
     file = load_robot(ROBOT)
-    built = build_robot(file.spec, file=ROBOT, place=lambda loc: file.place(*loc))[0]
+    built = build_robot(file.spec, file=ROBOT, source=file.source)[0]
     # Damping of the joints would be on top of the law's.
     return replace(built, joints=tuple(replace(joint, damping=0.0) for joint in built.joints))
 

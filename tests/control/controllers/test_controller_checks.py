@@ -46,7 +46,7 @@ CASES = [
 def robot(name):
     path = ROBOTS / name / "robot.yaml"
     file = load_robot(path)
-    return build_robot(file.spec, file=path, place=lambda loc: file.place(*loc))[0]
+    return build_robot(file.spec, file=path, source=file.source)[0]
 
 
 @pytest.mark.parametrize(("name", "text", "code", "told"), CASES, ids=[case[3] for case in CASES])

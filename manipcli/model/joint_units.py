@@ -1,0 +1,74 @@
+"""Angles of joints that slide, lengths of joints that turn: told where a file and its robot meet.
+
+The type of a joint's value takes both, because a file does not know by itself what its robot's joints are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from manipcli.core.errors import Finding
+from manipcli.core.units import describe, parse_quantity
+from manipcli.model.robot import Group, Joint
+from manipcli.spec.base import Model
+from manipcli.spec.fields import Held, children, unit_of
+from manipcli.spec.located import Source
+from manipcli.spec.tree import Node, Path, ScalarNode, SequenceNode, child, shown
+
+
+def misread_units(spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> Iterator[Finding]:
+    """An error for each text such as `5 cm` that fits no joint which it is about.
+
+    Args:
+        spec, source: the file.
+        joints, groups: of the robot.
+    """
+    return _Reading(source, joints, groups).below((spec, type(spec), ()), source.root, (), ())
+
+
+class _Reading:
+    """A walk through what was written and what it was read as."""
+
+    def __init__(self, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> None:
+        self._source = source
+        self._joints = {joint.name: joint for joint in joints if joint.moves}
+        self._groups = {group.name: group.joints for group in groups}
+
+    def below(self, held: Held, node: Node, path: Path, about: tuple[str, ...]) -> Iterator[Finding]:
+        """What is wrong at `node` and below; `about`: the joints that this is about, as far as blocks around it say."""
+        value, annotation, metadata = held
+        if isinstance(node, ScalarNode):
+            unit = unit_of(annotation, metadata)
+            known = [self._joints[name] for name in about if name in self._joints]
+            if isinstance(value, float) and isinstance(node.value, str) and unit is not None and known:
+                wanted = [unit.dimensions[-1 if joint.type == "prismatic" else 0] for joint in known]
+                given = parse_quantity(node.value).dimension
+                if given not in wanted:
+                    message = f"joint '{known[0].name}' is {known[0].type}: {shown(node)} is {given.name}; "
+                    yield self._source.finding(207, path, f"{message}expected {describe(wanted[0])}")
+            return
+        about = self._said(value) or about
+        for k, (key, inside) in enumerate(children(value, annotation).items()):
+            part = k if isinstance(node, SequenceNode) else key
+            written = child(node, part)
+            if written is not None:
+                own = self._meant(value, k, key, inside[0], about)
+                yield from self.below(inside, written, (*path, part), own)
+
+    def _said(self, block: object) -> tuple[str, ...]:
+        """The joints that a block speaks of in its `group`, `joints` or `joint_names`."""
+        group = getattr(block, "group", None)
+        if isinstance(group, str):
+            return self._groups.get(group, ())
+        names = getattr(block, "joints", None) or getattr(block, "joint_names", None)
+        return names if isinstance(names, tuple) else ()
+
+    def _meant(self, value: object, k: int, key: str, inside: object, about: tuple[str, ...]) -> tuple[str, ...]:
+        """The joints of item `k` of a value: its key names a group or a joint; a list is in the order of its joints."""
+        if isinstance(value, dict) and isinstance(inside, dict | tuple):
+            return self._groups.get(key, about)
+        if isinstance(value, dict) and key in self._joints:
+            return (key,)
+        if isinstance(value, tuple) and isinstance(inside, float) and len(value) == len(about):
+            return (about[k],)
+        return about
