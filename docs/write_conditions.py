@@ -12,6 +12,7 @@ from typing import Any
 
 from manipcli.model.condition import Condition
 from manipcli.model.conditions import CONDITIONS
+from manipcli.spec.base import about
 
 PAGE = Path(__file__).with_name("conditions.md")
 INTRODUCTION = """\
@@ -85,7 +86,7 @@ name.
 def page() -> str:
     """The whole text."""
     rows = [
-        f"| [`{one.name}`](#{one.name}) | {_about(one)} | {_units(one)} | {_SCOPES[one.scope]} | `{one.example}` |"
+        f"| [`{one.name}`](#{one.name}) | {about(one.spec)} | {_units(one)} | {_SCOPES[one.scope]} | `{one.example}` |"
         for one in CONDITIONS
     ]
     table = ["| word | holds when | unit of the margin | expected | example |", "|---|---|---|---|---|", *rows]
@@ -96,10 +97,6 @@ _SCOPES = {"end": "at the end", "always": "always"}
 
 
 # Any: a seam holds members of different specs; each is only asked for its texts.
-def _about(one: Condition[Any]) -> str:
-    return " ".join(cleandoc(one.spec.__doc__ or "").partition("\n\n")[0].split())
-
-
 def _units(one: Condition[Any]) -> str:
     return ", ".join(unit or "-" for unit in one.units)
 
@@ -110,7 +107,7 @@ def _section(one: Condition[Any]) -> list[str]:
     for name, field in one.spec.model_fields.items():
         told = field.is_required() or "efault" in str(field.description)
         fields.append(f"- `{name}`: {field.description}{'' if told else ' Optional.'}")
-    return ["", f"### {one.name}", "", _about(one), "", *fields, "", f"Margin: {cleandoc(gauge.__doc__ or '')}"]
+    return ["", f"### {one.name}", "", about(one.spec), "", *fields, "", f"Margin: {cleandoc(gauge.__doc__ or '')}"]
 
 
 if __name__ == "__main__":

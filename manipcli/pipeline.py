@@ -23,6 +23,7 @@ from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.flow.recorded_task import recorded_task
 from manipcli.flow.sample import load_task
 from manipcli.flow.verify import compared, refused_as_unlike
+from manipcli.flow.vocabulary import meanings
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
@@ -37,6 +38,7 @@ __all__ = [
     "judge_log",
     "kind_of",
     "load_task",
+    "meanings",
     "plan_task",
     "run_task",
     "schema",

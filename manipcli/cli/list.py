@@ -32,7 +32,9 @@ def list_(
     Robots, tasks and controllers are files below this folder; the rest are words of task files. `list controllers TASK`
     shows who claims what at the start of a task.
     """
+    from manipcli import pipeline
     from manipcli.report.json import dumps
+    from manipcli.report.table import table
 
     if task is not None:
         return _controllers(kind, task, format_)
@@ -46,6 +48,9 @@ def list_(
     if format_ == "json":
         console.result(dumps(found))
     elif kind is not None:
+        if told := pipeline.meanings(kind):
+            console.result(table(("word", "meaning"), [*told.items()]))
+            return ExitCode.PASSED
         for name in found[kind]:
             console.result(name)
     else:

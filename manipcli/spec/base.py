@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import cleandoc
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -42,6 +43,11 @@ class Model(BaseModel):
         schema = handler(source)
         _make_strict(schema)
         return schema
+
+
+def about(spec: type[BaseModel]) -> str:
+    """The first paragraph of its docstring, in one line."""
+    return " ".join(cleandoc(spec.__doc__ or "").partition("\n\n")[0].split())
 
 
 def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *short: JsonSchemaValue) -> JsonSchemaValue:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.spec.ros.nodes import MANAGER
+from manipcli.spec.ros.table import models
 from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _DESCRIPTIONS = (".urdf", ".xacro")
@@ -27,6 +29,21 @@ def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
     found = _certain_kind(root) if isinstance(root, MappingNode) else None
     if found is not None and found != wanted:
         raise _refusal(name, f"a {found} file", wanted)
+
+
+def names_controllers(node: Node) -> bool:
+    """Whether there is a controller, or ROS's manager of them, at or below this."""
+    return isinstance(node, MappingNode) and any(
+        key == MANAGER
+        or (key.rpartition(".")[2] == "type" and _is_controller(entry.node))
+        or names_controllers(entry.node)
+        for key, entry in node.entries.items()
+    )
+
+
+def _is_controller(kind: Node) -> bool:
+    word = kind.value if isinstance(kind, ScalarNode) else None
+    return isinstance(word, str) and ("/" in word or word in models())
 
 
 def _certain_kind(root: MappingNode) -> str | None:

@@ -14,7 +14,7 @@ from manipcli.core.text import did_you_mean, escape
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import substitute
-from manipcli.spec.kind import refuse_description, refuse_other_kind
+from manipcli.spec.kind import names_controllers, refuse_description, refuse_other_kind
 from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.robot import RobotSpec
@@ -27,6 +27,7 @@ from manipcli.spec.yaml import MAX_BYTES, parse
 M = TypeVar("M", bound=Model)
 
 FileKind = Literal["task", "robot", "controllers"]
+_NONE = "expected the mapping of a task, robot or controllers file"
 
 
 def read_bytes(path: Path) -> bytes:
@@ -65,21 +66,28 @@ def load(path: Path, model: type[M], area: Area) -> Located[M]:
     return validate(_source(read_bytes(path), str(path), area), model)
 
 
-def kind_of(path: Path) -> FileKind:
-    """Which of the three files this is, by its top-level keys.
+def kind_of(path: Path, *, sure: bool = False) -> FileKind:
+    """Which of the three files this is, by its top-level keys; a controllers file of ROS has none of its own.
+
+    Args:
+        path: the file.
+        sure: nobody said that it is one of the three, so a controllers file has to name a controller.
 
     Raises:
-        InvalidInput: it cannot be read, or is no YAML mapping.
+        InvalidInput: it cannot be read, is no YAML mapping, or with `sure` none of the three.
     """
     root = parse(read_bytes(path), str(path), infinite=True)
     if not isinstance(root, MappingNode):
-        message = "expected the mapping of a task, robot or controllers file"
-        raise InvalidInput([Finding("USE104", message, Place(str(path), 1, 1))])
+        raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
         return "task"
     # In a file of ROS `robot` may be a namespace.
     named = "robot" in root.entries and not isinstance(root.get("robot"), MappingNode)
-    return "robot" if named or "description" in root.entries else "controllers"
+    if named or "description" in root.entries:
+        return "robot"
+    if sure and not isinstance(root.get("controllers"), MappingNode) and not names_controllers(root):
+        raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
+    return "controllers"
 
 
 def load_task(

@@ -17,7 +17,7 @@ from typing_extensions import TypeAliasType
 
 from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean, escape, listed
-from manipcli.spec.base import Model, problem
+from manipcli.spec.base import Model, about, problem
 from manipcli.spec.condition import (
     COMBINATIONS,
     QUANTIFIERS,
@@ -94,7 +94,7 @@ def _expectations(members: Members, condition: object) -> object:
     """Any condition or combination with its time, and `always`, `never`, `eventually` of any."""
     models = [_wrapped(ExpectationSpec, name, spec, {}) for name, spec in members]
     models += [_combined(ExpectationSpec, name, condition) for name in COMBINATIONS]
-    models += [_keyed(ExpectationSpec, name, condition, about) for name, about in QUANTIFIERS.items()]
+    models += [_keyed(ExpectationSpec, name, condition, text) for name, text in QUANTIFIERS.items()]
     return _union("expectation", models, common=_EXPECTATION)
 
 
@@ -133,20 +133,19 @@ def _tag(name: str) -> str:
 
 def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object]) -> type[KeyedSpec]:
     """`base` with the one field `name`, which holds the member's spec."""
-    about = " ".join((spec.__doc__ or "").strip().partition("\n\n")[0].split())
     empty = not any(field.is_required() for field in spec.model_fields.values())
     default = BeforeValidator(_nothing_is_default, json_schema_input_type=spec | None if empty else spec)
-    return _keyed(base, name, Annotated[spec, default], about, **fields)
+    return _keyed(base, name, Annotated[spec, default], about(spec), **fields)
 
 
-def _keyed(base: type[KeyedSpec], name: str, holds: object, about: str, **fields: object) -> type[KeyedSpec]:
+def _keyed(base: type[KeyedSpec], name: str, holds: object, text: str, **fields: object) -> type[KeyedSpec]:
     """`base` with the one field `name` of any type."""
     made = create_model(  # type: ignore[call-overload]
         "".join(word.capitalize() for word in name.split("_")) + base.__name__.removesuffix("Spec"),
         __base__=base,
-        __doc__=about,
+        __doc__=text,
         **fields,
-        **{name: (holds, Field(description=about))},
+        **{name: (holds, Field(description=text))},
     )
     keyed = cast(type[KeyedSpec], made)
     keyed.word = name

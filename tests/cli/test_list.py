@@ -19,6 +19,12 @@ FILES = {
     ".hidden/c.yaml": "task: c\n",
     "broken.yaml": "task: [\n",
     "other.yaml": "- 1\n",
+    "docker-compose.yml": "services: {db: {image: a/b, volumes: [{type: bind}]}}\n",
+    "mkdocs.yml": "site_name: x\ntheme: {palette: {scheme: slate}}\n",
+    "workflow.yml": "on: {workflow_dispatch: {inputs: {x: {type: string}}}}\njobs: {a: {steps: [{uses: a/b}]}}\n",
+    "navigation.yaml": "planner: {ros__parameters: {tolerance: 0.5}}\n",
+    "controllers/dotted.yaml": "arm: {ros__parameters: {joints: [a], arm.type: a/B}}\n",
+    "controllers/bare.yaml": "arm: {type: joint_trajectory, joints: [a]}\n",
     "notes.yxml": "task: no\n",
 }
 
@@ -38,7 +44,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     [
         ("tasks", ["tasks/a.yml", "tasks/b.yaml"]),
         ("robots", ["robots/r.yaml"]),
-        ("controllers", ["controllers/own.yaml", "controllers/ros1.yaml", "controllers/ros2.yaml"]),
+        (
+            "controllers",
+            ["controllers/bare.yaml", "controllers/dotted.yaml"]
+            + [f"controllers/{name}.yaml" for name in ("own", "ros1", "ros2")],
+        ),
     ],
 )
 def test_files_are_known_by_their_top_level_key(
@@ -59,10 +69,16 @@ def test_files_are_known_by_their_top_level_key(
     ],
 )
 def test_words_are_those_of_the_registries(capsys: pytest.CaptureFixture[str], kind: str, some: set[str]) -> None:
+    assert main(["list", kind, "--format", "json"]) == 0
+    words = json.loads(capsys.readouterr().out)[kind]
+    assert {*words} >= some
+    assert "pose" not in words
     assert main(["list", kind]) == 0
-    listed = set(capsys.readouterr().out.split())
-    assert listed >= some
-    assert "pose" not in listed
+    lines = capsys.readouterr().out.splitlines()
+    if kind in ("steps", "conditions", "expectations"):
+        assert lines.pop(0).split() == ["word", "meaning"]
+        assert all(line.endswith((".", "`.")) and len(line.split()) > 3 for line in lines)
+    assert [line.split()[0] for line in lines] == words
 
 
 TASK = str(Path(__file__).parents[2] / "tasks" / "pour.yaml")
