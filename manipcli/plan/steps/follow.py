@@ -4,10 +4,6 @@
         joint_names: [joint_1, joint_2]
         points:
           - {positions: [0, 0], velocities: [0, 0], time_from_start: {secs: 3}}
-
-Between two points the curve is linear, cubic or quintic by what both give; the first is led to from where the robot
-is, at rest. Position and velocity limits hold for every curve; a linear one has infinite acceleration at its points and
-a cubic one infinite jerk, so those limits are asked only of curves that can keep them.
 """
 
 from __future__ import annotations
@@ -39,10 +35,10 @@ HERE = 1e-3
 class DurationSpec(Model):
     """A duration in ROS 1's (`secs`, `nsecs`) or ROS 2's words (`sec`, `nanosec`)."""
 
-    secs: Annotated[int, Field(ge=0)] = 0
-    nsecs: Annotated[int, Field(ge=0)] = 0
-    sec: Annotated[int, Field(ge=0)] = 0
-    nanosec: Annotated[int, Field(ge=0)] = 0
+    secs: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 1.")] = 0
+    nsecs: Annotated[int, Field(ge=0, description="Nanoseconds beside them, in ROS 1.")] = 0
+    sec: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 2.")] = 0
+    nanosec: Annotated[int, Field(ge=0, description="Nanoseconds beside them, in ROS 2.")] = 0
 
     @property
     def seconds(self) -> float:
@@ -52,11 +48,11 @@ class DurationSpec(Model):
 class PointSpec(Model):
     """One point; the curve between two is linear, cubic or quintic by what both give."""
 
-    positions: tuple[JointValue, ...]
-    velocities: tuple[JointVelocity, ...] = ()
-    accelerations: tuple[JointAcceleration, ...] = ()
-    effort: tuple[()] = ()
-    time_from_start: Time | DurationSpec
+    positions: tuple[JointValue, ...] = Field(description="One for each joint, in the order of `joint_names`.")
+    velocities: tuple[JointVelocity, ...] = Field((), description="One for each joint, or none.")
+    accelerations: tuple[JointAcceleration, ...] = Field((), description="One for each joint, or none.")
+    effort: tuple[()] = Field((), description="Stays empty.")
+    time_from_start: Time | DurationSpec = Field(description="From the start of the trajectory, later than the last.")
 
     @property
     def seconds(self) -> float:
@@ -66,11 +62,16 @@ class PointSpec(Model):
 
 
 class FollowSpec(Model):
-    """The fields of trajectory_msgs/JointTrajectory."""
+    """The joints follow a trajectory_msgs/JointTrajectory, written as ROS writes it.
+
+    Between two points the curve is linear, cubic or quintic by what both give; the first is led to from where the robot
+    is, at rest. Position and velocity limits hold for every curve; a linear one has infinite acceleration at its points
+    and a cubic one infinite jerk, so those limits are asked only of curves that can keep them.
+    """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
-    joint_names: tuple[str, ...] = Field(min_length=1)
-    points: tuple[PointSpec, ...] = Field(min_length=1)
+    joint_names: tuple[str, ...] = Field(min_length=1, description="The joints that move.")
+    points: tuple[PointSpec, ...] = Field(min_length=1, description="In the order of their times; the last at rest.")
 
     @model_validator(mode="after")
     def _sizes(self) -> FollowSpec:

@@ -24,7 +24,7 @@ DEFAULT_FORCE = 8.0
 
 
 class GraspSpec(Model):
-    """How the hand closes. A grasp holds by friction alone."""
+    """The hand closes until each finger meets `force`; what it holds, it holds by friction alone."""
 
     object: str | None = Field(None, description="What is grasped; carried from then on. Default: not said.")
     posture: str = Field("closed", description="The named pose that the hand closes towards.")

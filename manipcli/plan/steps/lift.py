@@ -23,10 +23,10 @@ from manipcli.spec.base import Model
 
 
 class LiftSpec(Model):
-    """The object goes straight up by a height in the range `by`; the middle of the range is tried first."""
+    """Raise what is held straight up, by a height in a range of which the middle is tried first."""
 
     object: str = Field(description="What is held and lifted.")
-    by: Annotated[Range, Field(description="Height [m]: one number, or [least, most].")] = (0.08, 0.2)
+    by: Annotated[Range, Field(description="Height [m].")] = (0.08, 0.2)
     speed: Speed = 0.5
 
 

@@ -1,8 +1,5 @@
 """`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
 
-While the hand is closed on something, `move` leaves it closed: of a named pose only the joints of the arm count then,
-and joints of the hand named one by one are refused. `release` and `place` open it.
-
     - move: {to: home}
     - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
     - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
@@ -27,11 +24,15 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue
 from manipcli.spec.robot import PoseSpec
 
-Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity and acceleration limits (0, 1].")]
+Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity and acceleration limits.")]
 
 
 class MoveSpec(Model):
-    """Either `to` (joint space) or `pose` (of the tool, in `frame`)."""
+    """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` in a `frame`.
+
+    While the hand is closed on something, it stays closed: of a named pose only the joints of the arm count then, and
+    joints of the hand named one by one are refused. `release` and `place` open it.
+    """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")

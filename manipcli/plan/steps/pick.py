@@ -1,8 +1,6 @@
 """`pick`: reach an object, approach it straight, and close the hand on it.
 
     - pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
-
-The tool's +z is the direction of approach, its y the direction in which the fingers close.
 """
 
 from __future__ import annotations
@@ -22,6 +20,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
+from manipcli.plan.inverse_kinematics import NOT_SO
 from manipcli.plan.names import unknown_pose
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
@@ -37,6 +36,10 @@ SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 
 _OTHERWISE = "say from where and how high it is taken: `approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`"
+_AIM = (
+    "the tool's +z has to point to the object, and the arm cannot turn it so: "
+    "see `tool: {link: ..., pose: {rpy: ...}}` in the robot file"
+)
 
 
 class ApproachSpec(Model):
@@ -52,18 +55,23 @@ class ApproachSpec(Model):
 class PickGraspSpec(GraspSpec):
     """The grasp of a pick: its object is the pick's own."""
 
-    object: None = None
+    object: None = Field(None, description="Nothing: the pick says it.")
     height: Length | None = Field(None, description="Of the tool above the object's bottom [m]; default: its middle.")
 
 
 class PickSpec(Model):
-    """Open the hand, reach, approach, close."""
+    """Open the hand, reach an object, approach it straight, and close the hand on it.
+
+    The tool's +z is the direction of approach, its y the direction in which the fingers close.
+    """
 
     object: str = Field(description="What to take.")
-    approach: ApproachSpec = ApproachSpec()
-    grasp: PickGraspSpec = PickGraspSpec()
+    approach: ApproachSpec = Field(ApproachSpec(), description="From where the hand comes.")
+    grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
     open: str = Field("open", description="The pose of the hand while approaching.")
-    speed: Speed = Field(1.0, description="Of reaching; the straight approach takes half of it.")
+    speed: Speed = Field(
+        1.0, description="Fraction of the velocity and acceleration limits in reaching; the straight approach takes half."
+    )
 
 
 def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
@@ -92,7 +100,9 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
             out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
         refusal = out_of_reach[k]
         if refusal is not None:
-            raise NotPlannable(refusal.cause, hint=f"move '{spec.object}', or {_OTHERWISE}")
+            other = "top" if spec.approach.from_ == "side" else "side"
+            move, turn = f"move '{spec.object}', or {_OTHERWISE}", f"{_AIM}; or say `approach: {{from: {other}}}`"
+            raise NotPlannable(refusal.cause, hint=turn if refusal.hint == NOT_SO else move)
         draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
         draft.straight("approach", X_WG, speed=spec.speed / 2)
         draft.close(

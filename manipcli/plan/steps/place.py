@@ -41,7 +41,7 @@ POINTING = 0.5
 
 
 class PlaceSpec(Model):
-    """Carry above the place, lower straight, open, withdraw against the direction of approach, rising."""
+    """Set down what is held: carry it above its place, lower it straight, let go, and withdraw, rising."""
 
     object: str = Field(description="What is held and put down.")
     at: Literal["start"] | tuple[Length, Length] = Field(
@@ -52,7 +52,9 @@ class PlaceSpec(Model):
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
-    speed: Speed = Field(0.5, description="Of carrying; lowering takes half of it.")
+    speed: Speed = Field(
+        0.5, description="Fraction of the velocity and acceleration limits in carrying; lowering takes half of it."
+    )
 
 
 def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:

@@ -42,14 +42,16 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class PourSpec(Model):
-    """Carry, tilt, dwell, tilt back."""
+    """Carry what is held over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
 
     object: str = Field(description="The container that is held and tilted.")
     into: str = Field(description="The container that receives.")
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Time, Field(ge=0, description="How long to stay tilted [s]; `until` prolongs it.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
-    speed: Speed = Field(0.5, description="Of carrying and tilting.")
+    speed: Speed = Field(
+        0.5, description="Fraction of the velocity and acceleration limits, in carrying and tilting."
+    )
 
 
 def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:

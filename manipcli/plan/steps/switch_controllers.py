@@ -4,9 +4,6 @@
     - switch_controllers: {to: [soft_arm, hand]}
     - switch_controllers: {activate: [soft_arm], deactivate: [arm]}
     - switch_controllers: {deactivate: [hand], strictness: best_effort}
-
-What is activated holds what it measures. Joints that nobody commands any more are braked. With `strict` a switch is
-done as a whole or refused; with `best_effort` names that cannot be switched are left out.
 """
 
 from __future__ import annotations
@@ -34,7 +31,12 @@ def _names(value: object) -> object:
 
 
 class SwitchControllersSpec(Model):
-    """Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them."""
+    """Other controllers take over, between two control ticks; nothing moves.
+
+    Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them. What is
+    activated holds what it measures. Joints that nobody commands any more are braked. With `strict` a switch is done as
+    a whole or refused; with `best_effort` names that cannot be switched are left out.
+    """
 
     to: Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=Names)] = Field(
         (), description="These are active afterwards, and nobody else on their joints."

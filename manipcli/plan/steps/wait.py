@@ -24,7 +24,7 @@ from manipcli.spec.quantity import Time
 
 
 class WaitSpec(Model):
-    """Hold still for `duration`; with `until` on the step, at least that long and until the condition holds."""
+    """Hold still for a time; with `until` on the step, at least that long and until the condition holds."""
 
     duration: Annotated[Time, Field(ge=0, description="How long [s].")] = 0.0
 
