@@ -66,20 +66,11 @@ def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> st
         visuals: also write what is drawn; a mesh of it that cannot be read is left out.
 
     Raises:
-        InvalidInput: a joint moves nothing that has mass, a line would be too long, or a collision mesh is damaged.
+        InvalidInput: a joint moves a link without mass, a line would be too long, or a collision mesh is damaged.
     """
-    massless = massless_joints(robot)
+    massless = massless_links(robot, "URDF040")
     if massless:
-        raise InvalidInput(
-            [
-                Finding(
-                    code="URDF040",
-                    message=f"joint '{name}' moves nothing that has mass",
-                    hint=f"give link '{robot.joint(name).child}' an <inertial>, or use an engine without physics",
-                )
-                for name in massless
-            ]
-        )
+        raise InvalidInput(massless)
     lines = _head(robot.name)
     for link in robot.links:
         drawn = tuple(filter(_readable, link.visuals)) if visuals else ()
@@ -110,6 +101,17 @@ def massless_joints(robot: RobotModel) -> tuple[str, ...]:
         if joint.type == "fixed" and joint.child in massive:
             massive.add(joint.parent)
     return tuple(joint.name for joint in robot.moving_joints if joint.child not in massive)
+
+
+def massless_links(robot: RobotModel, code: str) -> tuple[Finding, ...]:
+    """What `massless_joints` move, each at its place in the description: no engine with physics can hold it."""
+    found = []
+    for name in massless_joints(robot):
+        link = robot.link(robot.joint(name).child)
+        message = f"link '{link.name}', which joint '{name}' moves, has no mass, nor has what is fixed to it"
+        hint = "give it an <inertial> with a mass, or use an engine without physics"
+        found.append(Finding(code, message, link.place, hint))
+    return tuple(found)
 
 
 def _head(name: str) -> list[str]:

@@ -5,11 +5,12 @@ Frames: L link, J joint (coincides with its child link), P parent link, B robot 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from manipcli.core.errors import Place
 from manipcli.core.geometry import Array, Transform
 
 JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
@@ -69,10 +70,13 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class Link:
+    """`place`: where the description has it."""
+
     name: str
     inertial: Inertial | None
     visuals: tuple[Geometry, ...]
     collisions: tuple[Geometry, ...]
+    place: Place | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

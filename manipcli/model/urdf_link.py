@@ -29,6 +29,7 @@ def read_link(reader: Reader, element: Element, name: str, packages: Packages, m
         inertial=_inertial(reader, element, name),
         visuals=tuple(_geometries(reader, element, "visual", packages, materials)),
         collisions=tuple(_geometries(reader, element, "collision", packages, materials)),
+        place=element.place,
     )
 
 

@@ -514,10 +514,8 @@ def test_bullet_holds_127_joints_and_says_so_of_128(opens: Opens) -> None:
 def test_bullet_refuses_a_joint_that_moves_no_mass(opens: Opens) -> None:
     model = robot([joint("a", "x"), joint("b", "y", parent="x")], [inertial(1.0), None])
     (finding,) = ENGINES["pybullet"].refuses(model)
-    assert "'b'" in finding.message
-    assert finding.hint is not None
-    assert "'y'" in finding.hint
-    with pytest.raises(InvalidInput, match="'b' moves nothing that has mass"):
+    assert finding.message.startswith("link 'y', which joint 'b' moves, has no mass")
+    with pytest.raises(InvalidInput, match="joint 'b' moves, has no mass"):
         opens(ENGINES["pybullet"], model)
     assert ENGINES["kinematic"].refuses(model) == ()
 

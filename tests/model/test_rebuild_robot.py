@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.core.errors import Place
 from manipcli.core.geometry import Transform
 from manipcli.model.build_robot import build_robot, rebuild_robot
 from manipcli.spec.load import load_robot, load_robot_text
@@ -18,8 +19,8 @@ ROBOTS = sorted(ROOT.glob("robots/*/robot.yaml"))
 
 
 def _numbers(value: object, path: str = "") -> Iterator[tuple[str, object]]:
-    """Everything a value is made of; arrays as bytes. Where files lie is left out."""
-    if dataclasses.is_dataclass(value):
+    """Everything a value is made of; arrays as bytes. Where files lie, and where in them, is left out."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, Place):
         for field in dataclasses.fields(value):
             yield from _numbers(getattr(value, field.name), f"{path}.{field.name}")
     elif isinstance(value, tuple):
@@ -27,7 +28,7 @@ def _numbers(value: object, path: str = "") -> Iterator[tuple[str, object]]:
             yield from _numbers(each, f"{path}[{k}]")
     elif isinstance(value, np.ndarray):
         yield path, value.tobytes()
-    elif not isinstance(value, Path):
+    elif not isinstance(value, Path | Place):
         yield path, repr(value)
 
 

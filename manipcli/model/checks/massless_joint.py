@@ -1,4 +1,4 @@
-"""Joints that move nothing that has mass."""
+"""Joints that move a link without mass."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
     massive = {name for name, link in links.items() if _states_mass(link)}
     for joint, body in moved_bodies(subject.parts):
         if joint.child in links and not massive.intersection(body):  # of a link that is not there enough is said
-            message = f"joint '{joint.name}' moves nothing that has mass: link '{joint.child}' has no inertial"
+            message = f"link '{joint.child}', which joint '{joint.name}' moves, has no mass"
             hint = "state the mass and moments of inertia of the link"
             yield Finding("URDF100", message, links[joint.child].place, hint, "warning")
 
@@ -33,7 +33,7 @@ CHECK = Check(
     name="massless-joint",
     tier="physics",
     severity="warning",
-    summary="A joint moves nothing that has mass",
+    summary="A joint moves a link that has no mass",
     reason=(
         "PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques mean nothing; here an "
         "engine with physics refuses such a joint."

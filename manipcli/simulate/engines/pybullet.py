@@ -11,7 +11,7 @@ from typing import Final
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
-from manipcli.model.normalise import engine_urdf, massless_joints
+from manipcli.model.normalise import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
@@ -222,16 +222,12 @@ def _version() -> str:
 
 
 def refuses(robot: RobotModel) -> tuple[Finding, ...]:
-    """More joints than Bullet reads the state of, and joints that move nothing that has mass."""
+    """More joints than Bullet reads the state of, and moving links without mass."""
     found = []
     if len(robot.joints) > MAX_JOINTS:
         message = f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
         found.append(Finding("SIM120", message, hint="join links that are fixed to each other"))
-    for name in massless_joints(robot):
-        message = f"joint '{name}' moves nothing that has mass"
-        hint = f"give link '{robot.joint(name).child}' an <inertial>, or use an engine without physics"
-        found.append(Finding("SIM121", message, hint=hint))
-    return tuple(found)
+    return (*found, *massless_links(robot, "SIM121"))
 
 
 MEMBER = EngineMember(
