@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from manipcli.model.packages import NotFound
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.model.start_overlap import overlaps
+from manipcli.spec.base import Model
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.task import BodySpec, TaskSpec
 
@@ -25,6 +26,7 @@ Locate = Callable[[Loc], Place | None]
 Resolve = Callable[[str], Path]
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
+PLACING = ("pose", "rests_on", "inside", "at", "yaw")
 RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 
@@ -73,16 +75,25 @@ class _Builder:
         frames = tuple(self._frames())
         if not self.findings:
             for a, b, depth in overlaps(bodies):
-                late = next(name for name in reversed(self.spec.scene) if name in (a, b))
                 self._error(
                     "TASK226",
                     f"'{a}' and '{b}' start {depth * 1e3:.1f} mm inside each other",
-                    ("scene", late),
+                    self._blamed([name for name in reversed(self.spec.scene) if name in (a, b)]),
                     "move one of them; things that only touch are fine",
                 )
         if self.findings:
             raise InvalidInput(self.findings)
         return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
+
+    def _blamed(self, bodies: Sequence[str]) -> Loc:
+        """Where an argument (`--set`) gave one of these a place or a shape; else the first of them."""
+        for name in bodies:
+            for word in (*PLACING, *SHAPES):
+                for loc in _written(getattr(self.spec.scene[name], word), ("scene", name, word)):
+                    place = self.place(loc)
+                    if place is not None and place.line == 0:
+                        return loc
+        return ("scene", bodies[0])
 
     # -- shapes and mass
 
@@ -287,6 +298,16 @@ class _Builder:
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+
+
+def _written(value: object, loc: Loc) -> Iterator[Loc]:
+    """Where a value stands, and everything below it."""
+    yield loc
+    if isinstance(value, Model):
+        for key in value.model_fields_set:
+            yield from _written(getattr(value, key), (*loc, key))
+    elif isinstance(value, tuple):
+        yield from ((*loc, k) for k in range(len(value)))
 
 
 def pose_transform(spec: PoseSpec) -> Transform:
