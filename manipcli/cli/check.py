@@ -23,7 +23,8 @@ def check(
 ) -> ExitCode:
     """Check files: all findings, nothing simulated.
 
-    The kind (task, robot, controllers) is read from each file.
+    The kind (task, robot, controllers) is read from each file. A task with controllers on efforts is planned, and their
+    gains are looked at over the plan; a step that cannot be planned is an error.
     """
     from manipcli import pipeline
     from manipcli.report import json, text

@@ -86,18 +86,28 @@ class InvalidArgument(InvalidInput, ValueError):
 
 
 class NotPlannable(ManipcliError):
-    """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits."""
+    """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits.
+
+    `loc`: which value below the step's verb is the cause, where it is one; `place`: where that or the step is written.
+    """
 
     exit_code = ExitCode.FAILED
     code = "PLAN100"
 
     def __init__(
-        self, cause: str, *, step: str | None = None, hint: str | None = None, place: Place | None = None
+        self,
+        cause: str,
+        *,
+        step: str | None = None,
+        hint: str | None = None,
+        place: Place | None = None,
+        loc: tuple[str | int, ...] = (),
     ) -> None:
         self.cause = cause
         self.step = step
         self.hint = hint
         self.place = place
+        self.loc = loc
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
 
     @property

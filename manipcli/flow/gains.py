@@ -51,23 +51,24 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
 
     Args:
         task: what is run.
-        plan: of it; None: it is planned here, and where that is not possible the named poses are looked at.
+        plan: of it; None: it is planned here; where that is not possible, that is told, and named poses are looked at.
     """
     robot = task.robot
     loops = _loops(task)
     if not loops:
         return ()
     kinematics = Kinematics(robot, gravity=task.scene.gravity)
+    unplanned: tuple[Finding, ...] = ()
     if plan is None:
         try:
             plan = plan_task(task)
-        except NotPlannable:
-            plan = None  # planning tells why
+        except NotPlannable as refusal:
+            unplanned = refusal.findings
     postures = (
         _planned(task, plan) if plan is not None else Postures.at_rest(named_postures(robot, start_position(task)))
     )
     load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-    return tuple(_findings(task, loops, load, planned=plan is not None))
+    return (*unplanned, *_findings(task, loops, load, planned=plan is not None))
 
 
 def named_postures(robot: RobotModel, start: Array) -> Array:

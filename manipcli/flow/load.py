@@ -298,6 +298,12 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
             for loc, p in told
         ),
     ]
+    links = {link.name for link in robot.links}
+    for number, key, named in ((220, "scene", scene.bodies), (227, "frames", scene.frames)):
+        message, hint = f"robot '{robot.name}' has a link of this name", "choose another: a log has one frame of a name"
+        findings += [
+            task.source.finding(number, (key, one.name), message, hint=hint) for one in named if one.name in links
+        ]
     known = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in known:
         hint = f"poses: {', '.join(known)}"
@@ -311,11 +317,13 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
 
 
 def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
-    """Why the engine of the task cannot hold its robot."""
+    """Why the engine of the task cannot hold its robot: told at the link, or where the task names the robot."""
     engine = task.spec.simulation.engine
     if engine not in ENGINES.names:
         return ()
-    return tuple(replace(finding, place=task.place("robot")) for finding in ENGINES[engine].refuses(robot))
+    return tuple(
+        replace(finding, place=finding.place or task.place("robot")) for finding in ENGINES[engine].refuses(robot)
+    )
 
 
 def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:

@@ -131,7 +131,7 @@ def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPla
     try:
         return STEPS[step.verb].plan(step.body, planner, situation)
     except NotPlannable as refusal:
-        raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint) from refusal
+        raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
 
 
 def start_position(task: Task) -> Array:
@@ -155,7 +155,7 @@ def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[
         try:
             planned = plan_step(planner, step, situation)
         except NotPlannable as refusal:
-            at = task.file.place("steps", k)
+            at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
             raise NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at) from refusal
         yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned, place=task.log_place("steps", k))
         situation = planned.end

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
 
@@ -48,18 +51,45 @@ def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: floa
         _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits.names, tolerance)
 
 
+def verify_written(
+    robot: RobotModel,
+    written: Sequence[tuple[str, float, tuple[str | int, ...]]],
+    *,
+    when: str = "",
+) -> None:
+    """Refuse a position that a user wrote outside of its joint's limits.
+
+    Args:
+        robot: whose joints.
+        written: (joint, position, where below the step's verb it stands).
+        when: of a point that has a time.
+
+    Raises:
+        NotPlannable: names the joint, the position and the limit, and says where that position stands.
+    """
+    for name, value, loc in written:
+        limits = robot.joint(name).limits
+        lower = -np.inf if limits.lower is None else limits.lower
+        upper = np.inf if limits.upper is None else limits.upper
+        if max(lower - value, value - upper) > _POSITION:
+            raise _beyond(name, value, lower, upper, when, loc)
+
+
+def _beyond(
+    name: str, value: float, lower: float, upper: float, when: str, loc: tuple[str | int, ...] = ()
+) -> NotPlannable:
+    word, limit = ("lower", lower) if value < lower else ("upper", upper)
+    return NotPlannable(f"joint '{name}' goes to {value:.4f}{when}, beyond its {word} limit {limit:.4f}", loc=loc)
+
+
 def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
     """The worst position outside its limits, if any."""
     q = trajectory.positions
     outside = np.maximum(limits.lower - q, q - limits.upper)
     k, i = np.unravel_index(int(np.argmax(outside)), outside.shape)
     if outside[k, i] > _POSITION:
-        below = q[k, i] < limits.lower[i]
-        word, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
-        raise NotPlannable(
-            f"joint '{trajectory.names[i]}' goes to {q[k, i]:.4f} at t = {trajectory.times[k]:.3f} s, "
-            f"beyond its {word} limit {limit:.4f}"
-        )
+        when = f" at t = {trajectory.times[k]:.3f} s"
+        raise _beyond(trajectory.names[i], q[k, i], limits.lower[i], limits.upper[i], when)
 
 
 def _bounded(word: str, values: Array, limit: Array, times: Array, names: tuple[str, ...], tolerance: float) -> None:

@@ -91,6 +91,24 @@ def test_an_item_keeps_its_number_when_the_one_before_it_is_faulty(tmp_path: Pat
     assert [text.split(":")[0] for _, _, text in found] == ["steps[0]", "steps[1].move.to"]
 
 
+def test_a_faulty_point_of_a_trajectory_is_told_at_its_line(tmp_path: Path) -> None:
+    points = (
+        ("[a, b]", "{positions: [0, 0, 0], time_from_start: 1}", "points[1].positions: 3 positions for 2 joints"),
+        ("[a, b]", "{positions: [0, 0], time_from_start: 0.5}", "points[1].time_from_start: 0.5 s is not after 0.5 s"),
+        ("[a, b]", "{positions: [0, 0], time_from_start: -1}", "points[1].time_from_start: must be 0 or more, not -1"),
+        ("[a, a]", "{positions: [0, 0], time_from_start: 1}", "joint_names[1]: joint 'a' stands twice"),
+    )
+    text = "steps:\n" + "".join(
+        f"  - follow:\n      joint_names: {names}\n      points:\n"
+        f"        - {{positions: [0, 0], time_from_start: {{nsecs: 500000000}}}}\n        - {point}\n"
+        for names, point, _ in points
+    )
+    found = findings(tmp_path, text)
+    assert [place[:2] for place in found] == [(9, 23), (14, 48), (19, 48), (21, 24)]
+    for (_, _, told), (_, _, expected) in zip(found, points, strict=True):
+        assert expected in told
+
+
 def test_a_faulty_body_is_still_known_by_its_name(tmp_path: Path) -> None:
     found = findings(
         tmp_path, "scene:\n  cup: {box: {size: 1}}\nsteps:\n  - pick: {object: cup, grasp: {posture: wrap}}\n"

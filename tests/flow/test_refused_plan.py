@@ -31,7 +31,7 @@ def test_a_step_that_cannot_be_planned_is_told_at_its_line(
     Path("task.yaml").write_text(TASK)
     assert main([command, "task.yaml"]) == 1
     told = capsys.readouterr()
-    assert "task.yaml:7:5: error[PLAN100]: step 'reach': " in told.out + told.err
+    assert "task.yaml:8:24: error[PLAN100]: step 'reach': " in told.out + told.err
     assert main([command, "task.yaml", "--format", "json"]) == 1
     (error,) = json.loads(capsys.readouterr().out)["errors"]
-    assert (error["file"], error["line"], error["column"]) == ("task.yaml", 7, 5)
+    assert (error["file"], error["line"], error["column"]) == ("task.yaml", 8, 24)

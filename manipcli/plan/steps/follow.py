@@ -25,7 +25,8 @@ from manipcli.plan.names import unknown_joint
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
-from manipcli.spec.base import Model
+from manipcli.plan.verify import verify_written
+from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time
 
 HERE = 1e-3
@@ -75,24 +76,32 @@ class FollowSpec(Model):
 
     @model_validator(mode="after")
     def _sizes(self) -> FollowSpec:
-        n, before = len(self.joint_names), -1.0
-        if len(set(self.joint_names)) != n:
-            raise ValueError("a joint stands twice in `joint_names`")
+        n, before, last = len(self.joint_names), -1.0, len(self.points) - 1
+        for k, name in enumerate(self.joint_names):
+            if name in self.joint_names[:k]:
+                raise problem("duplicate", f"joint '{name}' stands twice", at=("joint_names", k))
         for k, point in enumerate(self.points):
             for word in ("positions", "velocities", "accelerations"):
                 values = getattr(point, word)
                 if len(values) != n and (values or word == "positions"):
-                    raise ValueError(f"point {k}: {len(values)} {word} for {n} joints")
+                    raise problem("count", f"{len(values)} {word} for {n} joints", at=("points", k, word))
             if point.accelerations and not point.velocities:
-                raise ValueError(f"point {k}: accelerations without velocities say no curve; add velocities")
+                message = "accelerations without velocities say no curve; add velocities"
+                raise problem("conflict", message, at=("points", k, "accelerations"))
+            at = ("points", k, "time_from_start")
+            if point.seconds < 0.0:
+                raise problem("range", f"must be 0 or more, not {point.seconds:g} s", at=at)
             if point.seconds <= before:
-                raise ValueError(f"point {k}: time_from_start {point.seconds:g} s is not after {before:g} s")
+                message = f"{point.seconds:g} s is not after {before:g} s, that of the point before"
+                raise problem("conflict", message, at=at)
             before = point.seconds
         if before <= 0.0:
-            raise ValueError("the last point's time_from_start is 0 s: there is no time to move in")
-        moving = [name for name, v in zip(self.joint_names, self.points[-1].velocities, strict=False) if v != 0.0]
-        if moving:
-            raise ValueError(f"the last point must be at rest; its velocity of {moving[0]} is not 0")
+            message = "the last point is at 0 s: there is no time to move in"
+            raise problem("conflict", message, at=("points", last, "time_from_start"))
+        for k, v in enumerate(self.points[-1].velocities):
+            if v != 0.0:
+                message = f"the last point must be at rest; its velocity of {self.joint_names[k]} is not 0"
+                raise problem("conflict", message, at=("points", last, "velocities", k))
         return self
 
 
@@ -105,6 +114,9 @@ def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
     """
     names = spec.joint_names
     start = situation.position[planner.robot.indices(names)]
+    for k, point in enumerate(spec.points):
+        written = [(names[i], value, ("points", k, "positions", i)) for i, value in enumerate(point.positions)]
+        verify_written(planner.robot, written, when=f" at t = {point.seconds:.3f} s")
     points = [
         TrajectoryPoint(point.positions, point.seconds, point.velocities, point.accelerations) for point in spec.points
     ]

@@ -20,6 +20,7 @@ from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.verify import verify_written
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import JointValue
 from manipcli.spec.robot import PoseSpec
@@ -65,6 +66,7 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         chosen = arm if situation.closed and arm else values
         draft.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.speed)
     elif spec.to is not None:
+        verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
         draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
     elif spec.pose is not None:
         X_WT = planner.frame(spec.frame, situation) @ pose_transform(spec.pose)
