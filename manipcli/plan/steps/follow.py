@@ -1,9 +1,9 @@
 """`follow`: a JointTrajectory, written as ROS writes it.
 
-    - follow:
-        joint_names: [joint_1, joint_2]
-        points:
-          - {positions: [0, 0], velocities: [0, 0], time_from_start: {secs: 3}}
+- follow:
+    joint_names: [joint_1, joint_2]
+    points:
+      - {positions: [0, 0], velocities: [0, 0], time_from_start: {secs: 3}}
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
 
-    - move: {to: home}
-    - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
-    - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
+- move: {to: home}
+- move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
+- move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 """
 
 from __future__ import annotations

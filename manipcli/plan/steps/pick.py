@@ -1,6 +1,6 @@
 """`pick`: reach an object, approach it straight, and close the hand on it.
 
-    - pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
+- pick: {object: cup, approach: {from: side, distance: [8 cm, 14 cm]}, grasp: {posture: wrap, force: 8 N}}
 """
 
 from __future__ import annotations
@@ -70,7 +70,8 @@ class PickSpec(Model):
     grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
     open: str = Field("open", description="The pose of the hand while approaching.")
     speed: Speed = Field(
-        1.0, description="Fraction of the velocity and acceleration limits in reaching; the straight approach takes half."
+        1.0,
+        description="Fraction of the velocity and acceleration limits in reaching; the straight approach takes half.",
     )
 
 

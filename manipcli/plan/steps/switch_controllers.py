@@ -1,9 +1,9 @@
 """`switch_controllers`: other controllers take over, between two control ticks; nothing moves.
 
-    - switch_controllers: soft_arm                     # it is active then, and nobody else on its joints
-    - switch_controllers: {to: [soft_arm, hand]}
-    - switch_controllers: {activate: [soft_arm], deactivate: [arm]}
-    - switch_controllers: {deactivate: [hand], strictness: best_effort}
+- switch_controllers: soft_arm                     # it is active then, and nobody else on its joints
+- switch_controllers: {to: [soft_arm, hand]}
+- switch_controllers: {activate: [soft_arm], deactivate: [arm]}
+- switch_controllers: {deactivate: [hand], strictness: best_effort}
 """
 
 from __future__ import annotations
