@@ -25,6 +25,7 @@ from manipcli.flow.sample import load_task
 from manipcli.flow.verify import compared, refused_as_unlike
 from manipcli.flow.vocabulary import meanings
 from manipcli.judge.verdict import INTERRUPTED, Verdict
+from manipcli.record.faults import RecordingFailed
 from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
@@ -79,6 +80,7 @@ def run_task(
 
     Raises:
         InvalidInput: a file or the log's path cannot be used; nothing was simulated.
+        RecordingFailed: the disk refused more of the log.
     """
     began = time.perf_counter()
     task = load_task(
@@ -98,9 +100,19 @@ def run_task(
         progress.warned(doubts)
 
     where = log if log is not None else default_log(task)
-    verdict, simulated, planning = _recorded(
-        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
-    )
+    try:
+        verdict, simulated, planning = _recorded(
+            task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
+        )
+    except RecordingFailed as failure:
+        simulation = task.spec.simulation
+        failure.known = {
+            "task": task.name,
+            "seed": simulation.seed,
+            "engine": simulation.engine,
+            "log": str(failure.partial),
+        }
+        raise
     judged = time.perf_counter()
     timing = Timing(
         load=loaded - began,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
@@ -36,9 +37,16 @@ from manipcli.cli import (
 )
 from manipcli.cli import list as list_
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
+from manipcli.record.faults import RecordingFailed
 
 _INTERRUPTED_BY_TYPER = 130
 """What Typer returns for Ctrl-C instead of letting KeyboardInterrupt through."""
+
+_FULL = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "there is no space left on the disk",
+    errno.EFBIG: "the file may not grow",
+}
 
 _EXIT_CODES = (
     "Exit codes: 0 passed, 1 failed or not plannable, 2 interrupted, 3 internal error, 4 usage or invalid file, "
@@ -109,8 +117,9 @@ def _fail(error: BaseException, *, as_json: bool) -> ExitCode:
     if os.environ.get("MANIPCLI_DEBUG"):
         console.talk("".join(traceback.format_exception(error)).rstrip())
     try:
-        if as_json:
-            console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error"))
+        if as_json and not (isinstance(error, OSError) and error.filename == console.STDOUT):
+            known = error.known if isinstance(error, RecordingFailed) else {}
+            console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error", known=known))
         else:
             console.talk("\n".join(map(text.describe, findings)))
     except OSError:
@@ -131,6 +140,10 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
         return ExitCode.USAGE, (finding,)
     if isinstance(error, KeyboardInterrupt):
         return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
+    if isinstance(error, OSError) and error.errno in _FULL:
+        where = "what was to be written" if error.filename is None else str(error.filename)
+        message = f"{where}: {_FULL[error.errno]} ({error.strerror})"
+        return ExitCode.INTERNAL, (Finding(code="INT001", message=message),)
     if isinstance(error, OSError) and error.filename is not None:
         return ExitCode.USAGE, (Finding(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
     finding = Finding(

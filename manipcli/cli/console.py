@@ -11,12 +11,15 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
 from manipcli.core.text import escape
 
+STDOUT = "standard output"
+"""What stdout is called where it cannot be written."""
 _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[": "36", "hint:": "36"}
 _PAINTED = re.compile("|".join(re.escape(word) for word in _COLOURS))
 
@@ -64,15 +67,8 @@ def result_bytes(path: Path) -> None:
     stream = sys.stdout
     if stream is None or stream.closed:
         return
-    try:
-        with path.open("rb") as file:
-            shutil.copyfileobj(file, stream.buffer)
-        stream.flush()
-    except BrokenPipeError:
-        _abandon(stream)
-    except OSError:
-        _abandon(stream)
-        raise
+    with path.open("rb") as file, _through(stream):
+        shutil.copyfileobj(file, stream.buffer)
 
 
 def talk(text: str) -> None:
@@ -123,15 +119,22 @@ def _dressed(text: str, stream: TextIO | None) -> str:
 
 
 def _write(stream: TextIO | None, text: str) -> None:
-    """Writes through to the end, so that a full disk or a closed pipe is met here and not at exit."""
     if stream is None or stream.closed:
         return
-    try:
+    with _through(stream):
         stream.write(text)
+
+
+@contextmanager
+def _through(stream: TextIO) -> Iterator[None]:
+    """What is written in the block goes through to the end: a full disk or a closed pipe is met here, not at exit."""
+    try:
+        yield
         stream.flush()
     except BrokenPipeError:
         _abandon(stream)
-    except OSError:
+    except OSError as error:
+        error.filename = STDOUT if stream is sys.stdout else "standard error"
         _abandon(stream)
         raise
 

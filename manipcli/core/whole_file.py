@@ -25,7 +25,11 @@ def whole_file(path: Path) -> Iterator[Path]:
         OSError: nothing can be written there.
     """
     if path.exists() and not path.is_file():
-        yield path
+        try:
+            yield path
+        except OSError as error:
+            error.filename = error.filename or str(path)
+            raise
         return
     whole = Path(os.path.realpath(path))
     partial = whole.with_name(f".{whole.name}.{os.getpid()}.partial")
@@ -34,8 +38,9 @@ def whole_file(path: Path) -> Iterator[Path]:
         yield partial
         partial.replace(whole)
     except OSError as error:
-        if error.filename is not None and os.fspath(error.filename) == str(partial):
-            error.filename = str(path)  # the user knows of this one only
+        # What fails while it is written names no file; and the user does not know of the partial one.
+        if error.filename is None or os.fspath(error.filename) == str(partial):
+            error.filename = str(path)
         raise
     finally:
         partial.unlink(missing_ok=True)

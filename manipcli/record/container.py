@@ -281,10 +281,10 @@ def _claim(path: Path, partial: Path, *, overwrite: bool) -> int:
     """Opens `partial`, which nobody else may have, or says why not; nothing is written before every check passed."""
     if path.is_dir():
         raise RecordingRefused(path, "this is a directory", hint="give the name of a file, such as run.mcap")
-    if os.path.lexists(path) and not overwrite:
-        raise RecordingRefused(path, "the file exists", hint="choose another name, or pass --force to replace it")
     if path.exists() and not path.is_file():
         raise RecordingRefused(path, "what is there is no regular file", hint="choose another name; - is stdout")
+    if os.path.lexists(path) and not overwrite:
+        raise RecordingRefused(path, "the file exists", hint="choose another name, or pass --force to replace it")
     if not path.parent.is_dir():
         raise RecordingRefused(path, f"there is no directory {path.parent}", hint="create it first")
     flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | (0 if overwrite else os.O_EXCL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
@@ -18,7 +19,10 @@ class RecordingRefused(InvalidInput):
 
 
 class RecordingFailed(ManipcliError):
-    """The disk refused more. What was written until `time` [s] stays readable in the partial file."""
+    """The disk refused more. What was written until `time` [s] stays readable in the partial file.
+
+    `known`: of the run, by the keys of a report, where a run is what was recorded.
+    """
 
     exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
     code: ClassVar[str] = "LOG200"
@@ -26,6 +30,7 @@ class RecordingFailed(ManipcliError):
     def __init__(self, partial: Path, cause: str, *, time: float) -> None:
         self.partial = partial
         self.time = time
+        self.known: Mapping[str, str | int] = {}
         super().__init__(
             f"the recording stopped after t = {time:.3f} s: {cause}; what was recorded until then is in {partial.name}"
         )

@@ -44,9 +44,11 @@ def render_verdict(verdict: Verdict, log: str) -> str:
     return dumps(_object(verdict=verdict.verdict, judged=verdict, log=log, errors=verdict.errors))
 
 
-def render_errors(findings: Sequence[Finding], verdict: VerdictWord = "error") -> str:
-    """A command that ended before there was anything to judge."""
-    return dumps(_object(verdict=verdict, errors=findings))
+def render_errors(
+    findings: Sequence[Finding], verdict: VerdictWord = "error", *, known: Mapping[str, Json] | None = None
+) -> str:
+    """A command that ended before there was anything to judge; `known`: what it knew of a run by then."""
+    return dumps({**_object(verdict=verdict, errors=findings), **(known or {})})
 
 
 def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
@@ -75,7 +77,7 @@ def _object(
     log: str | None = None,
     timing: Json = None,
     errors: Sequence[Finding] = (),
-) -> Json:
+) -> dict[str, Json]:
     """The one object, its keys always there."""
     return {
         "task": judged.task if judged is not None else None,

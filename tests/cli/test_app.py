@@ -21,6 +21,7 @@ from manipcli.core.geometry import Transform
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.robot import Joint, JointLimits, RobotModel
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
 
 PASSED = Verdict(
@@ -281,5 +282,34 @@ def test_a_full_disk_is_told_and_not_passed_over() -> None:
         check=False,
     )
     assert done.returncode == 3
-    assert "No space left" in done.stderr
-    assert "Traceback" not in done.stderr
+    told = "error[INT001]: standard output: the disk is full (No space left on device)\n"
+    assert done.stderr == told
+
+
+@pytest.mark.parametrize("words", [["list", "steps"], ["list", "steps", "--format", "json"], ["schema", "robot"]])
+def test_what_is_on_a_full_disk_is_named_and_no_bug(
+    words: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path("/dev/full").open("w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main(words) == 3
+    assert capsys.readouterr().err == "error[INT001]: standard output: the disk is full (No space left on device)\n"
+
+
+def test_a_file_on_a_full_disk_is_named(pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
+    pipeline.load_task = lambda *_, **__: SimpleNamespace(spec=SimpleNamespace(task="home"), robot=_robot())
+    pipeline.plan_task = lambda _: SimpleNamespace(motions=())
+    assert main(["plan", "t.yaml", "--csv", "/dev/full"]) == 3
+    assert capsys.readouterr().err == "error[INT001]: /dev/full: the disk is full (No space left on device)\n"
+
+
+def test_what_is_known_of_a_run_whose_log_the_disk_refused_is_told(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failure = RecordingFailed(Path("runs/pour.mcap.partial"), "No space left on device", time=1.5)
+    failure.known = {"task": "pour", "seed": 7, "engine": "pybullet", "log": "runs/pour.mcap.partial"}
+    pipeline.run_task = _raising(failure)
+    assert main(["run", "t.yaml", "--format", "json"]) == 3
+    answer = json.loads(capsys.readouterr().out)
+    assert {key: answer[key] for key in failure.known} == failure.known
+    assert (answer["verdict"], answer["errors"][0]["code"]) == ("error", "LOG200")

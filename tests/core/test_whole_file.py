@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import threading
 from pathlib import Path
@@ -56,3 +57,13 @@ def test_where_nothing_can_be_written_the_name_that_was_given_is_told(tmp_path: 
     with pytest.raises(FileNotFoundError) as refused:
         write_whole(path, b"")
     assert refused.value.filename == str(path)
+
+
+def test_a_full_disk_names_the_file_that_was_given(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    with pytest.raises(OSError, match="full") as refused, whole_file(path):
+        raise OSError(errno.ENOSPC, "full")  # as a write raises it: without a name
+    assert (refused.value.filename, [*tmp_path.iterdir()]) == (str(path), [])
+    with pytest.raises(OSError, match="No space left") as refused:
+        write_whole(Path("/dev/full"), b"x")
+    assert refused.value.filename == "/dev/full"

@@ -310,8 +310,9 @@ class TestRefusedBeforeAnythingIsWritten:
         assert [p.name for p in tmp_path.iterdir()] == ["run.mcap"]
         assert (tmp_path / "run.mcap").read_text() == "mine"
 
+    @pytest.mark.parametrize("overwrite", [True, False])
     @pytest.mark.parametrize("left", ["device", "pipe"])
-    def test_overwriting_replaces_files_alone(self, tmp_path: Path, make_run: MakeRun, left: str) -> None:
+    def test_only_files_are_replaced(self, tmp_path: Path, make_run: MakeRun, left: str, overwrite: bool) -> None:
         path = tmp_path / "run.mcap"
         if left == "pipe":
             os.mkfifo(path)
@@ -319,7 +320,7 @@ class TestRefusedBeforeAnythingIsWritten:
             path.symlink_to("/dev/null")
         before = path.lstat()
         with pytest.raises(RecordingRefused, match=r"no regular file"):
-            make_run(1).recorder(path, overwrite=True)
+            make_run(1).recorder(path, overwrite=overwrite)
         assert path.lstat() == before
         assert [p.name for p in tmp_path.iterdir()] == ["run.mcap"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import mmap
 import struct
 import subprocess
@@ -66,12 +67,15 @@ def test_a_kill_costs_at_most_a_second_and_never_the_log_before(tmp_path: Path, 
 def test_a_file_that_may_not_grow_keeps_what_is_in_it_and_the_log_before(tmp_path: Path) -> None:
     log = tmp_path / "run.mcap"
     log.write_bytes(b"the log of an earlier run")
-    words = f"{sys.executable} -m manipcli run {ROOT}/tasks/pour.yaml --log {log} --force"
+    words = f"{sys.executable} -m manipcli run {ROOT}/tasks/pour.yaml --log {log} --force --format json"
     done = subprocess.run(
         ["bash", "-c", f"ulimit -f 3000; exec {words}"], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 3, done.stderr
-    assert "the recording stopped after t = " in done.stderr
+    answer = json.loads(done.stdout)
+    assert "the recording stopped after t = " in answer["errors"][0]["message"]
+    known = {"task": "pour", "seed": 1, "engine": "pybullet", "log": f"{log}.partial"}
+    assert {key: answer[key] for key in known} == known
     assert "Traceback" not in done.stderr
     assert log.read_bytes() == b"the log of an earlier run"
     partial = tmp_path / "run.mcap.partial"
