@@ -19,6 +19,7 @@ from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
+from manipcli.plan.sampling import LONGEST
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
@@ -174,7 +175,12 @@ class Draft:
             label: of the motion.
             points: what lies between them is linear, cubic or quintic.
             limits: what the curve must keep; infinite where it cannot.
+
+        Raises:
+            NotPlannable: it does not keep them, takes longer than `LONGEST`, or something is in the way.
         """
+        if points.duration > LONGEST:
+            raise NotPlannable(f"the trajectory takes {points.duration:g} s, longer than {LONGEST:g} s")
         period = self._planner.period
         ticks = max(1, int(np.ceil(points.duration / period - 1e-6)))
         times = np.append(np.arange(ticks) * period, points.duration)
@@ -353,9 +359,17 @@ class Draft:
         return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
 
     def _grip_time(self, grip: Grip) -> float:
-        """How long the references take to the target [s]."""
-        here = self._now.position[self._planner.robot.indices(grip.joints)]
-        return float(np.max(np.abs(grip.target - here))) / self._planner.gripper_speed
+        """How long the references take to the target [s].
+
+        Raises:
+            NotPlannable: longer than `LONGEST`.
+        """
+        here, speed = self._now.position[self._planner.robot.indices(grip.joints)], self._planner.gripper_speed
+        duration = float(np.max(np.abs(grip.target - here))) / speed
+        if duration > LONGEST:
+            message = f"with the speed of its controller, {speed:g}, the hand takes more than {LONGEST:g} s"
+            raise NotPlannable(message, hint="raise `speed` of the gripper controller")
+        return duration
 
 
 def _no_gripper(posture: str) -> NotPlannable:

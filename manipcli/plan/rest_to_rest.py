@@ -13,7 +13,7 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.limits import MotionLimits
-from manipcli.plan.sampling import on_ticks
+from manipcli.plan.sampling import on_ticks, refuse_endless
 from manipcli.plan.trajectory import JointTrajectory
 
 
@@ -34,7 +34,7 @@ def rest_to_rest(
         duration: slow down to this [s], if given.
 
     Raises:
-        NotPlannable: `duration` is too short, or a position is not finite.
+        NotPlannable: `duration` is too short, the limits make it too long, or a position is not finite.
     """
     import ruckig
 
@@ -51,6 +51,7 @@ def rest_to_rest(
     def bound(limit: Array) -> float:
         return float(np.min(limit[moving] / np.abs(delta[moving])))
 
+    refuse_endless(np.stack((q0, q1)), limits)  # Ruckig cannot time what takes hours
     problem = ruckig.InputParameter(1)
     problem.current_position, problem.target_position = [0.0], [1.0]
     problem.max_velocity = [bound(limits.velocity)]

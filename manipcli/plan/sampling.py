@@ -15,6 +15,8 @@ from manipcli.plan.trajectory import JointTrajectory
 Curve = Callable[[Array], tuple[Array, Array, Array]]
 """times (k,) [s] -> position, velocity, acceleration, each (k, n)."""
 
+LONGEST = 600.0
+"""[s] of one motion. A longer one comes of a limit that is mistyped, and a trajectory has a point a control tick."""
 _ROUNDS = 6  # each stretches by what the samples exceed; 2 suffice, the rest is for jerk across kinks
 
 
@@ -30,6 +32,33 @@ def excess(velocities: Array, accelerations: Array, limits: MotionLimits, *, per
         jerk = np.abs(np.diff(accelerations, axis=0)) / period
         factor = max(factor, float(np.cbrt(np.max(jerk / limits.jerk))))
     return factor
+
+
+def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0) -> None:
+    """Refuse a motion from rest to rest along `positions` (k, n) that takes longer than `LONGEST`.
+
+    For its way d a joint needs at least d / v and 2 sqrt(d / a), and where the motion is straight cbrt(32 d / j).
+
+    Args:
+        positions: the path, by points on it; two are a straight line.
+        limits: of its joints.
+        duration: [s] that the motion is known to take.
+
+    Raises:
+        NotPlannable: names the joint that needs longest, and the limit that makes it so slow.
+    """
+    way = np.abs(np.diff(positions, axis=0)).sum(axis=0)
+    with np.errstate(over="ignore"):
+        squares, cubes = way / limits.acceleration, way / limits.jerk
+        least = np.array([way / limits.velocity, 2.0 * np.sqrt(squares), np.cbrt(32.0 * cubes)])
+    if max(duration, float(least[: 3 if len(positions) == 2 else 2].max())) <= LONGEST:
+        return
+    which, k = np.unravel_index(int(np.argmax(least)), least.shape)
+    word, joint = ("velocity", "acceleration", "jerk")[which], limits.names[k]
+    raise NotPlannable(
+        f"with the {word} limit of joint '{joint}' the motion takes more than {LONGEST:g} s",
+        hint="raise that limit, or the `speed` of the step; no motion is planned that takes longer",
+    )
 
 
 def on_ticks(
@@ -55,11 +84,12 @@ def on_ticks(
         duration: wished duration [s]; the motion is slowed down to it.
 
     Raises:
-        NotPlannable: `duration` is shorter than the limits allow.
+        NotPlannable: `duration` is shorter than the limits allow, or they make the motion longer than `LONGEST`.
     """
     wished = 1 if duration is None else _ticks(duration, period)
     stretch = 1.0
     for _ in range(_ROUNDS):
+        refuse_endless(curve(np.linspace(0.0, nominal, 100))[0], limits, nominal * stretch)
         least = max(1, _ticks(nominal * stretch, period))
         ticks = max(least, wished)
         times = np.arange(ticks + 1) * period
