@@ -160,7 +160,7 @@ def _bounds(said: list[Any], unit: str) -> Iterator[str]:
     for one in said:
         for key, word in _BOUNDS.items():
             if hasattr(one, key):
-                yield f"{word} {readable(value, unit) if (value := getattr(one, key)) else 0}"
+                yield f"{word} {readable(value, unit, digits=4) if (value := getattr(one, key)) else 0}"
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -62,6 +62,8 @@ Length = Annotated[float, Unit((units.LENGTH,))]
 Angle = Annotated[float, Unit((units.ANGLE,))]
 Mass = Annotated[float, Unit((units.MASS,))]
 Time = Annotated[float, Unit((units.TIME,))]
+Pause = Annotated[Time, Field(le=3600.0)]
+"""A time that is waited: an hour at most."""
 Frequency = Annotated[float, Unit((units.FREQUENCY,))]
 Force = Annotated[float, Unit((units.FORCE,))]
 Speed = Annotated[float, Unit((units.SPEED,))]

@@ -15,18 +15,18 @@ from pydantic import Field, field_validator, model_validator
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
-from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Time
+from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Pause, Time
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 from manipcli.spec.vary import VarySpec
 
 __all__ = [
-    "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "Positive", "RatesSpec",
-    "RecordSpec", "SimulationSpec", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
+    "BodySpec", "BoxSpec", "CupSpec", "CylinderSpec", "Fraction", "FrameSpec", "MeshSpec", "RatesSpec",
+    "RecordSpec", "SimulationSpec", "Size", "SphereSpec", "StepSpec", "TaskSpec", "TraySpec", "UrdfSpec", "Vector3",
 ]  # fmt: skip
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[Length, Field(gt=0)]
+Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
 
 
 class SimulationSpec(Model):
@@ -61,43 +61,45 @@ class SimulationSpec(Model):
 class BoxSpec(Model):
     """A solid box; its frame is at its centre."""
 
-    size: tuple[Positive, Positive, Positive] = Field(description="Full lengths along x, y, z [m], above 0.")
+    size: tuple[Size, Size, Size] = Field(description="Full lengths along x, y, z [m], 1 um to 100 m.")
 
 
 class SphereSpec(Model):
     """A solid sphere; its frame is at its centre."""
 
-    radius: Positive = Field(description="[m], above 0.")
+    radius: Size = Field(description="[m], 1 um to 100 m.")
 
 
 class CylinderSpec(Model):
     """A solid upright cylinder; its frame is in the middle of its bottom."""
 
-    radius: Positive = Field(description="[m], above 0.")
-    height: Positive = Field(description="[m], above 0.")
+    radius: Size = Field(description="[m], 1 um to 100 m.")
+    height: Size = Field(description="[m], 1 um to 100 m.")
 
 
 class CupSpec(Model):
     """An open cup: a floor disc and a ring of `segments` wall boxes; its frame is in the middle of its bottom."""
 
-    radius: Positive = Field(description="Outer radius [m], above 0.")
-    height: Positive = Field(description="Outer height [m], above 0.")
-    wall: Positive = Field(0.004, description="Thickness of wall and floor [m], above 0. Default 4 mm.")
+    radius: Size = Field(description="Outer radius [m], 1 um to 100 m.")
+    height: Size = Field(description="Outer height [m], 1 um to 100 m.")
+    wall: Size = Field(0.004, description="Thickness of wall and floor [m], 1 um to 100 m. Default 4 mm.")
     segments: Annotated[int, Field(ge=6, le=64, description="Wall boxes, 6 to 64. Default 16.")] = 16
 
 
 class TraySpec(Model):
     """An open tray: floor and four walls; its frame is in the middle of its bottom."""
 
-    size: tuple[Positive, Positive, Positive] = Field(description="Outer lengths along x, y, z [m], above 0.")
-    wall: Positive = Field(0.005, description="Thickness of walls and floor [m], above 0. Default 5 mm.")
+    size: tuple[Size, Size, Size] = Field(description="Outer lengths along x, y, z [m], 1 um to 100 m.")
+    wall: Size = Field(0.005, description="Thickness of walls and floor [m], 1 um to 100 m. Default 5 mm.")
 
 
 class MeshSpec(Model):
     """A mesh file (STL, OBJ, Collada), used as its convex hull."""
 
     file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
-    scale: Annotated[float, Field(gt=0, description="Factor on all three axes, above 0. Default 1.")] = 1.0
+    scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
+        1.0
+    )
 
 
 class UrdfSpec(Model):
@@ -125,7 +127,9 @@ class BodySpec(Model):
     yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies.")
     fixed: bool = Field(False, description="Never moves. Default false.")
-    mass: Annotated[Mass, Field(gt=0)] | None = Field(None, description="[kg], above 0; needed unless `fixed`, `urdf`.")
+    mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
+        None, description="[kg], above 0 to 100 t; needed unless `fixed`, `urdf`."
+    )
     friction: Annotated[float, Field(ge=0, description="Coefficient of sliding, 0 or more. Default 0.8.")] = 0.8
     rolling_friction: Annotated[float, Field(ge=0, description="Coefficient of rolling, 0 or more. Default 0.")] = 0.0
     spinning_friction: Annotated[float, Field(ge=0, description="Coefficient of turning on the spot. Default 0.")] = 0.0
@@ -214,7 +218,9 @@ class StepSpec(KeyedSpec):
         None,
         description="What the step waits for when it has moved (`pour`: in its dwell), 30 s or until its `timeout`.",
     )
-    timeout: Annotated[Time, Field(gt=0)] | None = Field(None, description="Fails the step after this [s], above 0.")
+    timeout: Annotated[Pause, Field(gt=0)] | None = Field(
+        None, description="Fails the step after this [s], above 0 to 1 h."
+    )
     on_fail: OnFail = Field(
         "stop",
         description="After a failure: `stop` ends the run, `continue` goes on (the step does not count then), "

@@ -45,5 +45,5 @@ def test_every_field_has_a_type_and_a_meaning() -> None:
     assert told["by"][:2] == ["length, or [length, length]", "`[80 mm, 200 mm]`"]
     assert told["tilt"][:2] == ["angle, above 0, at most 180 deg", "`120 deg`"]
     assert told["points[].time_from_start"][:2] == ["time, or mapping", "needed"]
-    assert told["timeout"][:2] == ["time, above 0", "-"]
+    assert told["timeout"][:2] == ["time, at most 3600 s, above 0", "-"]
     assert {"id", "until", "on_fail.retry", "approach.from", "retreat", "to"} <= told.keys()

@@ -34,7 +34,7 @@ from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Time
+from manipcli.spec.quantity import Angle, Pause
 
 TURNS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 50.0, -50.0, 75.0, -75.0)
 """Turns of the hand about the vertical that are tried, away from how the cup is held."""
@@ -47,7 +47,7 @@ class PourSpec(Model):
     object: str = Field(description="The container that is held and tilted.")
     into: str = Field(description="The container that receives.")
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
-    dwell: Annotated[Time, Field(ge=0, description="How long to stay tilted [s]; `until` prolongs it.")] = 1.0
+    dwell: Annotated[Pause, Field(ge=0, description="How long to stay tilted [s], to 1 h; `until` prolongs it.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
     speed: Speed = Field(0.5, description="Fraction of the velocity and acceleration limits, in carrying and tilting.")
 

@@ -20,13 +20,13 @@ from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model, or_short
-from manipcli.spec.quantity import Time
+from manipcli.spec.quantity import Pause, Time
 
 
 class WaitSpec(Model):
     """Hold still for a time; with `until` on the step, at least that long and until the condition holds."""
 
-    duration: Annotated[Time, Field(ge=0, description="How long [s].")] = 0.0
+    duration: Annotated[Pause, Field(ge=0, description="How long [s], to 1 h.")] = 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -36,7 +36,7 @@ class WaitSpec(Model):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
-        return or_short(schema, handler, TypeAdapter(Time).json_schema() | {"minimum": 0})
+        return or_short(schema, handler, TypeAdapter(Time).json_schema() | {"minimum": 0, "maximum": 3600})
 
 
 def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:

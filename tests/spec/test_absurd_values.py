@@ -1,0 +1,62 @@
+"""Values that nobody means are refused where they stand: they would run for days, or leave the range of numbers."""
+
+from __future__ import annotations
+
+import pytest
+
+from manipcli.core.errors import InvalidInput
+from manipcli.flow.vocabulary import task_spec
+from manipcli.spec.load import load_task_text
+
+TASK = """\
+task: t
+robot: r.yaml
+controllers: c.yaml
+scene:
+  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, pose: {}}
+  ball: {sphere: {radius: 1 cm}, mass: 1, pose: {}}
+  thing: {mesh: {file: a.stl, scale: 0.001}, mass: 1, pose: {}}
+steps:
+  - wait: 1 s
+  - pour: {object: block, into: ball, dwell: 1 s}
+    timeout: 10 s
+"""
+
+
+def refused(written: str, instead: str) -> str:
+    with pytest.raises(InvalidInput) as told:
+        load_task_text(TASK.replace(written, instead), "t.yaml", model=task_spec())
+    (finding,) = told.value.findings
+    return str(finding)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "told"),
+    [
+        ("wait: 1 s", "wait: 1e9 s", "t.yaml:9:11: error[TASK204]: steps[0].wait: must be at most 3600, not"),
+        ("wait: 1 s", "wait: {duration: 61 min}", "must be at most 3600, not '61 min'"),
+        ("dwell: 1 s", "dwell: 2 h", "must be at most 3600, not '2 h'"),
+        ("timeout: 10 s", "timeout: 1e9 s", "must be at most 3600, not '1e9 s'"),
+        ("timeout: 10 s", "timeout: 0", "must be more than 0, not 0"),
+        (
+            "mass: 80 g",
+            "mass: 1e300",
+            "t.yaml:5:50: error[TASK204]: scene.block.mass: must be at most 100000, not 1e+300",
+        ),
+        ("mass: 80 g", "mass: 101 t", "must be at most 100000, not '101 t'"),
+        ("[4 cm, 4 cm, 5 cm]", "[4 cm, 1e300, 5 cm]", "scene.block.box.size[1]: must be at most 100, not 1e+300"),
+        ("[4 cm, 4 cm, 5 cm]", "[4 cm, 4 cm, 1e-300]", "scene.block.box.size[2]: must be at least 1e-06, not 1e-300"),
+        ("radius: 1 cm", "radius: 0", "scene.ball.sphere.radius: must be at least 1e-06, not 0"),
+        ("scale: 0.001", "scale: 1e300", "scene.thing.mesh.scale: must be at most 1e+06, not 1e+300"),
+    ],
+)
+def test_it_is_told_with_the_most_that_is_taken(written: str, instead: str, told: str) -> None:
+    assert told in refused(written, instead)
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [("wait: 1 s", "wait: 1 h"), ("timeout: 10 s", "timeout: 1 h"), ("mass: 80 g", "mass: 100 t"), ("1 cm", "100 m")],
+)
+def test_the_most_is_taken(written: str, instead: str) -> None:
+    load_task_text(TASK.replace(written, instead), "t.yaml", model=task_spec())
