@@ -31,7 +31,8 @@ from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.plan import retimer
-from manipcli.plan.claims import Claims
+from manipcli.plan.claims import Claims, no_hand
+from manipcli.plan.names import UnknownPosture
 from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -265,6 +266,8 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, scene)
+        if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
+            unknown = (no_hand(robot), *(p for p in unknown if not isinstance(p, UnknownPosture)))
         found += [(at, p) for p in unknown]
         if claims is not None and not unknown:
             without = member.uncommanded(step.body, robot, claims)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
+from manipcli.core.text import any_of, nearest
 from manipcli.model.located_xml import shown_path
 
 LEVELS_ABOVE = 5
@@ -138,11 +139,15 @@ class Packages:
         return self._checked(path, uri, roots)
 
     def _checked(self, path: Path, uri: str, roots: Sequence[Path]) -> Path:
+        def inside(real: Path) -> bool:
+            return self._allow_outside or any(real.is_relative_to(root) for root in roots)
+
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            raise NotFound(f"'{uri}' is not found; searched {shown_path(path)}") from error
-        if not self._allow_outside and not any(real.is_relative_to(root) for root in roots):
+            hint = _meant(path) if inside(Path(os.path.realpath(path))) else None
+            raise NotFound(f"'{uri}' is not found; searched {shown_path(path)}", hint=hint) from error
+        if not inside(real):
             raise Outside(
                 f"'{uri}' lies outside of the description's folder and packages",
                 hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside",
@@ -189,6 +194,15 @@ class Unread(Packages):
 
 def _uri(root: Path, path: Path) -> str:
     return f"package://{root.name}/{path.relative_to(root).as_posix()}"
+
+
+def _meant(path: Path) -> str | None:
+    """The file beside it with nearly this name."""
+    try:
+        near = nearest(path.name, sorted(entry.name for entry in path.parent.iterdir()))
+    except OSError:
+        return None
+    return f"did you mean {any_of(near)}?" if near else None
 
 
 def _installed_package(name: str) -> Path | None:

@@ -41,7 +41,10 @@ class UnknownArgument(NameError):
     """`$(arg NAME)` of an argument that has neither a value nor a default."""
 
     def __init__(self, name: str, known: Collection[str]) -> None:
-        self.hint = did_you_mean(name, known) or f"pass it: {name}:=VALUE"
+        self.hint = (
+            did_you_mean(name, known)
+            or f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
+        )
         super().__init__(f"argument '{name}' is not given and has no default")
 
 

@@ -16,6 +16,7 @@ from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
 Loc = tuple[str | int, ...]
+_GRIPPER = "add a controller of type `gripper` for the hand's joints to the controllers file"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,9 +135,13 @@ def unmoved_tool(claims: Claims, robot: RobotModel, loc: Loc) -> tuple[Problem, 
 def unmoved_hand(claims: Claims, robot: RobotModel, posture: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if one gripper controller moves the hand to this pose of the robot."""
     if not set(robot.pose(posture).joints) & set(claims.hand):
-        hint = "add a controller of type `gripper` for the hand's joints to the controllers file"
-        return (Problem(loc, f"pose '{posture}' has no joint that a gripper controller moves", hint),)
+        return (Problem(loc, f"pose '{posture}' has no joint that a gripper controller moves", _GRIPPER),)
     return _not_one_hand(claims, loc)
+
+
+def no_hand(robot: RobotModel) -> Problem:
+    """What keeps a robot from every step with a hand."""
+    return Problem((), f"no gripper controller moves a hand of robot '{robot.name}'", _GRIPPER)
 
 
 def _not_one_hand(claims: Claims, loc: Loc) -> tuple[Problem, ...]:

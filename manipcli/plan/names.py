@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
@@ -15,6 +16,16 @@ Loc = tuple[str | int, ...]
 def unknown_pose(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if the robot has a pose of this name."""
     return _unknown(name, (pose.name for pose in robot.poses), f"robot '{robot.name}' has no pose '{name}'", loc)
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownPosture(Problem):
+    """An unknown pose that a hand is to take."""
+
+
+def unknown_posture(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if the robot has a pose of this name, for its hand."""
+    return tuple(UnknownPosture(loc, one.message, one.hint) for one in unknown_pose(robot, name, loc))
 
 
 def unknown_joint(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:

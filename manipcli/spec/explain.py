@@ -52,7 +52,7 @@ _MISTAKES = {
     "missing": 202, "extra_forbidden": 201, "literal_error": 203, "value_error": 208, "assertion_error": 208,
     "quantity_type": 205, "too_short": 206, "too_long": 206, "string_too_short": 206, "string_too_long": 206,
     "greater_than": 204, "greater_than_equal": 204, "less_than": 204, "less_than_equal": 204, "multiple_of": 204,
-    "finite_number": 204, "string_pattern_mismatch": 208, "union_tag_invalid": 203, "union_tag_not_found": 202,
+    "finite_number": 204, "union_tag_invalid": 203, "union_tag_not_found": 202,
 }  # fmt: skip
 _EXPECTED = {
     "float_type": "a number", "int_type": "a whole number", "bool_type": "true or false", "string_type": "a text",
@@ -82,7 +82,7 @@ class _Complaint:
         return len(self.path) == depth and (self.error["type"] in _EXPECTED or self.error["type"] in _WHOLE)
 
 
-_WHOLE = frozenset({"literal_error", "quantity_type", "unit", "string_pattern_mismatch"})
+_WHOLE = frozenset({"literal_error", "quantity_type", "unit"})
 
 
 def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Finding, ...]:
@@ -207,8 +207,6 @@ def _told(
         return _wrong_count(context, node), None
     if kind in _RANGES:
         return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", None
-    if kind == "string_pattern_mismatch":
-        return f"{shown(node)} does not look like {context.get('pattern')}", None
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
     expected = _expected(first)

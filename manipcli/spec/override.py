@@ -131,7 +131,8 @@ def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, 
     where = f"in '{dotted(done)}'" if done else "at the top of the file"
     hint = did_you_mean(part, known, kind="there are")
     if hint is None:
-        hint = f"nothing stands there yet: give the whole of it, {'.'.join(map(str, (*done, part)))}={{...}}"
+        path = ("robot", *done, part) if override.area == "ROBOT" else (*done, part)
+        hint = f"nothing stands there yet: give the whole of it, {'.'.join(map(str, path))}={{...}}"
     raise _nowhere(override, f"there is no '{escape(part)}' {where}", hint)
 
 

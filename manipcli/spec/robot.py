@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from manipcli.core.text import shorten
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
     Angle,
@@ -19,9 +21,22 @@ from manipcli.spec.quantity import (
 )
 
 Vector3 = tuple[Length, Length, Length]
+_VERSION = re.compile(r"\d+\.\d+\.\d+")
+
+
+def _three_numbers(version: str | None) -> str | None:
+    if version is not None and not _VERSION.fullmatch(version):
+        raise problem("conflict", f"'{shorten(version)}' is no version: expected three numbers, as '0.1.0'")
+    return version
+
+
 Version = Annotated[
     str | None,
-    Field(description="The least version of manipcli that reads this file, as '0.1.0'.", pattern=r"^\d+\.\d+\.\d+$"),
+    Field(
+        description="The least version of manipcli that reads this file, as '0.1.0'.",
+        json_schema_extra={"pattern": rf"^{_VERSION.pattern}$"},
+    ),
+    AfterValidator(_three_numbers),
 ]
 Arguments = dict[str, str | int | float | bool]
 

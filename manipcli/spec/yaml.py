@@ -26,6 +26,7 @@ from __future__ import annotations
 import codecs
 import math
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NoReturn, Protocol
@@ -348,15 +349,16 @@ class _Composer:
         if _TRUE.fullmatch(text) or _FALSE.fullmatch(text):
             return bool(_TRUE.fullmatch(text))
         whole, based = _INT.fullmatch(text), _BASED.fullmatch(text)
-        if (whole or based) and len(text) <= _LONGEST_NUMBER:
-            return int(text) if whole else int(text, 0)
+        number = int(text, 0 if based else 10) if (whole or based) and len(text) <= _LONGEST_NUMBER else None
+        if number is not None and abs(number) <= sys.float_info.max:
+            return number
         if self.infinite and _INFINITE.fullmatch(text):
             return -math.inf if text.startswith("-") else math.inf
         if _NOT_FINITE.fullmatch(text):
-            self.tell("YAML111", f"'{text}' is not a finite number", event, "quotes make it a text")
+            self.tell("YAML111", f"'{text}' is not a finite number", event, "write a finite number")
             return 0.0
         if whole or based or _FLOAT.fullmatch(text):
-            value = math.inf if len(text) > _LONGEST_NUMBER else float(text)
+            value = math.inf if len(text) > _LONGEST_NUMBER or number is not None else float(text)
             if math.isfinite(value):
                 return value
             self.tell("YAML111", f"'{shorten(text, width=24)}' is too large to be a number", event)

@@ -122,3 +122,25 @@ def test_a_missing_robot_file_is_told_where_it_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as refused:
         load_task(file)
     assert [(f.place.line, f.place.column) for f in refused.value.findings if f.place] == [(2, 8), (3, 14)]
+
+
+def test_a_robot_without_a_hand_is_not_asked_for_poses_of_one(tmp_path: Path) -> None:
+    folder = ROOT / "examples" / "04_own_robot"
+    file = tmp_path / "bad.yaml"
+    file.write_text(
+        f"""\
+task: bad
+robot: {folder}/robot.yaml
+controllers: {folder}/controllers.yaml
+scene:
+  cup: {{cup: {{radius: 3 cm, height: 10 cm}}, mass: 0.1, pose: {{xyz: [0.4, 0, 0]}}}}
+steps:
+  - pick: {{object: cop}}
+  - release: {{}}
+"""
+    )
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file)
+    told = [(f.place and f.place.line, f.message.partition(": ")[2]) for f in refused.value.findings]
+    handless = "no gripper controller moves a hand of robot 'reacher'"
+    assert told == [(7, handless), (7, "'cop' is not a movable body of the scene"), (8, handless)]

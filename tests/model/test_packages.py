@@ -115,3 +115,20 @@ def test_a_portable_uri_resolves_to_the_same_file(tree: Path) -> None:
     mesh = packages.resolve("../meshes/a.stl")
     assert packages.portable(mesh) == "package://arm/meshes/a.stl"
     assert packages.resolve(packages.portable(mesh)) == mesh
+
+
+@pytest.mark.parametrize(
+    ("uri", "hint"), [("arn.urdf", "arm.urdf"), ("../meshes/texture.png", None), ("none/arm.urdf", None)]
+)
+def test_the_file_that_was_meant_is_named(tree: Path, uri: str, hint: str | None) -> None:
+    with pytest.raises(NotFound) as refused:
+        Packages(tree / "arm" / "urdf" / "arm.urdf").resolve(uri)
+    assert refused.value.hint == (None if hint is None else f"did you mean '{hint}'?")
+
+
+def test_what_lies_outside_is_not_named_either(tree: Path) -> None:
+    description = tree / "arm" / "urdf" / "arm.urdf"
+    for allowed, hint in ((False, None), (True, "did you mean 'secret.txt'?")):
+        with pytest.raises(NotFound) as refused:
+            Packages(description, allow_outside=allowed).resolve("../../../secrt.txt")
+        assert refused.value.hint == hint

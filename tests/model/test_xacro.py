@@ -181,6 +181,14 @@ def test_what_is_no_plain_xml_description_is_refused(tmp_path: Path, text: str) 
         assert caught.value.findings[0].place is not None
 
 
+def test_an_argument_without_a_value_is_told_with_both_ways_to_give_one(tmp_path: Path) -> None:
+    (finding,) = refused(tmp_path, '<link name="$(arg prefix)"/>').findings
+    assert finding.code == "XACRO003"
+    assert "`args: {prefix: VALUE}` in a robot file" in (finding.hint or "")
+    assert "prefix:=VALUE" in (finding.hint or "")
+    assert expand(tmp_path, '<link name="$(arg prefix)"/>', prefix="a") is not None
+
+
 def test_an_argument_that_the_description_does_not_have_is_told(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"'sied'.*it has: side"):
         expand(tmp_path, '<xacro:arg name="side" default="left"/><link name="$(arg side)"/>', sied="right")

@@ -14,7 +14,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_pose
+from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
@@ -49,7 +49,7 @@ def plan(spec: GraspSpec, planner: Planner, situation: Situation) -> StepPlan:
 
 def check(spec: GraspSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown object or posture."""
-    found = unknown_pose(robot, spec.posture, ("posture",))
+    found = unknown_posture(robot, spec.posture, ("posture",))
     return found if spec.object is None else found + unknown_body(scene, spec.object, ("object",), movable=True)
 
 

@@ -21,7 +21,7 @@ from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.inverse_kinematics import NOT_SO
-from manipcli.plan.names import unknown_pose
+from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
@@ -176,8 +176,8 @@ def check(spec: PickSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...
     """Unknown object or postures."""
     return (
         unknown_body(scene, spec.object, ("object",), movable=True)
-        + unknown_pose(robot, spec.grasp.posture, ("grasp", "posture"))
-        + unknown_pose(robot, spec.open, ("open",))
+        + unknown_posture(robot, spec.grasp.posture, ("grasp", "posture"))
+        + unknown_posture(robot, spec.open, ("open",))
     )
 
 

@@ -20,7 +20,7 @@ from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_pose
+from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
@@ -164,7 +164,7 @@ def _surface(under: Body) -> tuple[float, tuple[float, float]]:
 def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown bodies and postures; a place without a support."""
     found = unknown_body(scene, spec.object, ("object",), movable=True)
-    found += unknown_pose(robot, spec.posture, ("posture",))
+    found += unknown_posture(robot, spec.posture, ("posture",))
     if spec.on is not None and spec.on == spec.object:
         found += (Problem(loc=("on",), message=f"'{spec.object}' cannot be placed on itself"),)
     elif spec.on is not None:

@@ -12,7 +12,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand
 from manipcli.plan.draft import Draft
-from manipcli.plan.names import unknown_pose
+from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.spec.base import Model
@@ -33,7 +33,7 @@ def plan(spec: ReleaseSpec, planner: Planner, situation: Situation) -> StepPlan:
 
 def check(spec: ReleaseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
     """Unknown posture."""
-    return unknown_pose(robot, spec.posture, ("posture",))
+    return unknown_posture(robot, spec.posture, ("posture",))
 
 
 def uncommanded(spec: ReleaseSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:

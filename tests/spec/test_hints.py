@@ -1,0 +1,50 @@
+"""Hints lead somewhere: what they say to write is taken, and messages say in words what was expected."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.spec.load import load_robot_text
+from manipcli.spec.yaml import parse
+
+ROBOT = "robot: r\ndescription: r.urdf\n"
+
+
+def refused(text: str, *overrides: str) -> Finding:
+    with pytest.raises(InvalidInput) as error:
+        load_robot_text(text, "r.yaml", overrides=overrides)
+    (finding,) = error.value.findings
+    return finding
+
+
+def test_what_an_override_is_told_to_give_whole_is_taken() -> None:
+    hint = refused(ROBOT, "robot.limits.a.velocity=2").hint or ""
+    path = re.search(r"robot\.limits\.a=", hint)
+    assert path is not None, hint
+    assert load_robot_text(ROBOT, "r.yaml", overrides=[f"{path.group()}{{velocity: 2}}"]).spec.limits["a"].velocity == 2
+
+
+@pytest.mark.parametrize("version", ["9.0", "v1.2.3", "1.2.3 ", "latest"])
+def test_a_version_is_explained_in_words(version: str) -> None:
+    finding = refused(f'{ROBOT}version: "{version}"\n')
+    assert (finding.code, finding.place and finding.place.line) == ("ROBOT208", 3)
+    assert finding.message == f"version: '{version}' is no version: expected three numbers, as '0.1.0'"
+
+
+@pytest.mark.parametrize("number", ["9" * 400, "-" + "9" * 309, "0x" + "f" * 300, "9" * 3000])
+def test_a_number_beyond_all_others_is_too_large(number: str) -> None:
+    with pytest.raises(InvalidInput, match="is too large to be a number"):
+        parse(f"a: {number}", "f.yaml")
+
+
+def test_the_greatest_whole_numbers_are_read() -> None:
+    root = parse(f"a: {'9' * 308}", "f.yaml")
+    assert root is not None
+    assert refused(f"{ROBOT}default_acceleration: -{'9' * 308}\n").code == "ROBOT204"
+
+
+def test_what_is_not_finite_is_not_said_to_be_a_text() -> None:
+    assert refused(f"{ROBOT}friction: .nan\n").hint == "write a finite number"
