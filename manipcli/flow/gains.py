@@ -1,7 +1,8 @@
 """Can the gains of a task work? Asked before anything moves, over the postures in which the robot will be.
 
 Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
-and whether there is effort enough for gravity, for the planned motions, and for standing near where it is to stand.
+and whether there is effort enough for gravity, for the planned motions and grasps, and for standing near where it is
+to stand.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Held:
 
 
 def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
-    """Warnings about gains, with the number that would do, each at its place in the controllers file.
+    """Warnings about gains and efforts, with the number that would do, each at its place in controllers file or task.
 
     Args:
         task: what is run.
@@ -68,7 +69,8 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         _planned(task, plan) if plan is not None else Postures.at_rest(named_postures(robot, start_position(task)))
     )
     load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-    return (*unplanned, *_findings(task, loops, load, planned=plan is not None))
+    strained = () if plan is None else _strained(task, plan)
+    return (*unplanned, *strained, *_findings(task, loops, load, planned=plan is not None))
 
 
 def named_postures(robot: RobotModel, start: Array) -> Array:
@@ -227,6 +229,26 @@ def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Itera
             f", more than its tolerance of {loop.tolerance:.2g} {length}"
         )
         yield Finding("CTRL156", message, place, "gravity_compensation: true carries it, or an i gain", "warning")
+
+
+def _strained(task: Task, plan: Plan) -> Iterator[Finding]:
+    """Grasps with more force than a finger that slides can press with.
+
+    Fingers that mimic it take their part: the effort is that of all of them, f (1 + sum |multiplier|).
+    """
+    owners = [one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec)]
+    for k, step in enumerate(plan.steps):
+        grips = [motion.grip for motion in step.plan.motions if motion.grip is not None]
+        for force, name in ((grip.force, name) for grip in grips if grip.force is not None for name in grip.joints):
+            joint = task.robot.joint(name)
+            limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
+            mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
+            fingers = 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
+            most = min((limit for limit in limits if limit), default=math.inf) / fingers
+            if joint.type == "prismatic" and force > most:
+                message = f"step '{step.id}': a grasp with {force:.3g} N; {name} presses with {most:.3g} N at most"
+                hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
+                yield Finding("TASK238", message, task.file.place("steps", k), hint, "warning")
 
 
 def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Finding]:

@@ -85,6 +85,24 @@ def test_an_effort_limit_below_gravity_or_below_the_plan_is_told() -> None:
     assert "the planned motions need up to" in lags.message
 
 
+def test_a_grasp_with_more_force_than_the_jaw_has_is_told(tmp_path: Path) -> None:
+    """The Panda's description limits a finger to 20 N, half of which goes to the finger that mimics it.
+
+    So it does in the simulation: with a force of 500 N each finger presses the block with 10.00 N.
+    """
+    file = tmp_path / "task.yaml"
+    file.write_text(
+        f"task: t\nrobot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"
+        "steps:\n  - wait: 0.1 s\n  - grasp: {until: posture, force: 9 N}\n  - release:\n"
+    )
+    assert findings(task=file) == ()
+    force, limit = "steps.grasp_1.grasp.force=11 N", "controllers.hand_controller.max_effort=10 N"
+    for overrides, told in (([force], "11 N; panda_finger_joint1 presses with 10 N"), ([limit], "9 N; .* with 5 N")):
+        (found,) = findings(*overrides, task=file)
+        assert re.search(f"step 'grasp_1': a grasp with {told} at most", found.message)
+        assert (str(found.place), found.severity) == (f"{file}:6:5", "warning")
+
+
 @pytest.mark.slow
 def test_loops_that_only_quarrel_together_are_told() -> None:
     """Damping near the bound of each joint: the arm as a whole is softer than any joint alone."""
