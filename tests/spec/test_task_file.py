@@ -603,7 +603,7 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=1
     name=st.from_regex(r"\w[\w .+-]{0,10}\w", fullmatch=True),
     description=TEXTS,
     body=TEXTS,
-    mass=st.floats(1e-300, 1e300),
+    mass=st.floats(1e-300, 1e5),
     gravity=st.tuples(*[st.floats(-1e9, 1e9)] * 3),
     params=st.dictionaries(TEXTS, st.booleans() | st.integers() | st.floats(-1e300, 1e300) | TEXTS, max_size=4),
 )
