@@ -45,10 +45,10 @@ Measures = dict[Key, Measure]
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A number that is not what it was; `new` None: it is not measured any more. `worse` by more than is tolerated.
+    """A number that is not what it was; `new` None: it is not measured any more. `worse` by more than is tolerated, or
+    not to be compared, which could hide that.
 
-    The margin of a condition of several parts has the unit of the one that decides: where that is another one now, it
-    is told, and not worse.
+    The margin of a condition of several parts has the unit of the one that decides, which may be another one now.
     """
 
     key: Key
@@ -71,7 +71,10 @@ class Change:
         if self.new is None:
             return f"{name} is in the baseline ({old}) and was not measured; `manipcli bless` writes a new one"
         if self.new.unit != self.old.unit:
-            return f"{name} {verb} {self.new}; its baseline is {old}: another part of it decides now"
+            why = (
+                "another part of it decides now, so that the two cannot be compared; `manipcli bless` writes a new one"
+            )
+            return f"{name} {verb} {self.new}; its baseline is {old}: {why}"
         share = abs(self.new.value / self.old.value - 1.0) if self.old.value else math.inf
         by = f"{100.0 * share:{'.0f' if share > 0.1 else '.2g'}} % " if share < 10.0 else ""
         word = more if self.new.value > self.old.value else less
@@ -131,7 +134,7 @@ def _compared(old: Measures, new: Measures, tolerance: ToleranceSpec) -> Iterato
     for key, before in old.items():
         now = new.get(key)
         if now is None or now.unit != before.unit:
-            yield Change(key, before, now, worse=now is None)
+            yield Change(key, before, now, worse=True)
             continue
         allowed = max(shares[key[0]] * abs(before.value), FLOORS.get(before.unit, 0.0))
         loss = before.value - now.value if key[0] == "margins" else now.value - before.value
