@@ -8,7 +8,7 @@ from manipcli.replay.player import POLICY, player_html
 from manipcli.report import html_numbers as numbers
 from manipcli.report import html_sections as sections
 from manipcli.report.html_parts import heading
-from manipcli.report.markup import Markup, element, joined
+from manipcli.report.markup import Markup, document, element, joined
 from manipcli.report.run_page import RunPage
 
 _NAMES = (
@@ -43,27 +43,15 @@ def render_page(page: RunPage) -> str:
     style, script = (Markup(own.joinpath(name).read_text("utf-8")) for name in ("report.css", "report.js"))
     verdict = page.verdict
     title = f"{'✓' if verdict.verdict == 'passed' else '✗'} {verdict.task} {verdict.verdict}"
-    whole = element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", http_equiv="Content-Security-Policy", content=POLICY),
-            element("meta", name_="viewport", content="width=device-width, initial-scale=1"),
-            element("title", title),
-            element("link", rel="icon", href="data:,"),
-            element("style", style),
-        ),
-        element(
-            "body",
-            sections.head(page),
-            element("nav", *links, aria_label="sections"),
-            element("main", *shown.values()),
-            element("script", script),
-        ),
-        lang="en",
+    return document(
+        title,
+        sections.head(page),
+        element("nav", *links, aria_label="sections"),
+        element("main", *shown.values()),
+        element("script", script),
+        style=style,
+        policy=POLICY,
     )
-    return f"<!DOCTYPE html>\n{whole}\n"
 
 
 def _replay(page: RunPage) -> Markup | None:

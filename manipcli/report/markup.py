@@ -17,6 +17,25 @@ class Markup(str):
     __slots__ = ()
 
 
+def document(title: str, *body: str | None, style: Markup, policy: str) -> str:
+    """A whole page that asks for nothing from elsewhere; `policy`: its Content-Security-Policy."""
+    whole = element(
+        "html",
+        element(
+            "head",
+            element("meta", charset="utf-8"),
+            element("meta", http_equiv="Content-Security-Policy", content=policy),
+            element("meta", name_="viewport", content="width=device-width, initial-scale=1"),
+            element("title", title),
+            element("link", rel="icon", href="data:,"),
+            element("style", style),
+        ),
+        element("body", *body),
+        lang="en",
+    )
+    return f"<!DOCTYPE html>\n{whole}\n"
+
+
 def element(name: str, *children: str | None, **attributes: Attribute) -> Markup:
     """`<name attribute="...">children</name>`.
 

@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from manipcli.replay.player import POLICY
 from manipcli.report.html_parts import mark, table
-from manipcli.report.markup import Markup, element, joined
+from manipcli.report.markup import Markup, document, element, joined
 from manipcli.report.suite import CaseReport, Suite
 from manipcli.report.suite_text import beforehand, gist, render_summary
 
@@ -28,39 +28,19 @@ def render_page(suite: Suite, folder: Path) -> str:
     good = passed == suite.total > 0
     word = "passed" if good else "failed"
     reports = sorted(suite.reports, key=lambda report: report.passed)
-    whole = element(
-        "html",
+    head = element(
+        "header",
         element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", http_equiv="Content-Security-Policy", content=POLICY),
-            element("meta", name_="viewport", content="width=device-width, initial-scale=1"),
-            element("title", f"{'✓' if good else '✗'} {passed} of {suite.total} passed"),
-            element("link", rel="icon", href="data:,"),
-            element("style", style),
+            "div",
+            element("h1", f"{passed} of {suite.total} passed"),
+            element("span", f"{'✓' if good else '✗'} {word}", class_=f"verdict {word}"),
+            class_="title",
         ),
-        element(
-            "body",
-            element(
-                "header",
-                element(
-                    "div",
-                    element("h1", f"{passed} of {suite.total} passed"),
-                    element("span", f"{'✓' if good else '✗'} {word}", class_=f"verdict {word}"),
-                    class_="title",
-                ),
-                element("p", render_summary(suite), class_="says"),
-            ),
-            element(
-                "main",
-                element(
-                    "section", table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",), stacks=True)
-                ),
-            ),
-        ),
-        lang="en",
+        element("p", render_summary(suite), class_="says"),
     )
-    return f"<!DOCTYPE html>\n{whole}\n"
+    rows = table(COLUMNS, [_row(one, folder) for one in reports], numbers=("took",), stacks=True)
+    title = f"{'✓' if good else '✗'} {passed} of {suite.total} passed"
+    return document(title, head, element("main", element("section", rows)), style=style, policy=POLICY)
 
 
 def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
