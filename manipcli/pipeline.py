@@ -18,7 +18,7 @@ from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries
-from manipcli.flow.log import default_log, judge_log, open_log, verdict_metadata
+from manipcli.flow.log import default_log, judge_log, known_of, open_log, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.flow.recorded_task import recorded_task
 from manipcli.flow.sample import load_task
@@ -105,13 +105,7 @@ def run_task(
             task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
         )
     except RecordingFailed as failure:
-        simulation = task.spec.simulation
-        failure.known = {
-            "task": task.name,
-            "seed": simulation.seed,
-            "engine": simulation.engine,
-            "log": str(failure.partial),
-        }
+        failure.known = known_of(task, failure.partial)
         raise
     judged = time.perf_counter()
     timing = Timing(

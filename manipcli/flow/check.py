@@ -11,8 +11,8 @@ from manipcli.flow.describe import DESCRIPTIONS, inspect
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.flow.postures import posture_findings
+from manipcli.flow.robot_file import read_robot
 from manipcli.flow.vocabulary import task_spec
-from manipcli.model.build_robot import build_robot
 from manipcli.model.build_scene import SHAPES
 from manipcli.model.checks import CHECKS
 from manipcli.model.conditions import CONDITIONS
@@ -46,15 +46,8 @@ def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> 
             return (*task.findings, *gain_findings(task))
         if kind == "controllers":
             return load.load_controllers(path).findings
-        file = load.load_robot(path)
-        robot, notes = build_robot(
-            file.spec,
-            file=path,
-            package_path=package_path,
-            allow_outside=allow_outside,
-            source=file.source,
-        )
-        return (*file.findings, *notes, *posture_findings(file, robot))
+        file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
+        return (*findings, *posture_findings(file, robot))
     except InvalidInput as invalid:
         return invalid.findings
 

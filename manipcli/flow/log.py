@@ -209,6 +209,12 @@ def attached(recording: Recording, path: Path, name: str) -> bytes:
     return recording.attachments[name]
 
 
+def known_of(task: Task, log: Path) -> Mapping[str, str | int]:
+    """What a report says of a run that has no verdict."""
+    simulation = task.spec.simulation
+    return {"task": task.name, "seed": simulation.seed, "engine": simulation.engine, "log": str(log)}
+
+
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:
     """What the log keeps of its own verdict, for whoever looks at it without manipcli."""
     return {

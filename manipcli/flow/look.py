@@ -11,6 +11,7 @@ from manipcli.core.geometry import Array
 from manipcli.flow.describe import DESCRIPTIONS
 from manipcli.flow.load import load_task
 from manipcli.flow.plan import start_position
+from manipcli.flow.robot_file import read_robot
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -64,12 +65,5 @@ def load_sight(
     if kind == "controllers":
         message = "a controllers file has nothing to look at; give a robot, a description or a task"
         raise InvalidInput([Finding("VIEW003", message, Place(str(path), 0, 0))])
-    file = load.load_robot(path)
-    robot, notes = build_robot(
-        file.spec,
-        file=path,
-        package_path=package_path,
-        allow_outside=allow_outside,
-        source=file.source,
-    )
-    return Sight(robot, None, posture(robot), (*file.findings, *notes))
+    _, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
+    return Sight(robot, None, posture(robot), findings)

@@ -19,7 +19,7 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.flow.gains import named_postures
-from manipcli.model.build_robot import build_robot
+from manipcli.flow.robot_file import read_robot
 from manipcli.model.kinematics import STANDARD_GRAVITY, Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -80,14 +80,7 @@ def tune(
     Raises:
         InvalidInput: a file cannot be used, a joint has no loop, or nothing has gains.
     """
-    robot_file = load.load_robot(robot_path)
-    robot, _ = build_robot(
-        robot_file.spec,
-        file=robot_path,
-        package_path=package_path,
-        allow_outside=allow_outside,
-        source=robot_file.source,
-    )
+    _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
     file = load.load_controllers(controllers_path)
     tuner = _Tuner(robot, file, wish, step)
     everything = tuner.proposals()
