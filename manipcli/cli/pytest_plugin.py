@@ -74,8 +74,8 @@ class TaskFile(pytest.File):
 class TaskItem(pytest.Item):
     """One run of a task, in a process of its own."""
 
-    def __init__(self, *, case: Case, **others: object) -> None:
-        super().__init__(**others)  # type: ignore[arg-type]
+    def __init__(self, *, name: str, parent: TaskFile, case: Case) -> None:
+        super().__init__(name, parent)
         self._case = case
         for tag in case.tags:
             self.add_marker(tag)

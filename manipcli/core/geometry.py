@@ -33,11 +33,11 @@ def quat_from_matrix(R: npt.ArrayLike) -> Array:
     if k == 3:
         q[:] = (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], 1.0 + trace)
     else:
-        i, j, l = k, (k + 1) % 3, (k + 2) % 3  # noqa: E741  (the axes in cyclic order)
-        q[i] = 1.0 + m[i, i] - m[j, j] - m[l, l]
+        i, j, k = k, (k + 1) % 3, (k + 2) % 3
+        q[i] = 1.0 + m[i, i] - m[j, j] - m[k, k]
         q[j] = m[j, i] + m[i, j]
-        q[l] = m[l, i] + m[i, l]
-        q[3] = m[l, j] - m[j, l]
+        q[k] = m[k, i] + m[i, k]
+        q[3] = m[k, j] - m[j, k]
     q /= np.linalg.norm(q)
     return q if q[3] >= 0.0 else -q
 

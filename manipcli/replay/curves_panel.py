@@ -107,7 +107,7 @@ class CurvesPanel:
         """Another table: the column stays where it has it, too."""
         before = self._column.value
         self._column.options = (ALL, *self._chosen.columns)
-        self._column.value = before if before in self._chosen.columns else ALL  # type: ignore[misc]  # as elsewhere
+        self._column.value = before if before in self._chosen.columns else ALL  # type: ignore[misc]  # viser's setter
         self._draw()
 
     def _shown(self) -> tuple[Array, list[tuple[str, str, Array]]]:

@@ -144,4 +144,4 @@ class JointPanel:
     def _place(self, q: Array) -> None:
         self._q = q
         self._stage.place(self._placing.start(q))
-        self._text.value = pose_text(self._robot, q)  # type: ignore[misc]
+        self._text.value = pose_text(self._robot, q)  # type: ignore[misc]  # viser's setter hides from mypy

@@ -80,6 +80,7 @@ class _Joints:
         point = self._point(q)
         now = (states.time, q, np.maximum(power, 0.0).sum(axis=1), point)
         if self._last is not None:
+            # Of four arrays four: mypy does not know how long this tuple is.
             now = tuple(np.concatenate([a, b]) for a, b in zip(self._last, now, strict=True))  # type: ignore[assignment]
         self._last = tuple(a[-1:] for a in now)
         time, q, power, point = now

@@ -109,6 +109,7 @@ _CONDITION = "Condition"
 
 def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
     """`base` with the field `all`, `any` (a list of conditions) or `not` (one)."""
+    # `condition` is a type only at run time, which annotations cannot follow.
     listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
     return _keyed(base, name, condition if name == "not" else listed, COMBINATIONS[name])
 
@@ -140,6 +141,7 @@ def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[s
 
 def _keyed(base: type[KeyedSpec], name: str, holds: object, text: str, **fields: object) -> type[KeyedSpec]:
     """`base` with the one field `name` of any type."""
+    # Fields whose names are only known at run time: no overload of create_model has those.
     made = create_model(  # type: ignore[call-overload]
         "".join(word.capitalize() for word in name.split("_")) + base.__name__.removesuffix("Spec"),
         __base__=base,
