@@ -115,7 +115,9 @@ def parse_document(data: bytes, file: str) -> Document:
     except expat.ExpatError as error:
         message = f"not well-formed XML: {expat.ErrorString(error.code)}"
         place = Place(file, error.lineno, error.offset + 1)
-        raise invalid("URDF001", message, place, _open_element(builder.curNode)) from error
+        begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
+        other = None if begins in (b"<", b"") else "this is no XML; robot, controllers and task files: `manipcli check`"
+        raise invalid("URDF001", message, place, other or _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
     return document

@@ -62,6 +62,14 @@ def test_what_cannot_be_read_is_one_finding_with_a_place(tmp_path: Path, data: b
         assert found.parts is None
 
 
+@pytest.mark.parametrize("begin", [b"", b"\xef\xbb\xbf", b"\n  "])
+def test_a_file_of_another_kind_is_sent_to_its_own_command(tmp_path: Path, begin: bytes) -> None:
+    (finding,) = look(tmp_path, begin + b"robot: arm\nurdf: arm.urdf\n", "robot.yaml").findings
+    assert finding.hint == "this is no XML; robot, controllers and task files: `manipcli check`"
+    (broken,) = look(tmp_path, begin + b"<robot name='r'><link>", "r.urdf").findings
+    assert "is open" in (broken.hint or "")
+
+
 def test_a_folder_is_no_description(tmp_path: Path) -> None:
     found = examine(tmp_path, packages=Packages(tmp_path))
     assert codes(found) == ["URDF001"]
