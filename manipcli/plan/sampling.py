@@ -88,8 +88,9 @@ def on_ticks(
     """
     wished = 1 if duration is None else _ticks(duration, period)
     stretch = 1.0
+    path = curve(np.linspace(0.0, nominal, 100))[0]
     for _ in range(_ROUNDS):
-        refuse_endless(curve(np.linspace(0.0, nominal, 100))[0], limits, nominal * stretch)
+        refuse_endless(path, limits, nominal * stretch)
         least = max(1, _ticks(nominal * stretch, period))
         ticks = max(least, wished)
         times = np.arange(ticks + 1) * period
