@@ -10,6 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, PackagePath
 from manipcli.core.errors import ExitCode
+from manipcli.core.text import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,8 +90,7 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
         old = None  # it is replaced
     write_baseline(path, new)
     told = [str(new[key]) for key in (("duration",), ("energy",)) if key in new]
-    margins = sum(key[0] == "margins" for key in new)
-    told.append(f"{margins} margin{'' if margins == 1 else 's'}")
+    told.append(number_of(sum(key[0] == "margins" for key in new), "margin"))
     lines = [f"{PASS} {done.case.id} blessed: {', '.join(told)}; written: {shown_path(path)}"]
     exact = ToleranceSpec(duration=0.0, energy=0.0, margin=0.0)
     changes = compared(old, new, exact) if old is not None else ()

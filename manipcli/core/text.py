@@ -63,8 +63,8 @@ def listed(names: Iterable[str], *, most: int = 12) -> str:
 
 
 def number_of(number: int, noun: str) -> str:
-    """`1 file`, `2 files`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    """`1 file`, `2 files`, `2 processes`."""
+    return f"{number} {noun}{'' if number == 1 else 'es' if noun.endswith('s') else 's'}"
 
 
 def escape(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import shorten
+from manipcli.core.text import number_of, shorten
 from manipcli.report.quantity import quantity
 from manipcli.report.suite import Case, CaseReport, Suite
 from manipcli.report.text import FAIL, PASS, describe
@@ -89,9 +89,8 @@ def render_summary(suite: Suite) -> str:
     told = [f"{count} {word}" for count, word in counts if count] + ([f"{undone} not run"] if undone else [])
     good = suite.total and all(report.passed for report in suite.reports) and not undone
     why = {"": "", "interrupted": "; interrupted", "first failure": "; stopped at the first failure"}[suite.stopped]
-    processes = f"{suite.jobs} process{'' if suite.jobs == 1 else 'es'}"
     text = ", ".join(told) or "nothing to run"
-    return f"{PASS if good else FAIL} {text} in {suite.duration:.1f} s, {processes}{why}"
+    return f"{PASS if good else FAIL} {text} in {suite.duration:.1f} s, {number_of(suite.jobs, 'process')}{why}"
 
 
 def render_suite(suite: Suite) -> str:

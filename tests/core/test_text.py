@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import unicodedata
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.text import any_of, did_you_mean, escape, listed, nearest, shorten
+from manipcli.core.text import any_of, did_you_mean, escape, listed, nearest, number_of, shorten
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
 
@@ -48,3 +49,11 @@ def test_shortened_text_fits(text: str, width: int) -> None:
 @given(st.text(), st.lists(st.text(), max_size=5))
 def test_near_names_are_known_names(name: str, known: list[str]) -> None:
     assert set(nearest(name, known, most=2)) <= set(known)
+
+
+@pytest.mark.parametrize(
+    ("number", "noun", "told"),
+    [(1, "file", "1 file"), (0, "file", "0 files"), (1, "process", "1 process"), (2, "process", "2 processes")],
+)
+def test_a_number_of_things_is_told_as_one_says_it(number: int, noun: str, told: str) -> None:
+    assert number_of(number, noun) == told
