@@ -227,11 +227,11 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
         if broken is not None:
             loc = (*((how,) if how else ()), law.word)
             raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
-    _refuse_endless(law, nominal, how)
+    _refuse_too_large(law, nominal, how)
     return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
 
 
-def _refuse_endless(law: Law, nominal: Sequence[float], how: str) -> None:
+def _refuse_too_large(law: Law, nominal: Sequence[float], how: str) -> None:
     """Amounts so large that what is drawn would be infinite."""
     for row in law.rows:
         for amount, value in zip(row, nominal, strict=True):
