@@ -145,7 +145,7 @@ class Actuation:
         else:
             seen = command
         asked, within = self._asked, self._within
-        np.dot(self._to_actuator, seen, out=asked)
+        np.matmul(self._to_actuator, seen, out=asked)
         if not self._rubs and not self._waits:
             np.abs(asked, out=self._size)
             np.less_equal(self._size, self._bound, out=within)
@@ -158,7 +158,7 @@ class Actuation:
         given = self._limited(wanted, speed)
         if self._rubs:
             given = self._rubbed(given, speed, position)
-        np.dot(self._to_joint, given, out=self._applied)
+        np.matmul(self._to_joint, given, out=self._applied)
         if self._passes:
             np.multiply(command, self._pass, out=self._passed)
             np.add(self._applied, self._passed, out=self._applied)
@@ -172,7 +172,7 @@ class Actuation:
             self._at[:] = np.arange(a) + (-self._latency % rows) * a
             self._row = 0
         self._past[self._row] = wanted
-        self._past_flat.take(self._at, out=self._wanted, mode="wrap")
+        self._wanted[:] = self._past_flat[self._at]
         self._row = (self._row + 1) % rows
         np.add(self._at, a, out=self._at)
         np.remainder(self._at, rows * a, out=self._at)

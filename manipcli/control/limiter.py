@@ -196,7 +196,7 @@ class _Positions:
         if self.fresh:
             self.fresh = False
             self._before[:], self._step[:] = position[where], 0.0
-        command.position.take(where, out=wanted, mode="clip")
+        wanted[:] = command.position[where]
         np.subtract(wanted, self._before, step)
         np.abs(step, growth)
         np.abs(self._step, self._size)
@@ -256,7 +256,7 @@ class _Velocities:
         if self.fresh:
             self.fresh = False
             self._before[:] = velocity[where]
-        command.velocity.take(where, out=wanted, mode="clip")
+        wanted[:] = command.velocity[where]
         np.subtract(wanted, self._before, change)
         np.multiply(wanted, self._dt, ahead)
         np.add(ahead, position[where], ahead)
@@ -366,7 +366,8 @@ class JointLimiter:
     def _refuse_not_finite(self, command: JointCommand, position: Array, velocity: Array) -> None:
         # Products tell it quickly, for infinity times 0 is NaN; where they overflow, that only costs the closer look.
         with np.errstate(all="ignore"):
-            if math.isfinite(position.dot(velocity) + command.effort.dot(command.velocity) + command.position.sum()):
+            products = np.vdot(position, velocity) + np.vdot(command.effort, command.velocity)
+            if math.isfinite(products + command.position.sum()):
                 return
         obeyed: dict[Mode, tuple[tuple[str, Array], ...]] = {
             "effort": (("effort command", command.effort),),

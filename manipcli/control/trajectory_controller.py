@@ -269,7 +269,7 @@ class JointTrajectoryController:
         if self._wraps:
             shortest(self._error, self._facts)
         # The largest error is at most their norm: nearly always this alone answers. NaN and infinity do not pass.
-        if not self._all_errors.dot(self._all_errors) < self._bound:
+        if not np.vdot(self._all_errors, self._all_errors) < self._bound:
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
             late = reference.clock(time) - reference.end

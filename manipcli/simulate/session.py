@@ -2,6 +2,10 @@
 
 read engine -> controllers -> joint limits -> actuators -> write -> observe -> physics. Whoever wants to see a tick (the
 recorder, the progress line) is an observer; nothing else happens in the loop.
+
+Nothing in a tick lets go of the interpreter lock, as `np.dot`, `take` and `norm` do for a vector of any size: it wakes
+the recorder's thread, which costs more than ten microseconds, and takes the lock from it before it could begin.
+`np.vdot`, `np.matmul` and an index do the same and keep it.
 """
 
 from __future__ import annotations

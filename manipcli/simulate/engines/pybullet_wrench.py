@@ -47,6 +47,6 @@ class WrenchSensor:
     def measure(self) -> None:
         """What the last physics step came to."""
         _, _, reaction, motor = self._p.getJointState(self._body, self._index, self._client)
-        np.dot(self._map, reaction, out=self.values)
+        np.matmul(self._map, reaction, out=self.values)
         if self._driven:
             self.values += motor * self._motor
