@@ -6,9 +6,9 @@ import errno
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 from typer.exceptions import TyperException
@@ -42,6 +42,9 @@ from manipcli.record.faults import RecordingFailed
 _INTERRUPTED_BY_TYPER = 130
 """What Typer returns for Ctrl-C instead of letting KeyboardInterrupt through."""
 
+_COMPLETION = "_MANIPCLI_COMPLETE"
+"""The environment variable by which a shell asks Typer for completions."""
+
 _FULL = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "there is no space left on the disk",
@@ -53,32 +56,55 @@ _EXIT_CODES = (
     "5 nothing to run."
 )
 
-app = typer.Typer(
-    name="manipcli",
-    help="Manipulation tasks as files: check, plan, simulate, record and judge them.",
-    # Rich help doubles the time of --help; plain help is within 10 % of importing typer.
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-app.command("init")(init.init)
-app.command("run")(run.run)
-app.command("test")(test.test)
-app.command("bless")(bless.bless)
-app.command("check")(check.check)
-app.command("check-urdf")(check_urdf.check_urdf)
-app.command("plan")(plan.plan)
-app.command("tune")(tune.tune)
-app.command("judge")(judge.judge)
-app.command("info")(info.info)
-app.command("at")(at.at)
-app.command("repair")(repair.repair)
-app.command("diff")(diff.diff)
-app.command("graph")(graph.graph)
-app.command("plot")(plot.plot)
-app.command("view")(view.view)
-app.command("replay")(replay.replay)
-app.command("list")(list_.list_)
-app.command("schema")(schema.schema)
+COMMANDS: Final[dict[str, Callable[..., object]]] = {
+    "init": init.init,
+    "run": run.run,
+    "test": test.test,
+    "bless": bless.bless,
+    "check": check.check,
+    "check-urdf": check_urdf.check_urdf,
+    "plan": plan.plan,
+    "tune": tune.tune,
+    "judge": judge.judge,
+    "info": info.info,
+    "at": at.at,
+    "repair": repair.repair,
+    "diff": diff.diff,
+    "graph": graph.graph,
+    "plot": plot.plot,
+    "view": view.view,
+    "replay": replay.replay,
+    "list": list_.list_,
+    "schema": schema.schema,
+}
+
+
+def _app(words: Sequence[str]) -> typer.Typer:
+    """The commands, for a command line of these words.
+
+    Typer reads the parameters of every command that it is given, at 2 ms each. Only the one that is called shows it
+    any, or all of them where a shell asks for completions; of the others the help has the names and first sentences.
+    """
+    app = typer.Typer(
+        name="manipcli",
+        help="Manipulation tasks as files: check, plan, simulate, record and judge them.",
+        # Rich help doubles the time of --help; plain help is within 10 % of importing typer.
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+    app.callback(epilog=_EXIT_CODES)(_root)
+    called = next((word for word in words if not word.startswith("-")), None)
+    for name, function in COMMANDS.items():
+        shown = name == called or _COMPLETION in os.environ
+        app.command(name)(function if shown else _without_parameters(function))
+    return app
+
+
+def _without_parameters(function: Callable[..., object]) -> Callable[[], None]:
+    def command() -> None: ...
+
+    command.__doc__ = function.__doc__
+    return command
 
 
 def _version(wanted: bool) -> None:
@@ -87,7 +113,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit()
 
 
-@app.callback(epilog=_EXIT_CODES)
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
@@ -101,7 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     console.prepare()
     try:
-        code = app(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
+        code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
         if code == _INTERRUPTED_BY_TYPER:
             raise KeyboardInterrupt
         return int(code or ExitCode.PASSED)

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import manipcli
-from manipcli.cli.app import main
+from manipcli.cli.app import COMMANDS, main
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
 from manipcli.core.geometry import Transform
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
@@ -313,3 +316,25 @@ def test_what_is_known_of_a_run_whose_log_the_disk_refused_is_told(
     answer = json.loads(capsys.readouterr().out)
     assert {key: answer[key] for key in failure.known} == failure.known
     assert (answer["verdict"], answer["errors"][0]["code"]) == ("error", "LOG200")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_is_as_if_all_were_shown(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = typer.Typer(rich_markup_mode=None)
+    whole.callback()(lambda: None)
+    for name, function in COMMANDS.items():
+        whole.command(name)(function)
+    expected = CliRunner().invoke(whole, [command, "--help"], prog_name="manipcli").output
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.split() == expected.split()  # the width of the lines may differ
+    assert f"manipcli {command} [OPTIONS]" in shown
+
+
+def test_a_shell_completes_commands_and_options(run_cli: Callable[..., Any], tmp_path: Path) -> None:
+    def completions(line: str, word: int) -> set[str]:
+        asked = {"_MANIPCLI_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(word)}
+        return set(run_cli(cwd=tmp_path, env=os.environ | asked).out.split())
+
+    assert completions("manipcli run --se", 2) == {"--seed", "--set"}
+    assert completions("manipcli che", 1) == {"check", "check-urdf"}
