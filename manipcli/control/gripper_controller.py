@@ -218,7 +218,7 @@ class GripperController:
             return self._output
         np.subtract(self._reference, measured.position, self._error)
         np.subtract(self._velocity, measured.velocity, self._error_rate)
-        if not np.vdot(self._all_errors, self._all_errors) < np.inf:
+        if not math.hypot(*self._all_errors.tolist()) < math.inf:
             refuse_not_finite(self.name, self.joints, measured, time)
         command = self._command
         self._pid.apply(self._errors, period, command)

@@ -63,13 +63,13 @@ class Tolerances:
 
     @property
     def bound(self) -> float:
-        """Errors of position and velocity whose squares sum to less are inside every path tolerance.
+        """Errors of position and velocity whose norm is less are inside every path tolerance.
 
         0 where an acceleration counts, too: they tell nothing of that.
         """
         if np.isfinite(self.path[2]).any():
             return 0.0
-        return float(self.path[:2].min()) ** 2
+        return float(self.path[:2].min())
 
     @property
     def needs_acceleration(self) -> bool:

@@ -5,6 +5,7 @@ The laws are told in `controllers/joint_trajectory.py`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -269,7 +270,7 @@ class JointTrajectoryController:
         if self._wraps:
             shortest(self._error, self._facts)
         # The largest error is at most their norm: nearly always this alone answers. NaN and infinity do not pass.
-        if not np.vdot(self._all_errors, self._all_errors) < self._bound:
+        if not math.hypot(*self._all_errors.tolist()) < self._bound:
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
             late = reference.clock(time) - reference.end

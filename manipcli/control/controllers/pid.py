@@ -170,7 +170,7 @@ class PidController:
             np.subtract(self._rate, measured.velocity, rate)
         else:
             rate[:] = (error - self._before) / period if self._has_before else 0.0
-        if not np.vdot(self._all_errors, self._all_errors) < np.inf:
+        if not math.hypot(*self._all_errors.tolist()) < math.inf:
             refuse_not_finite(self.name, self.joints, measured, time)
         self._before[:] = error
         self._has_before = True
