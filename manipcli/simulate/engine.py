@@ -69,8 +69,8 @@ class Engine(Protocol):
         """What the robot touches now."""
         ...
 
-    def contacts(self) -> tuple[Contact, ...]:
-        """Everything that touches now, robot included."""
+    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
+        """Everything that touches now: what the robot touches, and the rest."""
         ...
 
     def close(self) -> None:

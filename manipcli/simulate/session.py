@@ -178,14 +178,17 @@ class Session:
         """
         ticks = self.ticks
         slow = ticks % SLOW == 0
+        before = self._touched
         if slow:
             self._refuse_runaway(state)
-            self._others = tuple(c for c in self.engine.contacts() if not _of_robot(c))
         if (slow or ticks >= self._watchful) and self.engine.touches_changed():
             self._watchful = ticks + SLOW
         elif not slow and ticks >= self._watchful and not self.manager.senses_contact:
             return
-        before, self._touched = self._touched, self.engine.robot_contacts()
+        if slow:
+            self._touched, self._others = self.engine.contacts()
+        else:
+            self._touched = self.engine.robot_contacts()
         if self._touched or before:
             forces = [0.0] * len(self._contact_force)
             for a, b, force, _ in self._touched:
@@ -219,10 +222,6 @@ class Session:
                 raise SimulationFailed(f"'{body.name}' flies off at {speed:.3g} m/s", time=self.time)
             if not state.body_position[k, 2] > FALLEN:
                 raise SimulationFailed(f"'{body.name}' has fallen out of the scene", time=self.time)
-
-
-def _of_robot(contact: Contact) -> bool:
-    return contact.a.startswith("robot/") or contact.b.startswith("robot/")
 
 
 def _joint_of_part(robot: RobotModel) -> dict[str, int]:

@@ -92,8 +92,8 @@ class ScriptedEngine:
     def robot_contacts(self) -> tuple[Contact, ...]:
         return tuple(c for c in self.touching if "robot/" in c.a + c.b)
 
-    def contacts(self) -> tuple[Contact, ...]:
-        return self.touching
+    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
+        return self.robot_contacts(), tuple(c for c in self.touching if "robot/" not in c.a + c.b)
 
     def close(self) -> None: ...
 

@@ -60,8 +60,8 @@ class KinematicEngine:
     def robot_contacts(self) -> tuple[Contact, ...]:
         return ()
 
-    def contacts(self) -> tuple[Contact, ...]:
-        return ()
+    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
+        return (), ()
 
     def close(self) -> None:
         """Holds nothing."""

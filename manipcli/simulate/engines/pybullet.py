@@ -16,7 +16,14 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.simulate.engine import EngineMember, EngineSettings
-from manipcli.simulate.engines.pybullet_contacts import ContactMerger, Pair, Vector, greatest_force, touching_pairs
+from manipcli.simulate.engines.pybullet_contacts import (
+    ContactMerger,
+    ContactPoint,
+    Pair,
+    Vector,
+    greatest_force,
+    touching_pairs,
+)
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
@@ -74,6 +81,7 @@ class PybulletEngine:
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
         self._pairs: set[Pair] = set()
         self._greatest = 0.0
+        self._points: tuple[ContactPoint, ...] | None = None
         self._substeps = settings.substeps
 
     def _load_robot(self, robot: RobotModel, scene: Scene, folder: Path) -> None:
@@ -159,20 +167,28 @@ class PybulletEngine:
         for _ in range(self._substeps):
             self._motors.push()
             self._p.stepSimulation(self._client)
+        self._points = None
 
     def touches_changed(self) -> bool:
-        points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+        points = self._robot_points()
         if not points:
             return bool(self._pairs)
         return touching_pairs(points) != self._pairs or greatest_force(points) > KNOCK * self._greatest + KNOCK_LEAST
 
     def robot_contacts(self) -> tuple[Contact, ...]:
-        points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+        points = self._robot_points()
         self._pairs, self._greatest = touching_pairs(points), greatest_force(points)
         return self._merge(points)
 
-    def contacts(self) -> tuple[Contact, ...]:
-        return self._merge(self._p.getContactPoints(physicsClientId=self._client))
+    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
+        robot, points = self._robot, self._p.getContactPoints(physicsClientId=self._client)
+        return self.robot_contacts(), self._merge([point for point in points if robot not in point[1:3]])
+
+    def _robot_points(self) -> tuple[ContactPoint, ...]:
+        """The robot's points of contact, asked for once a tick: a tuple of a point costs as much as looking at it."""
+        if self._points is None:
+            self._points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+        return self._points
 
     def close(self) -> None:
         if self._client >= 0:

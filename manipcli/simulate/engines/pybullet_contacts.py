@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from operator import attrgetter, itemgetter
 
 from manipcli.model.state import Contact
@@ -17,12 +17,12 @@ _sides = attrgetter("a", "b")
 _force = itemgetter(9)
 
 
-def touching_pairs(points: tuple[ContactPoint, ...]) -> set[Pair]:
+def touching_pairs(points: Sequence[ContactPoint]) -> set[Pair]:
     """The pairs of links that touch."""
     return {point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0}
 
 
-def greatest_force(points: tuple[ContactPoint, ...]) -> float:
+def greatest_force(points: Sequence[ContactPoint]) -> float:
     """[N] of a single point."""
     return max(map(_force, points), default=0.0)
 
@@ -34,7 +34,7 @@ class ContactMerger:
         self._parts = parts
         self._known: dict[Pair, tuple[str, str]] = {}
 
-    def merged(self, points: tuple[ContactPoint, ...]) -> tuple[Contact, ...]:
+    def merged(self, points: Sequence[ContactPoint]) -> tuple[Contact, ...]:
         """One contact a touching pair; points that are near but apart (positive distance, no force) are dropped."""
         forces: dict[Pair, float] = {}
         depths: dict[Pair, float] = {}
