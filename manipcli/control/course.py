@@ -103,18 +103,16 @@ class Course:
         return Course(self.rest, tuple(kept))
 
 
-def decelerating(row: Array, deceleration: Array, *, together: bool) -> Course:
+def decelerating(row: Array, times: Array) -> Course:
     """From a moving `row` (4, n) to rest, at constant deceleration: q = q0 + v0 (t - t^2 / (2 T)), v = v0 (1 - t / T).
+
+    It ends at q0 + v0 T / 2.
 
     Args:
         row: what is followed now.
-        deceleration: (n) rad/s2 or m/s2; where it is infinite, a joint stops at once.
-        together: all stop at the same time T, none faster than it may; else each in its own, T = |v0| / deceleration.
+        times: (n) T [s] of each joint; 0: it stops at once.
     """
     velocity = row[VELOCITY]
-    times = np.abs(velocity) / deceleration
-    if together and times.any():
-        times = np.where(np.isfinite(deceleration), times.max(), times)
     course = Course.hold(row[POSITION], row[EFFORT])
     for time in np.unique(times[times > INSTANT]):
         columns = np.flatnonzero(times == time)

@@ -43,7 +43,8 @@ class JointTrajectoryController:
     that update's period. Until then, and for joints that it leaves out, the path before is followed. It succeeds at or
     after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when a joint leaves
     its path tolerance before (and at its first tick), or is outside its goal tolerance `goal_time` after the end. After
-    a success the last position is held at rest; after a cancel the reference is brought to rest and held.
+    a success the last position is held at rest; after a cancel the reference is brought to rest and held, with all joints
+    on their straight path, or each by itself where a position limit is near.
 
     Where ROS 1 and 2 differ, `compat` chooses; without it the safer of the two is done:
 

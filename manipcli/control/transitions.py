@@ -19,7 +19,7 @@ from manipcli.control.course import (
     stopping_in,
 )
 from manipcli.control.reference import Reference
-from manipcli.control.trajectory_goal import JointFacts, lead_in
+from manipcli.control.trajectory_goal import POSITION_SLACK, JointFacts, lead_in
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import Interpolation, JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec
@@ -31,7 +31,7 @@ class Transitions:
 
     Attributes:
         deceleration: (n) how fast each joint stops; infinite: at once.
-        together: whether all joints stop at the same time, on their straight path.
+        together: whether all joints stop at the same time, on their straight path, where that is within their limits.
     """
 
     facts: JointFacts
@@ -90,11 +90,31 @@ class Transitions:
         return course.with_part(Part(columns, whole, begin))
 
     def to_rest(self, reference: Reference, time: float) -> Course:
-        """What is followed from `time` [s] on, until it rests; in seconds of real time."""
+        """What is followed from `time` [s] on, until it rests; in seconds of real time.
+
+        Where that would take a joint beyond a position limit, each joint stops by itself: within the time that it needs
+        at its own deceleration, or that is given; before its limit even if it has to brake harder.
+        """
         now = reference.row(time)
         if self.stop_duration > 0.0:
-            return stopping_in(now, self.stop_duration)
-        return decelerating(now, self.deceleration, together=self.together)
+            own = np.full(now.shape[1], self.stop_duration)
+            course = stopping_in(now, self.stop_duration)
+        else:
+            own = np.abs(now[VELOCITY]) / self.deceleration
+            common = np.where(np.isfinite(self.deceleration), own.max(), 0.0)
+            course = decelerating(now, common if self.together else own)
+        room = self._room(now)
+        ways = np.abs(course.sample(np.array([course.end]))[0, POSITION] - now[POSITION])
+        if (ways <= room + POSITION_SLACK).all():
+            return course
+        rate = np.abs(now[VELOCITY])
+        latest = np.divide(2.0 * room, rate, out=np.zeros_like(rate), where=rate > 0.0)
+        return decelerating(now, np.minimum(own, latest))
+
+    def _room(self, row: Array) -> Array:
+        """(n) how far each joint may go on in the direction in which it moves; beyond its limit: not at all."""
+        ahead = np.where(row[VELOCITY] > 0.0, self.facts.upper - row[POSITION], row[POSITION] - self.facts.lower)
+        return np.asarray(np.maximum(ahead, 0.0))
 
     def _columns(self, names: Sequence[str]) -> Columns:
         joints = self.facts.joints

@@ -109,7 +109,9 @@ class ConstraintsSpec(Model):
         Field(ge=0, description="Greatest velocity error at the goal, 0 or more; 0: any. Default 0.05 rad/s."),
     ] = 0.05
     decelerate_on_cancel: bool = Field(
-        True, description="After a cancel slow down; else stop at once where the reference is. Default true."
+        True,
+        description="After a cancel slow down, within position limits; else stop at once where the reference is. "
+        "Default true.",
     )
     joints: dict[str, JointConstraintSpec] = Field({}, description="Tolerances by joint.")
 
