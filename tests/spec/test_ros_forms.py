@@ -354,6 +354,34 @@ def test_what_nobody_knows_is_an_error_with_the_nearest_name(table: Table) -> No
 
 
 @pytest.mark.parametrize(
+    ("block", "name"),
+    [
+        (f"{JTC}, joints: [a]", "interface_name: position"),
+        (f"{JTC}, joints: [a]", "sensor_name: ft"),
+        (f"{JTC}, joints: [a]", "state_interface_names: [position]"),
+        ("type: position_controllers/JointGroupPositionController, joints: [a]", "constraints: {goal_time: 1.0}"),
+        ("type: joint_state_broadcaster/JointStateBroadcaster", "command_interfaces: [position]"),
+        (
+            "type: force_torque_sensor_broadcaster/ForceTorqueSensorBroadcaster, frame_id: b",
+            "interpolation_method: none",
+        ),
+    ],
+)
+def test_a_parameter_that_ros_knows_of_other_controllers_is_ignored_as_ros_does(block: str, name: str) -> None:
+    plain, before = loaded(f"x: {{{block}}}")
+    controllers, findings = loaded(f"x: {{{block}, {name}}}")
+    assert controllers == plain
+    (line,) = [str(one) for one in findings if one not in before]
+    key = name.partition(":")[0]
+    assert f"warning[CTRL214]: x: ROS knows '{key}' of other controllers and ignores it here: left out" in line
+
+
+def test_our_own_words_are_not_ignored_where_they_do_not_belong() -> None:
+    (line,) = refused("x: {type: joint_state_broadcaster/JointStateBroadcaster, inverse_dynamics: true}")
+    assert "error[CTRL201]: x: unknown key 'inverse_dynamics'" in line
+
+
+@pytest.mark.parametrize(
     ("given", "message"),
     [
         ("interpolaton_method: none", "x: unknown key 'interpolaton_method' | did you mean 'interpolation_method'?"),

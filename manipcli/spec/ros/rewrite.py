@@ -9,7 +9,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.spec.controllers import Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
 from manipcli.spec.ros.table import Block, Table, model_below, models, value
-from manipcli.spec.ros.tables import BY_TYPE, OTHER_NODES, UNSERVED_TYPES
+from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, OTHER_NODES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
 
@@ -153,7 +153,7 @@ class _Rewriting:
         if word.value in table.differing:
             message = f"controller '{name}' {table.differing[word.value]}"
             self.tell("CTRL214", word.place, message, severity="warning")
-        served = self.served(name, node, table.parameters, model)
+        served = self.served(name, node, table.parameters, model, ignored=ELSEWHERE)
         self.unclamped(name, mapping(mapping(served).get("gains")))
         return served
 
@@ -175,8 +175,18 @@ class _Rewriting:
         hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="served")
         self.tell("CTRL203", place, f"controller '{name}': the type '{word}' is not known", hint=hint)
 
-    def served(self, where: str, node: Node, block: Block, model: type[BaseModel] | None) -> Node:
-        """`node` without the parameters that ROS knows and the spec does not have; what nobody knows is told."""
+    def served(
+        self,
+        where: str,
+        node: Node,
+        block: Block,
+        model: type[BaseModel] | None,
+        *,
+        ignored: frozenset[str] = frozenset(),
+    ) -> Node:
+        """`node` without the parameters that ROS knows and the spec does not have, or that ROS has `ignored` here; what
+        nobody knows is told.
+        """
         if not isinstance(node, MappingNode):
             return node
         node = _renamed(node, block)
@@ -203,6 +213,9 @@ class _Rewriting:
                 kept[key] = Entry(entry.key_place, inner)
             elif block.joint is not None:
                 kept[key] = entry  # no block: the validation says what was expected
+            elif key in ignored and key not in block.names:
+                message = f"{where}: ROS knows '{key}' of other controllers and ignores it here: left out"
+                self.tell("CTRL214", entry.key_place, message, severity="warning")
             elif not self.unserved(where, key, entry, block):
                 hint = did_you_mean(key, [*fields, *block.names], kind="known")
                 self.tell("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)

@@ -160,7 +160,10 @@ WRENCH: Final = Table(
         "force_torque_sensor_controller/ForceTorqueSensorController": {},
     },
     parameters=Block(
-        known=_ANY | {"additional_frames_to_publish", "sensor_filter_chain", "offset", "multiplier"},
+        known=_ANY | {
+            "additional_frames_to_publish", "sensor_filter_chain", "offset", "multiplier", "state_interface_names",
+            "topic_name",
+        },
         quiet=_EVERYWHERE | {"sensor_name", "interface_names"},
         renamed={"frame_id": "link"},
         neutral=_NEUTRAL | {"additional_frames_to_publish": ([],)},
@@ -170,6 +173,21 @@ WRENCH: Final = Table(
 
 TABLES: Final = (JOINT_TRAJECTORY, GRIPPER, FORWARD, PID, JOINT_STATES, WRENCH)
 BY_TYPE: Final = {name: table for table in TABLES for name in table.types}
+
+ELSEWHERE: Final = frozenset(name for table in TABLES for name in table.parameters.names) | {
+    "allow_integration_in_goal_trajectories", "allow_nonzero_velocity_at_trajectory_end", "allow_partial_joints_goal",
+    "allow_trajectory_replacement", "cmd_timeout", "command_interface", "command_interfaces", "constraints", "gains",
+    "goal_tolerance", "interpolate_from_desired_state", "interpolation_method", "joint", "joints", "max_effort", "pid",
+    "reference_and_state_interfaces", "set_current_state_as_first_setpoint", "state_interfaces",
+    "stop_trajectory_duration",
+} | {
+    "admittance", "base_frame_id", "chainable_command_interfaces", "control", "enable_odom_tf", "fixed_world_frame",
+    "ft_sensor", "gpios", "joint_limits", "kinematics", "left_wheel_names", "odom_frame_id", "open_loop", "pose_name",
+    "right_wheel_names", "sensor_names", "static_covariance_angular_velocity",
+    "static_covariance_linear_acceleration", "static_covariance_orientation", "tf", "wheel_radius",
+    "wheel_separation",
+}  # fmt: skip
+"""What ROS knows of some controller, served or not; one that does not know it ignores it."""
 
 UNSERVED_TYPES: Final = frozenset(
     {
