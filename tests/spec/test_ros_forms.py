@@ -453,6 +453,50 @@ def test_types_that_manipcli_does_not_serve_are_left_out_and_unknown_ones_are_er
     assert "did you mean 'joint_trajectory_controller/JointTrajectoryController'?" in line
 
 
+@pytest.mark.parametrize(
+    "word",
+    [
+        "ur_controllers/GPIOController",
+        "ur_controllers/ScaledJointTrajectoryController",
+        "robotiq_controllers/RobotiqActivationController",
+        "franka_example_controllers/JointImpedanceExampleController",
+        "pr2_controllers/Mover",
+        "robotiq_joint_trajectory_controller/JointTrajectoryController",
+    ],
+)
+def test_the_type_of_a_vendor_is_left_out_with_a_warning_and_its_parameters_are_not_read(word: str) -> None:
+    manager = f"controller_manager: {{ros__parameters: {{io: {{type: {word}}}, x: {{{JTC}}}}}}}\n"
+    controllers, findings = loaded(f"{manager}x: {OWN}\nio: {{ros__parameters: {{inputs: 3, gains: [1]}}}}\n")
+    assert controllers == {"x": ARM}
+    (line,) = told(findings)
+    assert (
+        f"c.yaml:1:51: warning[CTRL214]: controller 'io': '{word}' is of the package '{word.partition('/')[0]}'" in line
+    )
+    assert (findings[0].hint or "").startswith("did you mean 'joint_traj") == word.endswith(
+        "r/JointTrajectoryController"
+    )
+
+
+@pytest.mark.parametrize(
+    ("word", "near"),
+    [
+        (
+            "joint_trajectory_controllers/JointTrajectoryController",
+            "joint_trajectory_controller/JointTrajectoryController",
+        ),
+        ("position_controler/JointTrajectoryController", "position_controllers/JointTrajectoryController"),
+        ("effort_controllers/JointTrajectryController", "effort_controllers/JointTrajectoryController"),
+        ("Effort_Controllers/JointTrajectoryController", "effort_controllers/JointTrajectoryController"),
+        ("effort_controllers/GripperController", "effort_controllers/GripperActionController"),
+        ("joint_state_braodcaster/JointStateBroadcaster", "joint_state_broadcaster/JointStateBroadcaster"),
+        ("diff_drive_controller/DifDriveController", "diff_drive_controller/DiffDriveController"),
+    ],
+)
+def test_a_slip_in_a_type_of_ros_is_an_error_with_the_right_name(word: str, near: str) -> None:
+    (line,) = refused(f"x: {{type: {word}, joints: [a]}}")
+    assert line.endswith(f"error[CTRL203]: controller 'x': the type '{word}' is not known | did you mean '{near}'?")
+
+
 def test_what_else_stands_in_such_files_is_left_out() -> None:
     text = f"joint_limits: {{a: {{max_velocity: 1}}}}\ncontroller_list: [{{name: x}}]\nx: {{{JTC}, joints: [a]}}\n"
     controllers, findings = loaded(text)

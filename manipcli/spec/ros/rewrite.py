@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+import re
+
 from pydantic import BaseModel
 
 from manipcli.core.errors import Finding, Place, Severity
@@ -9,7 +12,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.spec.controllers import Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
 from manipcli.spec.ros.table import Block, Table, model_below, models, value
-from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, OTHER_NODES, UNSERVED_TYPES
+from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, OTHER_NODES, PACKAGES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
 
@@ -171,9 +174,17 @@ class _Rewriting:
         if word in UNSERVED_TYPES:
             message = f"controller '{name}': ROS knows the type '{word}', manipcli does not serve it: left out"
             self.tell("CTRL214", place, message, severity="warning")
-            return
-        hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="served")
-        self.tell("CTRL203", place, f"controller '{name}': the type '{word}' is not known", hint=hint)
+        elif _of_vendor(word):
+            package, _, own = word.partition("/")
+            message = (
+                f"controller '{name}': '{word}' is of the package '{package}', manipcli does not serve it: left out"
+            )
+            same = [one for one in BY_TYPE if one.partition("/")[2] == own]
+            hint = did_you_mean(word, same, kind="served")
+            self.tell("CTRL214", place, message, hint=hint, severity="warning")
+        else:
+            hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="served")
+            self.tell("CTRL203", place, f"controller '{name}': the type '{word}' is not known", hint=hint)
 
     def served(
         self,
@@ -268,6 +279,18 @@ def _joints(node: MappingNode) -> list[str]:
 def _may_be(node: Found, controller: Found) -> bool:
     """Whether these parameters are this controller's: the same name, and one of them does not say its namespace."""
     return node.name == controller.name and 1 in (len(node.path), len(controller.path))
+
+
+def _of_vendor(word: str) -> bool:
+    """Whether this is `package/Class` of a package that is none of ROS's, nor one of those written wrong."""
+    package = word.partition("/")[0]
+    return re.fullmatch(r"\w+/\w+", word) is not None and not any(_slip(package, known) for known in PACKAGES)
+
+
+def _slip(given: str, known: str) -> bool:
+    """Whether no more than two letters differ, in upper or lower case."""
+    match = difflib.SequenceMatcher(None, given.casefold(), known.casefold(), autojunk=False)
+    return max(len(given), len(known)) - sum(block.size for block in match.get_matching_blocks()) <= 2
 
 
 def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:

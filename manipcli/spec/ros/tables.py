@@ -208,13 +208,18 @@ UNSERVED_TYPES: Final = frozenset(
         "motion_primitives_controllers/MotionPrimitivesForwardController",
         "omni_wheel_drive_controller/OmniWheelDriveController",
         "pose_broadcaster/PoseBroadcaster",
+        "position_controllers/ScaledJointTrajectoryController",
         "range_sensor_broadcaster/RangeSensorBroadcaster",
         "state_interfaces_broadcaster/StateInterfacesBroadcaster",
         "tricycle_controller/TricycleController",
         "tricycle_steering_controller/TricycleSteeringController",
+        "velocity_controllers/ScaledJointTrajectoryController",
     }
 )
 """Controllers that ROS has and manipcli does not: left out with a warning."""
+
+PACKAGES: Final = frozenset(word.partition("/")[0] for word in (*BY_TYPE, *UNSERVED_TYPES)) | {"gripper_controllers"}
+"""ROS's own packages of controllers: all their types are known. Any other package is a vendor's."""
 
 MANAGER: Final = Block(
     known=frozenset(
