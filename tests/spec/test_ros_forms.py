@@ -64,14 +64,17 @@ ARM = {"type": "joint_trajectory", "joints": ("a",), "command_interfaces": ("eff
             "type: effort_controllers/GripperActionController, joint: f, goal_tolerance: 0.01, max_effort: 2.0, "
             "stall_velocity_threshold: 0.002, stall_timeout: 0.3, gains: {f: {p: 5}}",
             {
-                "type": "gripper", "joints": ("f",), "goal_tolerance": 0.01, "max_effort": 2.0,
-                "stall_velocity": 0.002, "stall_time": 0.3, "gains": {"f": {"p": 5.0}},
+                "type": "gripper", "joints": ("f",), "command_interface": "effort", "goal_tolerance": 0.01,
+                "max_effort": 2.0, "stall_velocity": 0.002, "stall_time": 0.3, "gains": {"f": {"p": 5.0}},
             },
         ),
         (
-            "type: parallel_gripper_action_controller/GripperActionController, joint: f, max_velocity: 0.1, "
-            "gains: {f: {p: 5}}",
-            {"type": "gripper", "joints": ("f",), "speed": 0.1, "gains": {"f": {"p": 5.0}}},
+            "type: parallel_gripper_action_controller/GripperActionController, joint: f, max_velocity: 0.1",
+            {"type": "gripper", "joints": ("f",), "command_interface": "position", "speed": 0.1},
+        ),
+        (
+            "type: position_controllers/GripperActionController, joint: f, max_effort: 0.0",
+            {"type": "gripper", "joints": ("f",), "command_interface": "position"},
         ),
         (
             "type: forward_command_controller/ForwardCommandController, joints: [a, b], interface_name: velocity",
@@ -527,6 +530,18 @@ controller_manager:
     assert (
         "c.yaml:3:5: error[CTRL201]: controller_manager: unknown key 'updaterate' | did you mean 'update_rate'?" in line
     )
+
+
+def test_what_does_nothing_on_the_positions_of_a_hand_is_told() -> None:
+    hand = "type: position_controllers/GripperActionController, joint: f"
+    controllers, findings = loaded(f"x: {{{hand}, max_effort: 50.0, gains: {{f: {{p: 5}}}}}}")
+    assert controllers == {"x": {"type": "gripper", "joints": ("f",), "command_interface": "position"}}
+    assert [one.partition("warning[CTRL214]: ")[2] for one in told(findings)] == [
+        "x: 'max_effort' does nothing on the position interface: left out",
+        "x: 'gains' does nothing on the position interface: left out",
+    ]
+    controllers, findings = loaded(f"x: {{{hand}, max_effort: 2, command_interface: effort, gains: {{f: {{p: 5}}}}}}")
+    assert (controllers["x"]["max_effort"], controllers["x"]["gains"], findings) == (2.0, {"f": {"p": 5.0}}, ())
 
 
 def test_a_wrench_of_no_link_is_left_out() -> None:

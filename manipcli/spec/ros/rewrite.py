@@ -153,12 +153,23 @@ class _Rewriting:
             self.tell("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
             return None
         self.foreign.append(name)
-        if word.value in table.differing:
-            message = f"controller '{name}' {table.differing[word.value]}"
-            self.tell("CTRL214", word.place, message, severity="warning")
+        node = self.effective(name, node, table)
         served = self.served(name, node, table.parameters, model, ignored=ELSEWHERE)
         self.unclamped(name, mapping(mapping(served).get("gains")))
         return served
+
+    def effective(self, name: str, node: MappingNode, table: Table) -> MappingNode:
+        """Without what does nothing on the interface that it commands, which is told."""
+        word = node.get("command_interface")
+        interface = str(word.value) if isinstance(word, ScalarNode) else ""
+        for key in table.idle.get(interface, ()):
+            entry = node.entries.get(key)
+            if entry is not None and not _neutral(table.parameters, key, entry.node):
+                message = f"{name}: '{key}' does nothing on the {interface} interface: left out"
+                hint = "on efforts, grips have a force: `command_interface: effort`, with `gains`"
+                self.tell("CTRL214", entry.key_place, message, hint=hint, severity="warning")
+                node = node.without(key)
+        return node
 
     def unclamped(self, name: str, gains: MappingNode) -> None:
         """Integrals that do nothing in ROS 1, and much here."""

@@ -59,7 +59,7 @@ class Table:
         types: ROS's name -> what it implies.
         parameters: of all of them.
         reshape: controller after renaming -> what no table can say.
-        differing: ROS's name -> what is not the same with it.
+        idle: command interface -> keys of ours that do nothing on it.
         needs: a key without which ROS's block does not say enough; then it is left out with a warning.
     """
 
@@ -67,7 +67,7 @@ class Table:
     types: Mapping[str, Words]
     parameters: Block
     reshape: Callable[[MappingNode], MappingNode] = _same
-    differing: Words = field(default_factory=dict)
+    idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     needs: str = ""
 
 

@@ -72,14 +72,11 @@ JOINT_TRAJECTORY: Final = Table(
 GRIPPER: Final = Table(
     own="gripper",
     types={
-        "effort_controllers/GripperActionController": {},
-        "position_controllers/GripperActionController": {},
-        "parallel_gripper_action_controller/GripperActionController": {},
+        "effort_controllers/GripperActionController": {"command_interface": "effort"},
+        "position_controllers/GripperActionController": {"command_interface": "position"},
+        "parallel_gripper_action_controller/GripperActionController": {"command_interface": "position"},
     },
-    differing=dict.fromkeys(
-        ("position_controllers/GripperActionController", "parallel_gripper_action_controller/GripperActionController"),
-        "commands efforts here, not positions, so that its grip has a force: it needs `gains`",
-    ),
+    idle={"position": ("gains", "max_effort")},
     parameters=Block(
         known=_ANY | {"allow_stalling", "max_effort_interface", "max_velocity_interface"},
         quiet=_EVERYWHERE | {"state_interfaces", "action_monitor_rate"},
