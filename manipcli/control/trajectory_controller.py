@@ -43,8 +43,8 @@ class JointTrajectoryController:
     that update's period. Until then, and for joints that it leaves out, the path before is followed. It succeeds at or
     after its end, when all joints are inside their goal tolerances at the same tick; it is aborted when a joint leaves
     its path tolerance before (and at its first tick), or is outside its goal tolerance `goal_time` after the end. After
-    a success the last position is held at rest; after a cancel the reference is brought to rest and held, with all joints
-    on their straight path, or each by itself where a position limit is near.
+    a success the last position is held at rest; after a cancel the reference is brought to rest and held: all joints on
+    their straight path, or each by itself where a position limit is near.
 
     Where ROS 1 and 2 differ, `compat` chooses; without it the safer of the two is done:
 
@@ -217,12 +217,15 @@ class JointTrajectoryController:
             constraints: for this goal, instead of the controller's.
 
         Raises:
-            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities over the limits,
-                points that differ in what they give or give what is not allowed, a velocity at the end, an end in the
-                past. The goal before then goes on.
+            GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities over the limits (on
+                the way to the first point, too, once it is active), points that differ in what they give or give what
+                is not allowed, a velocity at the end, an end in the past. The goal before then goes on.
         """
         goal = trajectory if isinstance(trajectory, TrajectoryGoal) else TrajectoryGoal(trajectory)
         ordered = check_goal(goal, self._facts, self._accepted, self._time)
+        if self._activated:
+            actual = self._desired - self._error
+            self._transitions.check_way(ordered, goal.start_time, self._reference, self._time, actual)
         tolerances = self._default_tolerances
         if constraints is not None:
             tolerances = Tolerances.of(self.joints, constraints, patient=self._compat == "ros2")

@@ -201,11 +201,17 @@ def _check_limits(trajectory: JointTrajectory, facts: JointFacts) -> None:
     fast = np.abs(velocities) > facts.velocity * (1.0 + VELOCITY_SLACK)
     if fast.any():
         k, j = (int(index) for index in np.argwhere(fast)[0])
-        raise GoalRejected(
-            "CTRL125",
-            f"joint '{facts.joints[j]}' moves at {velocities[k, j]:.6g} {facts.units[j]}/s {what} {k + first}; "
-            f"its limit is {facts.velocity[j]:.6g} {facts.units[j]}/s",
-        )
+        raise too_fast(facts, j, float(velocities[k, j]), f"{what} {k + first}")
+
+
+def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalRejected:
+    """What a goal is refused with that asks joint `j` for a `velocity` beyond its limit."""
+    unit = facts.units[j] + "/s"
+    return GoalRejected(
+        "CTRL125",
+        f"joint '{facts.joints[j]}' moves at {velocity:.6g} {unit} {where}; "
+        f"its limit is {facts.velocity[j]:.6g} {unit}",
+    )
 
 
 def _beyond(facts: JointFacts, j: int, value: float, where: str) -> str:

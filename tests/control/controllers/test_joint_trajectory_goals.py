@@ -356,3 +356,59 @@ def test_two_runs_are_equal():
         return np.vstack(rows)
 
     assert np.array_equal(whole(), whole())
+
+
+def quick(**more):
+    """A controller whose joint may move at 1 rad/s, and rests at 0."""
+    controller = made(limits=[JointLimits(-6.0, 6.0, velocity=1.0)], **more)
+    run(controller, 1)
+    return controller
+
+
+@pytest.mark.parametrize("velocity", [None, 0.0])
+def test_a_first_point_that_is_too_far_away_is_refused_like_any_other(velocity):
+    """From 0 at rest 0.9 rad in 0.1 s are 9 rad/s, whatever the curve."""
+    with pytest.raises(GoalRejected, match=r"'j' moves at 9 rad/s on the way to point 0; its limit is 1 rad/s"):
+        quick().send_goal(to(at(0.9, 0.1, velocity)))
+    with pytest.raises(GoalRejected, match=r"moves at -2 rad/s on the way to point 0"):
+        quick().send_goal(TrajectoryGoal(to(at(-1.0, 0.5), at(0.0, 2.0)), start_time=3.0))
+    with pytest.raises(GoalRejected, match=r"moves at -1.5708 rad/s on the way to point 0"):  # the shortest way
+        quick(types=["continuous"]).send_goal(to(at(1.5 * math.pi, 1.0), at(1.5 * math.pi + 0.1, 2.0)))
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        to(at(0.1, 0.1 * (1 - 1e-6))),  # rounded
+        to(at(1e-7, 1e-9), at(0.0, 1.0)),
+        to(at(0.9, 0.0)),  # wanted as a step
+        to(at(-0.2, 0.001), at(0.0, 1.0)),  # where the joint is measured
+        TrajectoryGoal(to(at(0.005, 0.0051), at(0.0, 1.0)), start_time=PERIOD / 2),  # past, but it was in reach
+        JointTrajectory(["j"], [at(0.9, 0.1)], interpolation="none"),
+    ],
+)
+def test_a_first_point_is_not_refused_for_rounding_or_where_the_joint_is(goal):
+    controller = quick()
+    run(controller, 1, first=1, measured=state(-0.2))
+    assert controller.send_goal(goal).active
+
+
+def test_a_first_point_is_reached_from_where_the_reference_will_be():
+    """It moves at its limit: from 0.5 at 0.5 s, 0.51 one tick later, 1 rad at its end."""
+    for start_time, point, legal in (
+        (0.0, at(0.6, 0.1), True), (0.0, at(0.61, 0.1), True), (0.0, at(0.62, 0.1), False), (0.8, at(0.9, 0.1), True),
+        (0.8, at(0.6, 0.1), False), (2.0, at(1.1, 0.1), True), (2.0, at(0.5, 0.1), False),
+    ):  # fmt: skip
+        controller = quick()
+        controller.send_goal(to(at(1.0, 1.0)))
+        run(controller, 51, first=1, measured=state(5.0))
+        goal = TrajectoryGoal(to(point, at(1.0, 3.0)), start_time=start_time + (PERIOD if start_time else 0.0))
+        if legal:
+            assert controller.send_goal(goal).active
+        else:
+            with pytest.raises(GoalRejected, match="on the way to point 0"):
+                controller.send_goal(goal)
+
+
+def test_a_goal_before_the_controller_is_active_is_not_asked_for_its_way():
+    assert made(limits=[JointLimits(velocity=1.0)]).send_goal(to(at(0.9, 0.1))).active
