@@ -14,7 +14,7 @@ from manipcli.flow.live import Live
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Onlooker, Progress
 from manipcli.flow.plan import Plan
-from manipcli.flow.steps_run import StepsRun, saturated_ticks
+from manipcli.flow.steps_run import StepsRun, cuts_of
 from manipcli.model.condition import World
 from manipcli.model.kinematics import Kinematics
 from manipcli.record.recorder import Recorder
@@ -82,10 +82,8 @@ def simulate(
             try:
                 run.steps()
             finally:
-                for kind, ticks in saturated_ticks(session).items():
-                    counts = {name: str(count) for name, count in ticks.items() if count}
-                    if counts:
-                        recorder.metadata(kind, counts)
+                for kind, counts in cuts_of(session).to_metadata().items():
+                    recorder.metadata(kind, counts)
     finally:
         engine.close()
 

@@ -19,6 +19,7 @@ from manipcli.flow.onlooker import Progress
 from manipcli.flow.plan import Plan, PlannedStep, plan_step
 from manipcli.flow.replan import Measured, after
 from manipcli.flow.watching import Watching
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Situation
@@ -36,15 +37,13 @@ AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
-MOST_CUT: Final = 3
-"""Joints that are named as cut at their limits."""
 
 
-def saturated_ticks(session: Session) -> dict[str, dict[str, int]]:
+def cuts_of(session: Session) -> Cuts:
     """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
     joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return {"saturated joints": joints, "saturated actuators": actuators}
+    return Cuts(joints, actuators, session.ticks)
 
 
 class StepsRun:
@@ -196,7 +195,7 @@ class StepsRun:
 
     def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: Situation, *, again: bool) -> MotionEnd:
         """One attempt, planned anew where things are not as they were planned to be, or `again`."""
-        ticks, saturated = self._session.ticks, saturated_ticks(self._session)
+        before = cuts_of(self._session)
         now = self._measured.situation(self._believed)
         differences = self._measured.differences(planned_start, now, step)
         anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
@@ -218,13 +217,13 @@ class StepsRun:
             self._executor.stop()
             return MotionEnd("failed", f"stopped: {alarm}")
         except SimulationFailed as failure:
-            text = str(failure) + _cut_since(saturated, self._session, ticks)
+            text = str(failure) + _cut_since(before, self._session)
             self._event("step_ended", planned, "failed", text)
             raise
         if end.outcome == "done":
             return end
         found = "" if anew or not differences else f"; when it began, {'; '.join(differences)}"
-        return MotionEnd(end.outcome, end.text + found + _cut_since(saturated, self._session, ticks))
+        return MotionEnd(end.outcome, end.text + found + _cut_since(before, self._session))
 
     def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
@@ -296,13 +295,7 @@ def _moves(planned: PlannedStep) -> bool:
     return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
 
 
-def _cut_since(before: dict[str, dict[str, int]], session: Session, tick: int) -> str:
-    """What had nothing left to give since `tick`, the worst first; nothing where everything had."""
-    counts = {
-        f"{kind.removeprefix('saturated ').removesuffix('s')} '{name}'": count - before[kind][name]
-        for kind, ticks in saturated_ticks(session).items()
-        for name, count in ticks.items()
-    }
-    worst = sorted((name for name, count in counts.items() if count), key=lambda name: -counts[name])[:MOST_CUT]
-    cut = ", ".join(f"{name} in {counts[name]}" for name in worst)
-    return f"; cut at its limits: {cut} of {session.ticks - tick} ticks" if cut else ""
+def _cut_since(before: Cuts, session: Session) -> str:
+    """What had nothing left to give since then; nothing where everything had."""
+    cut = str(cuts_of(session).since(before))
+    return f"; {cut}" if cut else ""

@@ -9,13 +9,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.judge.cuts import ACTUATORS, JOINTS
 from manipcli.record.compare import compare_logs, compared_with_itself
 from manipcli.record.compare_entries import compare_entries
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.verification import Verification
 
-UNFINISHED = ("run", "verdict", "saturated joints", "saturated actuators", "repair")
+UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, "repair")
 """Metadata that a run writes at its end; one that did not come to its end lacks it, or says something else."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import listed
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.expectation import Seams
@@ -65,6 +66,7 @@ def judge(
         errors=errors,
         text=text,
         drawn=_drawn(recording),
+        cuts=Cuts.from_metadata(recording.metadata, end=examined.end, period=recording.period),
     )
 
 

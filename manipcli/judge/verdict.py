@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from manipcli.core.errors import Finding
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 
 VerdictWord = Literal["passed", "failed", "error"]
@@ -63,6 +64,7 @@ class Verdict:
     """The judgement of one recording. `errors`: why there is none, or why it is incomplete or was never made.
 
     `drawn`: which sample of the task's `vary:` it is of; None: the task as it is written.
+    `cuts`: what was asked for more than it can give.
     """
 
     task: str
@@ -75,3 +77,4 @@ class Verdict:
     errors: tuple[Finding, ...] = ()
     text: str = ""
     drawn: Drawn | None = None
+    cuts: Cuts = field(default_factory=Cuts)

@@ -5,13 +5,14 @@ Two passes over the spans, one span in memory at a time: the first finds what wa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -148,7 +149,7 @@ def run_facts(
         powers.add(states.time, np.nan_to_num(effort * velocity))
         for meter in meters:
             meter.add(span, bodies)
-    saturated = _counts(recording.metadata.get("saturated joints", {}))
+    cuts = Cuts.from_metadata(recording.metadata, end=end, period=recording.period)
     units = ["m" if joint.type == "prismatic" else "rad" for joint in robot.moving_joints]
     found = tuple(
         JointFacts(
@@ -160,7 +161,7 @@ def run_facts(
             given=float(powers.given[:, k].sum()),
             taken=float(powers.taken[:, k].sum()),
             power=powers.peak(k),
-            saturated=saturated.get(name, 0),
+            saturated=cuts.joints.get(name, 0),
         )
         for k, name in enumerate(robot.joint_names)
     )
@@ -168,17 +169,13 @@ def run_facts(
         joints=found,
         steps=powers.steps(),
         holds=tuple(meter.finish() for meter in meters),
-        actuators=tuple(_counts(recording.metadata.get("saturated actuators", {})).items()),
+        actuators=tuple(cuts.actuators.items()),
         times=errors.times,
         errors=errors.table(),
         period=recording.period,
         start=errors.start,
         end=end,
     )
-
-
-def _counts(values: Mapping[str, str]) -> dict[str, int]:
-    return {name: int(text) for name, text in values.items() if text.isdecimal()}
 
 
 class _Limits:

@@ -83,8 +83,10 @@ def causes(page: RunPage) -> Markup | None:
             element("p", jump, line_link(cause.written) if cause.written is not None else None, class_="jump"),
         )
         shown.append(element("div", *lines, class_="cause"))
+    cut = str(page.verdict.cuts)
     also = element("div", element("p", "Also:", class_="about"), *shown[1:], class_="also") if shown[1:] else None
-    first = [element("div", shown[0], also)]
+    told_cut = element("p", f"In this run: {cut}.", class_="about") if cut else None
+    first = [element("div", shown[0], also, told_cut)]
     if page.moment is not None:
         told = f"{page.verdict.task} at {page.moment.time:.2f} s"
         caption = element("figcaption", f"at {page.moment.time:.2f} s")

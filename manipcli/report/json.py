@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from manipcli.core.errors import Finding
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
@@ -91,6 +92,7 @@ def _object(
         "real_time_factor": number(real_time_factor),
         "log": log,
         "timing": timing,
+        "saturated": saturated_object(judged.cuts if judged is not None else Cuts()),
         "steps": [step_object(step) for step in (judged.steps if judged is not None else ())],
         "expectations": [
             {
@@ -109,6 +111,14 @@ def _object(
 
 def _sample(drawn: Drawn) -> Json:
     return {"number": drawn.number, "values": dict(drawn.values)}
+
+
+def saturated_object(cuts: Cuts) -> dict[str, Json]:
+    """Ticks by joint and by actuator, of those that were cut."""
+    return {
+        "joints": {name: count for name, count in cuts.joints.items() if count},
+        "actuators": {name: count for name, count in cuts.actuators.items() if count},
+    }
 
 
 def step_object(step: StepOutcome) -> dict[str, Json]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.record.inventory import Inventory
 from manipcli.record.recording import EMBEDDED
-from manipcli.report.json import Json, dumps, number, step_object
+from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, steps_table
 
@@ -45,6 +46,15 @@ class LogInfo:
         return self.inventory.metadata.get("versions", {})
 
     @property
+    def cuts(self) -> Cuts:
+        """What was asked for more than it can give."""
+        try:
+            period = float(self.run.get("period", ""))
+        except ValueError:
+            period = 0.0
+        return Cuts.from_metadata(self.inventory.metadata, end=self.inventory.end or 0.0, period=period)
+
+    @property
     def size_per_minute(self) -> float | None:
         """[byte] a minute of the log; None where it has no length."""
         return 60.0 * self.inventory.size / self.inventory.duration if self.inventory.duration > 0.0 else None
@@ -72,7 +82,7 @@ def render_text(info: LogInfo) -> str:
     if meshes:
         held = "all of them in the log" if embedded >= meshes else f"{embedded} of them in the log"
         lines += ["", f"{meshes} meshes, {'none of them in the log' if not embedded else held}"]
-    lines += ["", _headline(info), _length(info)]
+    lines += ["", _headline(info), *([str(info.cuts)] if str(info.cuts) else []), _length(info)]
     return "\n".join([*lines, f"log: {found.path}"])
 
 
@@ -93,6 +103,7 @@ def render_json(info: LogInfo) -> str:
             "run": dict(info.run),
             "versions": dict(info.versions),
             "verdict": dict(info.verdict) or None,
+            "saturated": saturated_object(info.cuts),
             "steps": [step_object(step) for step in info.steps],
             "topics": [
                 {

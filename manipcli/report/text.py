@@ -80,6 +80,8 @@ def _verdict(verdict: Verdict, speed: str) -> list[str]:
         lines += [_expectations(verdict.expectations), ""]
     mark = PASS if verdict.verdict == "passed" else FAIL
     lines.append(f"{mark} {verdict.task} {verdict.verdict}: {verdict.text or _summary(verdict)}")
+    if cut := str(verdict.cuts):
+        lines.append(cut)
     lines.append(f"{speed}; engine {verdict.engine}, seed {verdict.seed}")
     if verdict.drawn is not None:
         lines.append(str(verdict.drawn))

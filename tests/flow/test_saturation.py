@@ -10,8 +10,11 @@ from typing import Any
 import pytest
 
 from manipcli.core.errors import Finding
+from manipcli.flow.log import judge_log
+from manipcli.flow.log_info import log_info
 from manipcli.pipeline import run_task
 from manipcli.record.reading import open_recording
+from manipcli.report.log_info import render_text
 
 HOME = Path(__file__).parents[2] / "tasks" / "home.yaml"
 
@@ -44,6 +47,9 @@ def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Pat
     (doubt,) = listener.doubts
     assert "joint_2: holding against gravity takes up to" in doubt.message
     assert report.verdict.verdict == "failed"
+    assert report.verdict.cuts == judge_log(log).cuts
+    assert report.verdict.cuts.joints["joint_2"] > 0
+    assert "joint 'joint_2' in" in render_text(log_info(log))
     counts = {k: int(v) for k, v in open_recording(log).metadata["saturated joints"].items()}
     told = re.search(r"; cut at its limits: joint 'joint_2' in (\d+) of (\d+) ticks", report.verdict.steps[0].text)
     assert told is not None

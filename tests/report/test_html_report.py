@@ -15,6 +15,7 @@ import pytest
 
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import frozen
+from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
 from manipcli.report.facts import JointFacts, Peak, RunFacts, StepFacts, Use
@@ -139,6 +140,15 @@ def test_the_cause_comes_first_and_the_verdict_before_it() -> None:
     found = [words.index(each) for each in order[:3]] if page.playback is None else []
     assert found == sorted(found)
     assert words.index("82 mm") < words.index("−16.0 mm") < words.index("Tracking and limits")
+
+
+def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
+    page = replace(_page(), causes=(Cause("expectation 'near' fails by 2 mm", "", 1.5),))
+    cut = replace(page, verdict=replace(page.verdict, cuts=Cuts({"b": 7}, {}, 150)))
+    told = "In this run: cut at its limits: joint 'b' in 7 of 150 ticks."
+    words = _Page(render_page(cut)).words
+    assert words.index("fails by 2 mm") < words.index(told) < words.index("Tracking and limits")
+    assert told not in _Page(render_page(page)).words
 
 
 def test_what_the_log_lacks_is_said() -> None:

@@ -31,7 +31,7 @@ def test_the_documented_names_are_there() -> None:
     answer = json.loads(render_run(REPORT))
     assert set(answer) >= {
         "task", "verdict", "seed", "engine", "simulated_time", "wall_time", "real_time_factor", "log", "timing",
-        "steps", "expectations", "errors",
+        "saturated", "steps", "expectations", "errors",
     }  # fmt: skip
     assert set(answer["timing"]) == {"load", "plan", "simulate", "judge"}
     assert set(answer["steps"][0]) >= {"id", "verb", "outcome", "started", "ended", "planned_duration"}

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 TASKS = ROOT / "tasks"
 NAMES = {
     "task", "verdict", "seed", "engine", "simulated_time", "wall_time", "real_time_factor", "log", "timing", "steps",
-    "expectations", "errors",
+    "saturated", "expectations", "errors",
 }  # fmt: skip
 
 

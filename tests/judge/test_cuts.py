@@ -1,0 +1,42 @@
+"""What was cut is told in one line, the worst first, and goes through the metadata of a log unchanged."""
+
+from __future__ import annotations
+
+from manipcli.judge.cuts import Cuts
+from manipcli.judge.verdict import Verdict
+from manipcli.report.json import saturated_object
+from manipcli.report.text import render_verdict
+
+CUTS = Cuts({"a": 5, "b": 0, "c": 70}, {"m1": 6, "m2": 300}, 2000)
+
+
+def test_the_worst_three_are_named_and_what_was_never_cut_is_not() -> None:
+    assert str(CUTS) == (
+        "cut at their limits: actuator 'm2' in 300, joint 'c' in 70, actuator 'm1' in 6 of 2000 ticks; "
+        "1 more less often"
+    )
+    assert str(Cuts(actuators={"m1": 463}, ticks=2000)) == "cut at its limits: actuator 'm1' in 463 of 2000 ticks"
+    assert str(Cuts({"a": 0}, {}, 2000)) == ""
+
+
+def test_metadata_give_back_what_went_into_them() -> None:
+    assert CUTS.to_metadata() == {
+        "saturated joints": {"a": "5", "c": "70"},
+        "saturated actuators": {"m1": "6", "m2": "300"},
+    }
+    assert str(Cuts.from_metadata(CUTS.to_metadata(), end=1.999, period=1e-3)) == str(CUTS)
+    assert Cuts().to_metadata() == {}
+    damaged = {"saturated joints": {"a": "-1", "b": "many", "c": "4"}}
+    assert str(Cuts.from_metadata(damaged, end=1.0, period=0.0)) == "cut at its limits: joint 'c' in 4 ticks"
+
+
+def test_since_an_earlier_moment_only_what_was_added_counts() -> None:
+    before = Cuts({"a": 5, "c": 60}, {"m2": 300}, 1900)
+    assert str(CUTS.since(before)) == "cut at their limits: joint 'c' in 10, actuator 'm1' in 6 of 100 ticks"
+
+
+def test_a_verdict_tells_it_in_text_and_json() -> None:
+    verdict = Verdict("t", "passed", 0, "pybullet", 1.0, (), (), cuts=CUTS)
+    assert f"\n{CUTS}\n" in render_verdict(verdict, "x.mcap")
+    assert "cut at" not in render_verdict(Verdict("t", "passed", 0, "pybullet", 1.0, (), ()), "x.mcap")
+    assert saturated_object(CUTS) == {"joints": {"a": 5, "c": 70}, "actuators": {"m1": 6, "m2": 300}}
