@@ -15,7 +15,7 @@ Path = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Something at `path` (namespaces, then its name), and where that is written."""
+    """Something at `path` (namespaces, then its name: "" for what is said of all there), and where that is written."""
 
     path: Path
     key_place: Place
@@ -23,7 +23,7 @@ class Found:
 
     @property
     def name(self) -> str:
-        """Without its namespaces; "" for what is said of all nodes."""
+        """Without its namespaces."""
         return self.path[-1] if self.path else ""
 
 
@@ -61,14 +61,17 @@ def _is_namespace(node: MappingNode) -> bool:
 
 
 def at_nodes(root: MappingNode, above: Path = ()) -> Iterator[Found]:
-    """The nodes of ROS 2 and their parameters, `*` and `**` left out of the paths; then what is no node."""
+    """The nodes of ROS 2 and their parameters; then what is no node. `*` and `**` are "" at the end of a path, and left
+    out before it.
+    """
     for key, entry in root.entries.items():
         path = (*above, *_parts(key))
         if not isinstance(entry.node, MappingNode) or not is_ros2(entry.node):
             yield Found(path, entry.key_place, entry.node)
             continue
         if PARAMETERS in entry.node.entries:
-            yield Found(path, entry.key_place, undotted(mapping(entry.node.get(PARAMETERS))))
+            name = ("",) if key.endswith("*") else ()
+            yield Found((*path, *name), entry.key_place, undotted(mapping(entry.node.get(PARAMETERS))))
         yield from at_nodes(entry.node.without(PARAMETERS), path)
 
 
@@ -87,18 +90,19 @@ def undotted(node: MappingNode) -> MappingNode:
             key = first
         before = entries.get(key)
         if before is not None and isinstance(before.node, MappingNode) and isinstance(inner, MappingNode):
-            entries[key] = Entry(before.key_place, _merged(before.node, inner))
+            entries[key] = Entry(before.key_place, merged(before.node, inner))
         else:
             entries[key] = Entry(entry.key_place, inner)
     return MappingNode(entries, node.place)
 
 
-def _merged(a: MappingNode, b: MappingNode) -> MappingNode:
+def merged(a: MappingNode, b: MappingNode) -> MappingNode:
+    """Both, to the depth of their blocks; where they differ, `b`."""
     entries = dict(a.entries)
     for key, entry in b.entries.items():
         before = entries.get(key)
         if before is not None and isinstance(before.node, MappingNode) and isinstance(entry.node, MappingNode):
-            entry = Entry(before.key_place, _merged(before.node, entry.node))
+            entry = Entry(before.key_place, merged(before.node, entry.node))
         entries[key] = entry
     return MappingNode(entries, a.place)
 

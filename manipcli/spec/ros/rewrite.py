@@ -14,6 +14,7 @@ from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_names
 from manipcli.spec.ros.table import Block, Table, model_below, models, value
 from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, OTHER_NODES, PACKAGES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
+from manipcli.spec.ros.wildcards import Wildcards
 from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
 
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
@@ -80,7 +81,8 @@ class _Rewriting:
     def of_nodes(self, root: MappingNode) -> list[Found]:
         """The controllers of ROS 2: their types stand at the controller manager, or at their own nodes."""
         nodes = list(at_nodes(root))
-        managers = [one for one in nodes if one.name == MANAGER or not one.path]
+        managers = [one for one in nodes if one.name in (MANAGER, "")]
+        wildcards = Wildcards([one for one in managers if not one.name], self.models)
         own = [one for one in nodes if one not in managers]
         declared = [found for manager in managers for found in self.declared(manager)]
         used: list[Found] = []
@@ -88,26 +90,45 @@ class _Rewriting:
         for one in declared:
             blocks = [node for node in own if node.path == one.path] or [n for n in own if _may_be(n, one)]
             used += blocks
-            merged = dict(mapping(one.node).entries)
+            entries = dict(mapping(one.node).entries)
             for block in blocks:
-                merged.update(mapping(block.node).entries)
+                entries.update(mapping(block.node).entries)
             # What is missing in a controller is missing in its own block, where there is one.
             nearest = blocks[-1] if blocks else one
             place = nearest.key_place if blocks else one.node.place
-            found.append(Found(one.path, nearest.key_place, MappingNode(merged, place)))
+            found.append(wildcards.given(Found(one.path, nearest.key_place, MappingNode(entries, place))))
         names = [one.name for one in declared]
         for node in own:
             if node in used:
                 continue
-            if has_type(node.node):
-                found.append(node)
+            given = node if node.name in OTHER_NODES else wildcards.given(node)
+            if has_type(given.node):
+                found.append(given)
             elif node.name in OTHER_NODES:
                 self.tell("CTRL214", node.key_place, f"'{node.name}' is no controller: left out", severity="warning")
             else:
                 hint = did_you_mean(node.name, names, kind="it names")
                 message = f"the controller_manager names no controller '{node.name}'"
                 self.tell("CTRL203", node.key_place, message, hint=hint)
+        self.of_all(wildcards, found)
         return found
+
+    def of_all(self, wildcards: Wildcards, found: list[Found]) -> None:
+        """Parameters of all nodes that no controller has taken."""
+        for one, key, entry in wildcards.left():
+            where = "/".join(("", *one.path[:-1], "**"))
+            if key == "type" and not found:
+                message = f"{where}: no block names the controllers of this type"
+                self.tell("CTRL203", entry.key_place, message, hint="add `NAME: {ros__parameters: {joints: [...]}}`")
+            elif key in ELSEWHERE:
+                message = f"{where}: ROS knows '{key}', no controller here takes it: left out"
+                self.tell("CTRL214", entry.key_place, message, severity="warning")
+            elif key != "type":
+                kinds = {str(plain(kind)) for kind in (mapping(c.node).get("type") for c in found) if kind is not None}
+                tables = [BY_TYPE[kind] for kind in sorted(kinds) if kind in BY_TYPE]
+                known = [name for t in tables for name in (*self.models[t.own].model_fields, *t.parameters.names)]
+                hint = did_you_mean(key, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)], kind="known")
+                self.tell("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
 
     def declared(self, manager: Found) -> list[Found]:
         """The controllers that a manager names; its own parameters are told of."""
@@ -118,7 +139,7 @@ class _Rewriting:
                 found.append(Found((*above, key), entry.key_place, entry.node))
             else:
                 names.append(key)
-        for key in names:
+        for key in names if manager.name else [key for key in names if key in MANAGER_BLOCK.names]:
             self.managers_own(key, mapping(manager.node).entries[key], [one.name for one in found])
         return found
 

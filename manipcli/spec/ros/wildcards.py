@@ -1,0 +1,81 @@
+"""Parameters below `/**` or `/*`: every node of a namespace has them, unless it says otherwise itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from manipcli.spec.controllers import ControllerSpec
+from manipcli.spec.ros.nodes import Found, has_type, mapping, merged
+from manipcli.spec.ros.tables import BY_TYPE, MANAGER
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+
+_BY_JOINT = ("gains", "constraints")
+"""Blocks with one block a joint, of which a controller reads those of its own joints."""
+
+
+class Wildcards:
+    """Those of one file, with what stands there for no controller left out; and which of them one has taken."""
+
+    def __init__(self, found: list[Found], models: Mapping[str, type[ControllerSpec]]) -> None:
+        self.models = models
+        self.shared = [Found(one.path, one.key_place, _without_controllers(one.node)) for one in found]
+        self.taken: set[str] = set()
+
+    def given(self, controller: Found) -> Found:
+        """The controller, with what it has from all; without a type when nothing says one."""
+        shared = MappingNode({}, controller.key_place)
+        for one in self.shared:
+            space = one.path[:-1]
+            if controller.path[: len(space)] == space:
+                shared = merged(shared, mapping(one.node))
+        own = mapping(controller.node)
+        both = merged(shared, own)
+        if not has_type(both):
+            return controller
+        takes = {key: entry for key, entry in shared.entries.items() if key == "type" or self.takes(both, key)}
+        self.taken |= takes.keys()
+        joints = _joints(both)
+        for key in _BY_JOINT:
+            if key in takes and joints is not None:
+                takes[key] = Entry(takes[key].key_place, _of_joints(takes[key].node, joints))
+        return Found(controller.path, controller.key_place, merged(MappingNode(takes, own.place), own))
+
+    def takes(self, node: MappingNode, key: str) -> bool:
+        """Whether a controller of this type reads it; of types that are not served nobody knows."""
+        word = node.get("type")
+        kind = str(word.value) if isinstance(word, ScalarNode) else ""
+        table = BY_TYPE.get(kind)
+        model = self.models.get(kind if table is None else table.own)
+        names = () if table is None else table.parameters.names
+        return model is None or key in model.model_fields or key in names
+
+    def left(self) -> list[tuple[Found, str, Entry]]:
+        """What no controller has taken: where it stands, its name, and what is said."""
+        return [
+            (one, key, entry)
+            for one in self.shared
+            for key, entry in mapping(one.node).entries.items()
+            if key not in self.taken
+        ]
+
+
+def _without_controllers(node: Node) -> MappingNode:
+    """Without the blocks of controllers and the parameters of their manager."""
+    entries = mapping(node).entries
+    of_others = [key for key, entry in entries.items() if has_type(entry.node) or key in MANAGER.names]
+    return mapping(node).without(*of_others)
+
+
+def _joints(node: MappingNode) -> frozenset[str] | None:
+    """The joints of a controller, where they are listed."""
+    joints = node.get("joints")
+    if not isinstance(joints, SequenceNode):
+        return None
+    return frozenset(str(item.value) for item in joints.items if isinstance(item, ScalarNode))
+
+
+def _of_joints(node: Node, joints: frozenset[str]) -> Node:
+    if not isinstance(node, MappingNode):
+        return node
+    others = [key for key, entry in node.entries.items() if isinstance(entry.node, MappingNode) and key not in joints]
+    return node.without(*others)
