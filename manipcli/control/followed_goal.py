@@ -38,14 +38,12 @@ class FollowedGoal:
     timeout: float
     begin: float = 0.0
     _before: tuple[float, Array] | None = None
+    _now: tuple[float, Array] | None = None
 
     def judge_path(
         self, errors: Array, acceleration: Array, measured_velocity: Array, time: float, clock: float
     ) -> Then:
         """Ends it where a joint left its path tolerance.
-
-        What is measured of an acceleration is the change of the velocity since the tick before; it is only looked at
-        where the goal has a tolerance for it.
 
         Args:
             errors: (2, n) of position and velocity.
@@ -54,33 +52,44 @@ class FollowedGoal:
             time: [s] now.
             clock: [s] of the course now.
         """
-        judged = [errors[0], errors[1]]
-        if self.tolerances.needs_acceleration:
-            before, self._before = self._before, (time, np.array(measured_velocity))
-            if before is not None and time > before[0]:
-                judged.append(acceleration - (measured_velocity - before[1]) / (time - before[0]))
+        judged = self._judged(errors, acceleration, measured_velocity, time)
         if not self.tolerances.outside_path(judged):
             return "go on"
         text = self.tolerances.path_text(self.facts, judged, time, clock - self.begin)
         return self._abort(ErrorCode.PATH_TOLERANCE_VIOLATED, text, time)
 
-    def judge_end(self, errors: Array, time: float, late: float) -> Then:
+    def judge_end(self, errors: Array, acceleration: Array, measured_velocity: Array, time: float, late: float) -> Then:
         """Ends it, `late` [s] after its end, where it is reached or its patience is over.
 
         Args:
-            errors: (2, n) of position and velocity.
-            time, late: see above.
+            errors, acceleration, measured_velocity, time: as for `judge_path`.
+            late: see above.
         """
-        if self.tolerances.inside_goal(tuple(errors)):
+        judged = self._judged(errors, acceleration, measured_velocity, time)
+        known = len(judged) == len(self.tolerances.goal) or not self.tolerances.needs_acceleration
+        if known and self.tolerances.inside_goal(judged):
             self.handle.end("succeeded", ErrorCode.SUCCESSFUL, f"goal reached at t = {time:.3f} s", time)
             return "let go"
         if late <= min(self.tolerances.goal_time, self.timeout):
             return "go on"
-        text = self.tolerances.goal_text(self.facts, tuple(errors), time, late)
+        text = self.tolerances.goal_text(self.facts, judged, time, late)
         if late > self.tolerances.goal_time:
             return self._abort(ErrorCode.GOAL_TOLERANCE_VIOLATED, text, time)
         self._abort(ErrorCode.GOAL_TOLERANCE_VIOLATED, f"{text}, cmd_timeout {self.timeout:.6g} s", time)
         return "let go"
+
+    def _judged(self, errors: Array, acceleration: Array, measured_velocity: Array, time: float) -> list[Array]:
+        """Errors of position, velocity and, where the goal has a tolerance for it and it is known, acceleration.
+
+        What is measured of an acceleration is the change of the velocity since the tick before.
+        """
+        judged = [errors[0], errors[1]]
+        if self.tolerances.needs_acceleration:
+            if self._now is None or time != self._now[0]:
+                self._before, self._now = self._now, (time, np.array(measured_velocity))
+            if self._before is not None and time > self._before[0]:
+                judged.append(acceleration - (measured_velocity - self._before[1]) / (time - self._before[0]))
+        return judged
 
     def _abort(self, code: ErrorCode, text: str, time: float) -> Then:
         self.handle.end("aborted", code, f"controller '{self.controller}': {text}", time)

@@ -65,9 +65,9 @@ class Tolerances:
     def bound(self) -> float:
         """Errors of position and velocity whose norm is less are inside every path tolerance.
 
-        0 where an acceleration counts, too: they tell nothing of that.
+        0 where an acceleration counts, too, there or at the end: they tell nothing of that.
         """
-        if np.isfinite(self.path[2]).any():
+        if self.needs_acceleration:
             return 0.0
         return float(self.path[:2].min())
 

@@ -278,7 +278,8 @@ class JointTrajectoryController:
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
             late = reference.clock(time) - reference.end
-            self._go_on(self._goal.judge_end(self._errors, time, late), time, measured)
+            then = self._goal.judge_end(self._errors, self._output.acceleration, measured.velocity, time, late)
+            self._go_on(then, time, measured)
         feed = reference.feed
         if self._pid is None:
             self._commands[:] = feed

@@ -226,6 +226,33 @@ def test_a_velocity_tolerance_at_the_goal():
     assert handle.status == "succeeded"
 
 
+@pytest.mark.parametrize(("limit", "status"), [(1.9, "aborted"), (2.1, "succeeded"), (-1.0, "succeeded")])
+def test_an_acceleration_tolerance_at_the_goal(limit, status):
+    """After the end the joint's velocity grows by 2 rad/s2, while its place is that of the goal."""
+    controller = made(constraints=ConstraintsSpec(goal_time=0.05, stopped_velocity_tolerance=0.0))
+    goal = TrajectoryGoal(to(at(0.0, 0.05)), goal_tolerance=(JointTolerance("j", acceleration=limit),))
+    handle = controller.send_goal(goal)
+    for k in range(20):
+        controller.update(k * PERIOD, PERIOD, state(0.0, 2.0 * k * PERIOD))
+    assert handle.status == status
+    if status == "aborted":
+        assert "goal acceleration tolerance: acceleration error -2 rad/s^2, limit 1.9 rad/s^2" in handle.result.text
+    else:
+        assert handle.result.time == pytest.approx(0.05)
+
+
+def test_an_acceleration_at_the_goal_is_waited_for():
+    """At its first tick nobody knows it; a joint that has come to rest reaches its goal at the next."""
+    controller = made(constraints=ConstraintsSpec(goal_time=0.1, stopped_velocity_tolerance=0.0))
+    tolerance = (JointTolerance("j", acceleration=0.5),)
+    run(controller, 1)
+    at_once = controller.send_goal(TrajectoryGoal(to(at(0.0, 0.0)), goal_tolerance=tolerance))
+    run(controller, 1, first=1)
+    assert at_once.active
+    run(controller, 1, first=2)
+    assert at_once.status == "succeeded"
+
+
 def test_efforts_of_points_go_to_the_command():
     """Linear between the points, a period ahead; the last one stays."""
     points = [at(0.0, 0.0, effort=0.0), at(0.0, 1.0, effort=10.0)]
