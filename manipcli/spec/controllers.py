@@ -86,8 +86,12 @@ class GainsSpec(Model):
 class JointConstraintSpec(Model):
     """Tolerances of one joint, rad or m; absent means not enforced."""
 
-    trajectory: Annotated[JointValue, Field(gt=0)] | None = Field(None, description="On the way [rad or m], above 0.")
-    goal: Annotated[JointValue, Field(gt=0)] | None = Field(None, description="At the end [rad or m], above 0.")
+    trajectory: Annotated[JointValue, Field(gt=0)] | None = Field(
+        None, description="On the way [rad or m], above 0. Left out: not enforced."
+    )
+    goal: Annotated[JointValue, Field(gt=0)] | None = Field(
+        None, description="At the end [rad or m], above 0. Left out: not enforced."
+    )
     max_deceleration_on_cancel: Annotated[JointAcceleration, Field(ge=0)] = Field(
         0.0, description="After a cancel [rad/s^2 or m/s^2], 0 or more. Default 0: the joint's acceleration limit."
     )

@@ -29,6 +29,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from manipcli.core.errors import Finding
@@ -194,9 +195,7 @@ def _told(
     if kind == "extra_forbidden":
         return _unknown_key(path, dict(first.tags), model)
     if kind == "missing":
-        field = shape.keys_of(shape.at(model, path[:-1], dict(first.tags))).get(str(path[-1]))
-        described = field.description if field is not None else None
-        return f"the key '{path[-1]}' is missing", described and f"{path[-1]}: {described}"
+        return f"the key '{path[-1]}' is missing", _described(_field(first, model), path)
     if "message" in context:
         return str(context["message"]), str(context.get("hint", "")) or None
     if kind == "literal_error":
@@ -206,7 +205,10 @@ def _told(
     if kind in ("too_short", "too_long"):
         return _wrong_count(context, node), None
     if kind in _RANGES:
-        return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", None
+        field = _field(first, model)
+        optional = field is not None and field.default is None
+        hint = _described(field, path) if optional else None
+        return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", hint
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
     expected = _expected(first)
@@ -217,6 +219,16 @@ _RANGES = {
     "greater_than": "more than", "greater_than_equal": "at least", "less_than": "less than",
     "less_than_equal": "at most", "multiple_of": "a multiple of",
 }  # fmt: skip
+
+
+def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
+    """What the model says of the key; None for an item of a list, and for a name that the writer has chosen."""
+    *above, key = complaint.path or ("",)
+    return shape.keys_of(shape.at(model, tuple(above), dict(complaint.tags))).get(str(key))
+
+
+def _described(field: FieldInfo | None, path: Path) -> str | None:
+    return None if field is None or not field.description else f"{path[-1]}: {field.description}"
 
 
 def _limit(context: dict[str, object]) -> str:

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.spec.load import load_robot_text
+from manipcli.spec.load import load_controllers_text, load_robot_text
 from manipcli.spec.yaml import parse
 
 ROBOT = "robot: r\ndescription: r.urdf\n"
@@ -48,3 +48,15 @@ def test_the_greatest_whole_numbers_are_read() -> None:
 
 def test_what_is_not_finite_is_not_said_to_be_a_text() -> None:
     assert refused(f"{ROBOT}friction: .nan\n").hint == "write a finite number"
+
+
+def test_a_tolerance_of_zero_is_told_what_leaving_it_out_means() -> None:
+    constraints = "constraints: {joints: {a: {goal: 0, trajectory: 0.1}}}"
+    with pytest.raises(InvalidInput) as error:
+        load_controllers_text(f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}", "c.yaml")
+    (finding,) = error.value.findings
+    assert (finding.code, finding.hint) == ("CTRL204", "goal: At the end [rad or m], above 0. Left out: not enforced.")
+
+
+def test_a_number_out_of_range_that_may_not_be_left_out_has_no_such_hint() -> None:
+    assert refused(f"{ROBOT}default_acceleration: -1\n").hint is None
