@@ -79,4 +79,5 @@ def idle_gains(joints: Sequence[str], gains: Mapping[str, GainsSpec], interface:
         if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()
             message = f"the gains of joint '{joint}' are all zero; on the {interface} interface it would not move"
-            yield Problem(loc, message, f"give gains.{joint}.p; `manipcli tune` proposes it", "CTRL103")
+            wanted = f"give gains.{joint}.p" if gains else f"add `gains: {{{joint}: {{p: ..., d: ...}}}}`"
+            yield Problem(loc, message, f"{wanted}; `manipcli tune ROBOT CONTROLLERS` proposes them", "CTRL103")

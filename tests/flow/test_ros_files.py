@@ -82,8 +82,26 @@ arm_controller:
 """
     (line,) = errors(tmp_path, listing)
     assert "controllers.yaml:2:3: error[CTRL103]: controller 'arm_controller': the gains of joint 'joint_1'" in line
-    assert f"are all zero; on the {interface} interface it would not move | give gains.joint_1.p; `manipcli" in line
+    hint = "add `gains: {joint_1: {p: ..., d: ...}}`; `manipcli tune ROBOT CONTROLLERS` proposes them"
+    assert f"are all zero; on the {interface} interface it would not move | {hint}" in line
+    assert errors(tmp_path, listing + "  gains: {joint_1: {p: 3, d: 0.5}}\n") == []
+    (line,) = errors(tmp_path, listing + "  gains: {joint_1: {i_clamp: 1}}\n")
+    assert "would not move | give gains.joint_1.p; `manipcli tune" in line
     assert errors(tmp_path, listing.replace(f'"{interface}_', '"position_')) == []
+
+
+def test_a_hand_on_positions_needs_no_gains(tmp_path: Path) -> None:
+    hand = """\
+controller_manager:
+  ros__parameters:
+    arm_controller: {type: joint_trajectory_controller/JointTrajectoryController}
+    hand_controller: {type: position_controllers/GripperActionController}
+arm_controller: {ros__parameters: {joints: [joint_1], command_interfaces: [position]}}
+hand_controller: {ros__parameters: {joint: finger_1_proximal}}
+"""
+    assert errors(tmp_path, hand) == []
+    (line,) = errors(tmp_path, hand.replace("position_controllers", "effort_controllers"))
+    assert "controller 'hand_controller': the gains of joint 'finger_1_proximal' are all zero; on the effort" in line
 
 
 def interfaces(command: str, state: str = "position, velocity") -> str:
