@@ -22,6 +22,8 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
+from manipcli.control.motors import MotorLimits
+from manipcli.control.roles import is_hand
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
@@ -85,6 +87,8 @@ class Session:
         self.state = engine.read()
         self._limiter = JointLimiter([joint.limits for joint in robot.moving_joints], robot.joint_names)
         self.actuation = Actuation(robot, period)
+        hands = {name for one in manager.controllers if is_hand(one) for name in one.joints}
+        self._motors = MotorLimits(robot, pressing=hands)
         self._obeyed = -1
         self._asked = np.zeros(len(robot.joint_names))
         if engine.ideal:
@@ -108,7 +112,7 @@ class Session:
 
     @property
     def saturations(self) -> Array:
-        """(n) in how many ticks each joint's command was cut."""
+        """(n) in how many ticks each joint's command was cut, or the engine's motor at it gave all it may."""
         return self._limiter.saturations.astype(np.float64)
 
     @property
@@ -134,6 +138,8 @@ class Session:
         time = self.ticks * self.period
         state.time[...] = time
         self._touch(state)
+        if self._motors.watches:
+            self._motors.count(state.effort, self._limiter.saturated, self._limiter.saturations)
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         if manager.faults:
@@ -146,6 +152,11 @@ class Session:
                 raise SimulationFailed(str(bad), time=time) from bad
             manager.stop_non_finite(time)
             self._limiter.apply(command, state.position, state.velocity, self.period)
+        if command.version != self._obeyed:
+            self._obeyed = command.version
+            self.actuation.select(command.modes)
+            if not self.engine.ideal:
+                self._motors.select(command.modes)
         if self.actuation.ideal or self.engine.ideal:
             self.engine.write(command)
         else:
@@ -158,9 +169,6 @@ class Session:
     def _drive(self, command: JointCommand, state: WorldState) -> None:
         """Writes what the actuators make of the command. What the controllers wrote stays: a slow one relies on it."""
         actuation, effort = self.actuation, command.effort
-        if command.version != self._obeyed:
-            self._obeyed = command.version
-            actuation.select(command.modes)
         applied = actuation.apply(effort, state.position, state.velocity)
         if applied is effort:
             self.engine.write(command)

@@ -12,6 +12,7 @@ import pytest
 from manipcli.control.command import JointCommand, Mode
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
+from manipcli.control.motors import MotorLimits
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, Mimic, RobotModel
@@ -156,6 +157,43 @@ def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: s
     for rate, position in ways.items():
         assert position[-1] == pytest.approx(0.3, abs=1e-4), rate
         assert np.abs(position - ways[1000.0]).max() < peak * (1.0 / rate + 1e-3)
+
+
+@pytest.mark.parametrize("interface", ["position", "velocity"])
+@pytest.mark.parametrize(("share", "counted"), [(0.9, 300), (1.1, 0)])
+def test_a_motor_that_gives_all_it_may_is_counted(interface: str, share: float, counted: int) -> None:
+    limits = replace(FREE, effort=share * GRAVITY_EFFORT)
+    arm = JointTrajectoryController(
+        name="arm", joints=["hinge"], command_interfaces=[interface],
+        gains={"hinge": GainsSpec(p=30.0)} if interface == "velocity" else {}, limits=[limits], types=["revolute"],
+    )  # fmt: skip
+    manager = ControllerManager(joints=["hinge"], period=1e-3)
+    manager.load(arm)
+    manager.configure("arm")
+    manager.switch(["arm"])
+    engine = opened(limits)
+    scene = Scene((), (), frozen((0.0, 0.0, -9.81)))
+    session = Session(robot=robot(limits), scene=scene, engine=engine, manager=manager, period=1e-3)
+    for _ in range(301):  # the first tick measures what was before it
+        session.tick()
+    engine.close()
+    assert session.saturations[0] == pytest.approx(counted, abs=3)
+
+
+def test_of_a_hand_that_presses_and_of_a_tick_that_is_counted_already_nothing_is_added() -> None:
+    model = robot(replace(FREE, effort=2.0))
+    full, counts = np.array([-2.0]), np.zeros(1, dtype=np.int64)
+    motors = MotorLimits(model)
+    motors.select(["effort"])
+    assert not motors.watches
+    motors.select(["position"])
+    motors.count(full, np.array([True]), counts)
+    assert counts.tolist() == [0]
+    motors.count(full, np.array([False]), counts)
+    assert counts.tolist() == [1]
+    hand = MotorLimits(model, pressing={"hinge"})
+    hand.select(["position"])
+    assert not hand.watches
 
 
 def test_a_follower_settles_where_its_driver_says_also_under_gravity() -> None:
