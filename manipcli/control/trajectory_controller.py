@@ -263,6 +263,8 @@ class JointTrajectoryController:
         Raises:
             InvalidArgument: a period that is not above 0; a measured position or velocity that is not finite.
         """
+        if not 0.0 < period < math.inf:
+            raise InvalidArgument("CTRL105", f"controller '{self.name}': a period of {period} s; expected more than 0")
         self._time = time
         reference = self._reference
         if reference.moving:
@@ -325,8 +327,6 @@ class JointTrajectoryController:
 
     def _turn(self, time: float, period: float, measured: JointState) -> None:
         """What was asked for since the last update: to be active, a new goal, to stop."""
-        if not 0.0 < period < np.inf:
-            raise InvalidArgument("CTRL105", f"controller '{self.name}': a period of {period} s; expected more than 0")
         self._waiting = False
         if not self._activated:
             self._activated = True

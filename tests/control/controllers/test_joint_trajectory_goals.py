@@ -363,6 +363,14 @@ def test_what_is_measured_must_be_a_number(position, velocity):
             controller.update(PERIOD, PERIOD, state(position, velocity))
 
 
+@pytest.mark.parametrize("period", [0.0, -0.1, math.nan, math.inf])
+def test_a_period_is_a_time_at_every_tick(period):
+    controller = made()
+    run(controller, 2)  # it holds
+    with pytest.raises(InvalidArgument, match=r"a period of .* s; expected more than 0"):
+        controller.update(2 * PERIOD, period, state())
+
+
 @pytest.mark.parametrize(
     "wrong", [{"cmd_timeout": -1.0}, {"stop_trajectory_duration": math.nan}, {"speed_scaling": -0.1}]
 )
