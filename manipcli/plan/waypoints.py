@@ -114,10 +114,13 @@ def read_points(given: Sequence[Point], begins: Point | Values | None, n: int) -
         v1 = v0 + T (a0 + a1) / 2,  p1 = p0 + T (v0 + v1) / 2
 
     Raises:
-        InvalidArgument: no points, a point that gives nothing or a wrong number of values, accelerations beside
-            positions but no velocities, efforts at some points and not at others.
+        InvalidArgument: no points, a point that gives nothing or a wrong number of values, a mapping without a time,
+            accelerations beside positions but no velocities, efforts at some points and not at others.
     """
     points = _as_points(given)
+    for k, one in enumerate(given):
+        if isinstance(one, Mapping) and "time_from_start" not in one:
+            raise InvalidArgument("TRAJ113", f"point {k} has no time_from_start", hint="give it in seconds")
     start = TrajectoryPoint(begins) if isinstance(begins, Sequence | np.ndarray) else begins
     if not points:
         raise InvalidArgument("TRAJ101", "the trajectory has no points; expected at least one")

@@ -320,9 +320,11 @@ def test_durations_of_both_ros_are_read():
         (["a"], at(1, 1), "the points are TrajectoryPoint; expected a list"),
         (["a"], [3.0], "point 0 is 3.0; expected a TrajectoryPoint"),
         (["a"], [{"position": [1]}], "point 0 has an unknown 'position'"),
+        (["a"], [{"positions": [1], "time_from_start": 0}, {"positions": [1]}], "point 1 has no time_from_start"),
+        (["a"], [{"positions": [1]}], "point 0 has no time_from_start"),
         (["a"], [at(1, None)], "point 0 has the time_from_start None; expected seconds"),
         (["a"], [at(1, {"secs": "3"})], "time_from_start {'secs': '3'}; expected seconds"),
-        (["a"], [{"positions": "x"}], "point 0 has positions that are no numbers: 'x'"),
+        (["a"], [{"positions": "x", "time_from_start": 1}], "point 0 has positions that are no numbers: 'x'"),
     ],
 )
 def test_what_is_no_point_is_told_as_such(names, points, text):
