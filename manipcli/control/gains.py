@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import TypeVar
+
+from pydantic import ValidationError
 
 from manipcli.control.pid import AntiWindup, Compat, Pid
 from manipcli.core.errors import InvalidArgument
@@ -18,12 +21,34 @@ def joint_gains(
     """The gains (n) in the order of the joints, all zero where none are given.
 
     Raises:
-        InvalidArgument: gains of a joint that controller `name` does not have.
+        InvalidArgument: gains of a joint that controller `name` does not have; see `gains_of`.
     """
     unknown = sorted(set(gains) - set(joints))
     if unknown:
         raise InvalidArgument("CTRL102", f"controller '{name}': '{unknown[0]}' has gains, but is not one of its joints")
-    return tuple(GainsSpec.model_validate(gains.get(joint, GainsSpec())) for joint in joints)
+    return tuple(gains_of(name, joint, gains.get(joint, {}), GainsSpec) for joint in joints)
+
+
+G = TypeVar("G", bound=GainsSpec)
+
+
+def gains_of(name: str, joint: str, given: object, kind: type[G]) -> G:
+    """The gains of one joint of controller `name`, which may be `given` as a mapping of its fields.
+
+    Raises:
+        InvalidArgument: unknown fields, values out of their range, something else.
+    """
+    try:
+        return kind.model_validate(given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+    field = ".".join(str(part) for part in first["loc"])
+    where = f"controller '{name}': the gains of joint '{joint}'"
+    if first["type"] == "extra_forbidden":
+        hint = did_you_mean(field, kind.model_fields, kind="gains")
+        raise InvalidArgument("CTRL109", f"{where} have an unknown '{field}'", hint=hint)
+    what = f"{field} {first['input']!r}" if field else repr(first["input"])
+    raise InvalidArgument("CTRL109", f"{where}: {what}: {first['msg']}")
 
 
 def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], compat: Compat | None) -> Pid:

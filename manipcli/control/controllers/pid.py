@@ -33,7 +33,7 @@ from manipcli.control.controller import (
     refuse_not_finite,
 )
 from manipcli.control.controllers.forward_command import finite_values
-from manipcli.control.gains import build_pid, strangers
+from manipcli.control.gains import build_pid, gains_of, strangers
 from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
@@ -49,7 +49,7 @@ class PidController:
     Args:
         name: of the controller.
         joints: (n) distinct names.
-        gains: by joint name.
+        gains: by joint name, a `PidGainsSpec` or its fields.
         interface: what the command is.
         led: what the reference is of: position, position and velocity, or velocity.
         types: (n) joint types: the position error of a `continuous` joint is the shortest angle, unless its gains say.
@@ -58,7 +58,7 @@ class PidController:
         compat: order of the PID integration.
 
     Raises:
-        InvalidArgument: no or repeated joints, gains that are missing, all zero, or of other joints; other `led`.
+        InvalidArgument: no or repeated joints, gains that are missing, wrong, all zero or of other joints, other `led`.
     """
 
     role: Role = "other"
@@ -69,7 +69,7 @@ class PidController:
         *,
         name: str,
         joints: Sequence[str],
-        gains: Mapping[str, PidGainsSpec],
+        gains: Mapping[str, PidGainsSpec | Mapping[str, float]],
         interface: Interface = "effort",
         led: Sequence[Interface] = ("position",),
         types: Sequence[JointType] | None = None,
@@ -87,7 +87,7 @@ class PidController:
         for joint in {*gains} ^ {*self.joints}:
             kind = "is not one of its joints" if joint in gains else "has no gains"
             raise InvalidArgument("CTRL102", f"controller '{name}': '{joint}' {kind}")
-        own = tuple(gains[joint] for joint in self.joints)
+        own = tuple(gains_of(name, joint, gains[joint], PidGainsSpec) for joint in self.joints)
         # What is fed forward makes a joint move, too.
         counted = tuple(g.model_copy(update={"ff_velocity_scale": g.feedforward_gain}) for g in own)
         self._pid = build_pid(name, self.joints, counted, compat)

@@ -1,12 +1,19 @@
 """What cannot work with a robot is told before anything is built, at its place, with what would."""
 
+import re
 from functools import cache
 from pathlib import Path
 
 import pytest
 
+from manipcli.control import (
+    ComputedTorqueController,
+    GripperController,
+    JointTrajectoryController,
+    PidController,
+)
 from manipcli.control.factory import build_controllers, controller_findings
-from manipcli.core.errors import InvalidInput
+from manipcli.core.errors import InvalidArgument, InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.spec.load import load_controllers_text, load_robot
 
@@ -59,3 +66,20 @@ def test_what_cannot_work_is_told_at_its_place_and_not_built(name, text, code, t
     ]
     with pytest.raises(InvalidInput):
         build_controllers(file.spec, robot(name), 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("gains", "named"),
+    [
+        ({"p": 1.0, "q": 2.0}, "the gains of joint 'a' have an unknown 'q'"),
+        ({"p": -1.0}, "the gains of joint 'a': p -1.0: "),
+        ({"p": "1"}, "the gains of joint 'a': p '1': "),
+        (3.0, "the gains of joint 'a': 3.0: "),
+    ],
+)
+@pytest.mark.parametrize(
+    "kind", [JointTrajectoryController, GripperController, PidController, ComputedTorqueController]
+)
+def test_wrong_gains_in_python_are_told_with_their_joint(kind, gains, named):
+    with pytest.raises(InvalidArgument, match=re.escape(f"controller 'c': {named}")):
+        kind(name="c", joints=["a"], gains={"a": gains})
