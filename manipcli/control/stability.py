@@ -191,6 +191,17 @@ def largest_stiffness(loop: Loop) -> float:
     return unit * _boundary(with_p, start=start) if is_stable(with_p(start)) else 0.0
 
 
+def largest_integral(loop: Loop) -> float:
+    """The largest i of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
+    unit = float(loop.p[0]) / loop.period
+
+    def with_i(factor: float) -> Loop:
+        return replace(loop, i=np.array([unit * factor]))
+
+    start = 1e-6
+    return unit * _boundary(with_i, start=start) if unit > 0.0 and is_stable(with_i(start)) else 0.0
+
+
 def _boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
     """The first factor above `start`, where the loop is stable, at which it is not; within 0.1 %."""
     low = start

@@ -81,3 +81,8 @@ def shorten(text: str, *, width: int = 60) -> str:
     """`text`, escaped, and cut in the middle of nowhere with `...` when longer than `width`."""
     line = escape(text)
     return line if len(line) <= width else line[: width - 3] + "..."
+
+
+def digits(value: float) -> str:
+    """Three digits, and no exponent from 1e-4 to 1e5: `6000`, `0.084`, `164`."""
+    return f"{float(f'{value:.3g}'):.5g}"

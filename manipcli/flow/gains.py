@@ -15,9 +15,18 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.reflected import Load, Postures, load_of
-from manipcli.control.stability import Loop, is_stable, largest_damping, largest_stiffness, poles, unstable_share
+from manipcli.control.stability import (
+    Loop,
+    is_stable,
+    largest_damping,
+    largest_integral,
+    largest_stiffness,
+    poles,
+    unstable_share,
+)
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
+from manipcli.core.text import digits
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.model.kinematics import Kinematics
@@ -162,6 +171,7 @@ def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool)
 def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
     """(code, message, hint) of a loop that diverges or rings."""
     p, d, i = float(loop.p[0]), float(loop.d[0]), float(loop.i[0])
+    kp, kd, ki = f"kp {digits(p)}", f"kd {digits(d)}", f"ki {digits(i)}"
     at = f"at {1e3 * loop.period:.3g} ms"
     if loop.delay is not None and loop.delay[0]:
         at += f" and {int(loop.delay[0])} ticks of latency"
@@ -170,22 +180,26 @@ def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | Non
         if abs(worst) <= RINGING:
             return None
         most = largest_damping(loop)
-        message = f"{joint}: kd {d:.3g} rings {at}: its effort turns round every tick; {inertia}"
-        return "CTRL150", message, f"it is unstable above {most:.2g}; stay below half of that"
+        message = f"{joint}: {kd} rings {at}: its effort turns round every tick; {inertia}"
+        return "CTRL150", message, f"it is unstable above {digits(most)}; stay below half of that"
     most = largest_damping(loop)
     if 0.0 < most < d:
-        message = f"{joint}: kd {d:.3g} is unstable above {most:.2g} {at}; {inertia}"
-        return "CTRL150", message, f"stay below half of that: kd {0.5 * most:.2g}"
+        message = f"{joint}: {kd} is unstable above {digits(most)} {at}; {inertia}"
+        return "CTRL150", message, f"stay below half of that: kd {digits(0.5 * most)}"
+    swift = largest_integral(loop)
+    if 0.0 < swift < i:
+        message = f"{joint}: {ki} with {kp} and {kd} is unstable above {digits(swift)} {at}; {inertia}"
+        return "CTRL150", message, f"stay below half of that: ki {digits(0.5 * swift)}"
     if most == 0.0:
         stiffest = largest_stiffness(loop)
         if 0.0 < stiffest < p:
-            message = f"{joint}: kp {p:.3g} with kd {d:.3g} is unstable above {stiffest:.2g} {at}; {inertia}"
+            message = f"{joint}: {kp} with {kd} is unstable above {digits(stiffest)} {at}; {inertia}"
             return "CTRL150", message, "lower kp; `manipcli tune` proposes both"
-        message = f"{joint}: kp {p:.3g}, ki {i:.3g} and kd {d:.3g} are unstable {at}; {inertia}"
+        message = f"{joint}: {kp}, {ki} and {kd} are unstable {at}; {inertia}"
         return "CTRL150", message, "`manipcli tune` proposes gains that are not"
     need = 1.4 * math.sqrt(p * float(loop.mass[0, 0]))
-    message = f"{joint}: kp {p:.3g}{f', ki {i:.3g}' if i else ''} with kd {d:.3g} swings up {at}; {inertia}"
-    return "CTRL150", message, f"kd {min(need, 0.5 * most):.2g} damps it"
+    message = f"{joint}: {kp}{f', {ki}' if i else ''} with {kd} swings up {at}; {inertia}"
+    return "CTRL150", message, f"kd {digits(min(need, 0.5 * most))} damps it"
 
 
 def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
@@ -198,10 +212,10 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     if ratio >= SWINGING:
         return None
     message = (
-        f"{joint}: kp {p:.3g} with kd {d:.3g} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
+        f"{joint}: kp {digits(p)} with kd {digits(d)} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
         f"{ratio:.2g}; {inertia}"
     )
-    return "CTRL153", message, f"kd {1.4 * math.sqrt(p * float(loop.mass[0, 0])):.2g} gives 0.7"
+    return "CTRL153", message, f"kd {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
 
 
 def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Finding]:
@@ -225,8 +239,8 @@ def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Itera
     if sag > loop.tolerance:
         length = "m" if unit == "N" else "rad"
         message = (
-            f"{loop.joint}: kp {loop.gains.p:.3g} gives way by {sag:.2g} {length} under {weight:.3g} {unit} of gravity"
-            f", more than its tolerance of {loop.tolerance:.2g} {length}"
+            f"{loop.joint}: kp {digits(loop.gains.p)} gives way by {sag:.2g} {length} under {weight:.3g} {unit} of "
+            f"gravity, more than its tolerance of {loop.tolerance:.2g} {length}"
         )
         yield Finding("CTRL156", message, place, "gravity_compensation: true carries it, or an i gain", "warning")
 
@@ -265,7 +279,7 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
             continue
         pole, share = unstable_share(whole)
         worst = [k for k in np.argsort(-share) if share[k] > 0.1][:3]
-        names = ", ".join(f"{loops[k].joint} (kd {d[k]:.3g})" for k in worst)
+        names = ", ".join(f"{loops[k].joint} (kd {digits(d[k])})" for k in worst)
         message = (
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"

@@ -14,6 +14,7 @@ from manipcli.control.stability import (
     gain_margin,
     is_stable,
     largest_damping,
+    largest_integral,
     largest_stiffness,
     poles,
     unstable_share,
@@ -111,6 +112,19 @@ def test_two_loops_that_are_stable_alone_may_not_be_together() -> None:
     assert largest_eigenvalue(mass, d) * H > 2.0
     margin = gain_margin(Loop(mass, np.ones(2), d / 4, np.zeros(2), np.zeros(2), H))
     assert margin == pytest.approx(2.0 / (largest_eigenvalue(mass, d / 4) * H), rel=0.01)
+
+
+def test_the_largest_integral_is_where_the_loop_itself_stops_to_settle() -> None:
+    """With as much inertia and damping that time does not count as discrete, it is that of Routh: i < p d / I."""
+
+    def loop(i: float) -> Loop:
+        return Loop.of_joint(0.083, p=80.0, d=6.0, i=i, period=H)
+
+    bound = largest_integral(loop(1.0))
+    assert bound == pytest.approx(80.0 * 6.0 / 0.083, rel=0.03)
+    assert remains(loop(0.95 * bound), ticks=20000) < 1e-2
+    assert remains(loop(1.05 * bound), ticks=20000) > 1.0
+    assert largest_integral(Loop.of_joint(0.083, p=80.0, d=0.0, period=H)) == 0.0
 
 
 def largest_eigenvalue(mass: np.ndarray, d: np.ndarray) -> float:

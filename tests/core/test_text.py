@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.text import any_of, did_you_mean, escape, listed, nearest, number_of, shorten
+from manipcli.core.text import any_of, did_you_mean, digits, escape, listed, nearest, number_of, shorten
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
 
@@ -57,3 +57,11 @@ def test_near_names_are_known_names(name: str, known: list[str]) -> None:
 )
 def test_a_number_of_things_is_told_as_one_says_it(number: int, noun: str, told: str) -> None:
     assert number_of(number, noun) == told
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [(6000.0, "6000"), (164.3, "164"), (60512.0, "60500"), (0.08434, "0.0843"), (2e5, "2e+05"), (0.0, "0")],
+)
+def test_three_digits_stand_without_an_exponent_while_people_would_write_none(value: float, told: str) -> None:
+    assert digits(value) == told
