@@ -66,6 +66,7 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
         task=task.value,
         tags=(*tagged, f"engine_{engine_name}"),
         varied=root.get("vary") is not None,
+        line=task.place.line,
     )
 
 

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".yaml", ".yml")
 """As `batch/first_look.py` has them, which is not imported for any other file."""
+MARKS_OF_PYTEST = frozenset(
+    {"filterwarnings", "parametrize", "skip", "skipif", "tryfirst", "trylast", "usefixtures", "xfail"}
+)
+"""Marks that mean something to pytest itself: a tag of that name is a word for `-k` and nothing else."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -66,7 +70,7 @@ class TaskFile(pytest.File):
         case = read_case(self.path, shown=shown_path(self.path))
         for one in samples_of(case, self.config.getoption("manipcli_samples")):
             for tag in one.tags:
-                if tag not in _registered(self.config):
+                if tag not in MARKS_OF_PYTEST and tag not in _registered(self.config):
                     _register(self.config, tag, "a tag of a task")
             yield TaskItem.from_parent(self, name=one.name, case=one)
 
@@ -77,8 +81,10 @@ class TaskItem(pytest.Item):
     def __init__(self, *, name: str, parent: TaskFile, case: Case) -> None:
         super().__init__(name, parent)
         self._case = case
+        self.extra_keyword_matches.update(case.tags)
         for tag in case.tags:
-            self.add_marker(tag)
+            if tag not in MARKS_OF_PYTEST:
+                self.add_marker(tag)
 
     def runtest(self) -> None:
         """
@@ -107,8 +113,9 @@ class TaskItem(pytest.Item):
             return "\n".join([f"{report.outcome}: {gist(report)}", "", *case_lines(report)])
         return str(super().repr_failure(excinfo))
 
-    def reportinfo(self) -> tuple[Path, int | None, str]:
-        return self.path, None, self.name
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Its place, the line counted from 0: a test that is skipped is reported with it."""
+        return self.path, self._case.line - 1, self.name
 
 
 class TaskFailed(Exception):

@@ -27,6 +27,7 @@ class Case:
         tags: of the task, and `engine_<name>`.
         varied: whether the task has a `vary:`.
         findings: why the file cannot be read.
+        line: of the key `task`, from 1.
     """
 
     file: str
@@ -35,6 +36,7 @@ class Case:
     tags: tuple[str, ...] = ()
     varied: bool = False
     findings: tuple[Finding, ...] = ()
+    line: int = 1
 
     @property
     def name(self) -> str:

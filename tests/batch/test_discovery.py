@@ -96,9 +96,10 @@ def test_only_the_beginning_of_a_foreign_file_is_read(tmp_path: Path) -> None:
 
 def test_a_case_knows_name_tags_and_engine(tmp_path: Path) -> None:
     path = tmp_path / "t.yaml"
-    path.write_text("task: t\ntags: [slow, nightly]\nsimulation: {engine: kinematic}\nvary: {scene.a.mass: 1}\n")
+    path.write_text("# about it\ntask: t\ntags: [slow, nightly]\nsimulation: {engine: kinematic}\nvary: {scene.a.mass: 1}\n")
     case = read_case(path, shown="tasks/t.yaml")
-    assert (case.id, case.tags) == ("tasks/t.yaml::t", ("slow", "nightly", "engine_kinematic"))
+    assert (case.id, case.line) == ("tasks/t.yaml::t", 2)
+    assert case.tags == ("slow", "nightly", "engine_kinematic")
     assert [one.id for one in samples_of(case, 2)] == ["tasks/t.yaml::t[0]", "tasks/t.yaml::t[1]"]
     assert samples_of(case, None) == (case,)
 

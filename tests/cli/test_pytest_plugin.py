@@ -90,6 +90,32 @@ def test_tags_and_engine_are_markers_that_need_no_registration(project: pytest.P
     assert collected(project, "-k", "late") == ["tasks/late.yaml::late"]
 
 
+def test_a_conftest_can_skip_tasks_by_their_tags(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(
+        """
+        import pytest
+
+        def pytest_collection_modifyitems(items):
+            for item in items:
+                if "slow" in item.keywords:
+                    item.add_marker(pytest.mark.skip(reason="needs --runslow"))
+        """
+    )
+    pytester.makefile(".yaml", a="# slow\n" + TASK.format(name="a", tags="slow", below="10 s"))
+    result = pytester.runpytest_inprocess(*LOADED, *ALONE, "-rs")
+    result.assert_outcomes(skipped=1)
+    result.stdout.fnmatch_lines(["SKIPPED*a.yaml: needs --runslow"])
+    (item,), _ = pytester.inline_genitems(*LOADED, *ALONE)
+    assert item.location == ("a.yaml", 1, "a")  # its line counts from 0
+
+
+def test_a_tag_with_the_name_of_a_mark_of_pytest_is_a_word_alone(pytester: pytest.Pytester) -> None:
+    pytester.makefile(".yaml", a=TASK.format(name="a", tags="skip, xfail, usefixtures", below="10 s"))
+    everything = pytester.inline_genitems(*LOADED, *ALONE)[0]
+    assert [mark.name for item in everything for mark in item.iter_markers()] == ["engine_kinematic"]
+    assert collected(pytester, "-k", "skip and xfail") == ["a.yaml::a"]
+
+
 def test_samples_are_tests_of_their_own(project: pytest.Pytester) -> None:
     path = project.path / "tasks" / "good.yaml"
     path.write_text(path.read_text() + "vary: {simulation.settle: {uniform: [0.1 s, 0.2 s]}}\n")
