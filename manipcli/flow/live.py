@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.controller import Controller, ControllerOutput
+from manipcli.core.units import readable
 from manipcli.flow.log import recorded
 from manipcli.model.condition import World
 from manipcli.model.conditions import CONDITIONS
@@ -40,9 +41,11 @@ class Probe:
         self, spec: ConditionSpec, world: World, first: int, told: Told | None, catch_up: Callable[[], None]
     ) -> None:
         self._gauge = opened(spec, world, CONDITIONS)
+        self._word = "" if spec.combines else f"{spec.name}: "
         self._first = first
         self._catch_up = catch_up
         self._held = False
+        self._last: Reading | None = None
         self.told = told
 
     @property
@@ -51,13 +54,28 @@ class Probe:
         self._catch_up()
         return self._held
 
+    @property
+    def missing(self) -> str:
+        """`it fails by 3 mm: near: 'cup' is at ...`: how far it was from holding at the last tick.
+
+        Only to be asked before the next tick, while the arrays of this one stand.
+        """
+        self._catch_up()
+        if self._last is None:
+            return ""
+        if not self._last.applies[-1]:
+            return self._word + self._last.idle
+        found = self._last.found(len(self._last.margins) - 1)
+        by = f" by {readable(-found.margin, found.unit)}" if found.margin < 0.0 and found.unit else ""
+        return f"it fails{by}: {self._word}{found.text}"
+
     def look(self, moments: Moments, start: int) -> None:
         """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""
         skipped = max(self._first - start, 0)
         if skipped >= len(moments.times):
             return
         shown = moments.part(skipped, len(moments.times))
-        answer = self._gauge(shown)
+        answer = self._last = self._gauge(shown)
         self._held = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
         if self.told is not None:
             self.told(shown, answer)

@@ -13,7 +13,7 @@ from manipcli.control.action import GoalHandle
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.holding import Holding
-from manipcli.flow.live import Live
+from manipcli.flow.live import Live, Probe
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
 from manipcli.flow.plan import Plan, PlannedStep, plan_step
@@ -229,7 +229,8 @@ class StepsRun:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
         texts = []
-        with self._asked(step) as until:
+        with self._asked(step) as probe:
+            until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
             for k, motion in enumerate(planned.plan.motions):
                 self._event("phase_started", planned, "", motion.label)
@@ -239,7 +240,7 @@ class StepsRun:
                     over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
                 end = self._executor.run(motion, until=until, deadline=over)
                 if end.outcome != "done":
-                    return MotionEnd(end.outcome, f"{motion.label}: {end.text}")
+                    return MotionEnd(end.outcome, f"{motion.label}: {end.text}{_missing(end, probe)}")
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touched)
                 awaited = awaited and not motion.awaits
@@ -250,19 +251,19 @@ class StepsRun:
                     deadline = self._session.time + DEFAULT_UNTIL_TIME
                 end = self._executor.wait(until, deadline=deadline)
                 if end.outcome != "done":
-                    return end
+                    return replace(end, text=end.text + _missing(end, probe))
         return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
-    def _asked(self, step: StepSpec) -> Iterator[Until | None]:
-        """Whether what the step waits for holds, asked from now on; None where it waits for nothing, or only physics
-        could answer it."""
+    def _asked(self, step: StepSpec) -> Iterator[Probe | None]:
+        """What the step waits for, asked from now on; None where it waits for nothing, or only physics could answer
+        it."""
         if step.until is None or self._live.absent(step.until) is not None:
             yield None
             return
         probe = self._live.open(step.until)
         try:
-            yield lambda _: probe.holds
+            yield probe
         finally:
             self._live.close(probe)
 
@@ -293,6 +294,12 @@ class StepsRun:
 def _moves(planned: PlannedStep) -> bool:
     """Whether a step does anything that depends on where things are."""
     return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+
+
+def _missing(end: MotionEnd, probe: Probe | None) -> str:
+    """How far what was waited for was from holding, where that is why a motion ended."""
+    missing = probe.missing if probe is not None and end.awaited else ""
+    return f"; at the end {missing}" if missing else ""
 
 
 def _cut_since(before: Cuts, session: Session) -> str:

@@ -33,10 +33,11 @@ PATIENCE: Final = 30.0
 
 @dataclass(frozen=True, slots=True)
 class MotionEnd:
-    """How a motion or a wait ended."""
+    """How a motion or a wait ended; `awaited`: its time was over because the condition under `until` did not hold."""
 
     outcome: Literal["done", "failed", "timeout"]
     text: str = ""
+    awaited: bool = False
 
 
 DONE: Final = MotionEnd("done")
@@ -101,14 +102,16 @@ class Executor:
                 self._cancel()
                 return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
-            if not busy and awaited is not None and session.ticks % UNTIL_TICKS == 0 and awaited(state):
+            over = deadline is not None and session.time >= deadline
+            looks = over or session.ticks % UNTIL_TICKS == 0
+            if not busy and awaited is not None and looks and awaited(state):
                 awaited = None
             if not busy and awaited is None:
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
-            if deadline is not None and session.time >= deadline:
-                late = "this motion was" if busy or awaited is None else "the condition under `until` held"
+            if over:
+                late = "this motion was" if busy else "the condition under `until` held"
                 self._cancel()
-                return MotionEnd("timeout", f"the time of the step was over before {late}")
+                return MotionEnd("timeout", f"the time of the step was over before {late}", awaited=not busy)
             if deadline is None and session.time >= given_up:
                 late = f"it is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
                 self._cancel()
@@ -120,9 +123,10 @@ class Executor:
             state = self._tick()
             if self._session.manager.faults:
                 return _fault(self._session)
-            if self._session.ticks % UNTIL_TICKS == 0 and until(state):
+            looks = self._session.ticks % UNTIL_TICKS == 0 or self._session.time >= deadline
+            if looks and until(state):
                 return DONE
-        return MotionEnd("timeout", "the condition under `until` did not come to hold")
+        return MotionEnd("timeout", "the condition under `until` did not come to hold", awaited=True)
 
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""

@@ -60,6 +60,21 @@ def test_a_step_that_fails_ends_the_run_where_nothing_else_is_said(run: Run) -> 
     assert [len(step.attempts) for step in verdict.steps] == [1, 0]
 
 
+def test_a_condition_that_is_waited_for_in_vain_is_told_with_what_it_lacks(run: Run) -> None:
+    """0.3 rad away, 0.1 rad allowed: 0.2 rad, 11.5 deg. Also in a combination, and in a wait."""
+    at_end = "the condition under `until` %s; at the end it fails by 11.5 deg: at_pose: joint 'pitch' is 17.2 deg from"
+    assert at_end % "did not come to hold" in run(f"steps:\n{AWAY}{UP}").steps[0].text
+    both = UP.replace("{at_pose", "{all: [{duration: {below: 10 s}}, {at_pose").replace("$wide}}", "$wide}}]}")
+    assert at_end % "did not come to hold" in run(f"steps:\n{AWAY}{both}").steps[0].text
+    assert at_end % "held" in run(f"steps:\n{AWAY}  - wait: 0.1 s\n{UP}").steps[1].text
+
+
+def test_a_condition_that_holds_at_the_deadline_has_come_to_hold(run: Run) -> None:
+    """The time is over between two looks, 5 ticks after the last."""
+    until = "    until: {not: {duration: {below: 105 ms}}}\n    timeout: 110 ms\n"
+    assert run(f"steps:\n  - wait: 0.05 s\n{until}").steps[0].outcome == "done"
+
+
 def test_a_retry_has_other_parameters_also_in_those_made_of_them(run: Run, tmp_path: Path) -> None:
     """`wide` is twice `near`: 0.1 does not hold 0.3 rad away, 0.4 does."""
     steps = f"{AWAY}{UP}    on_fail: {{retry: 3, with: {{near: 0.2}}}}\n  - wait: 0.1 s\n"
