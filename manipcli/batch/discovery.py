@@ -4,17 +4,21 @@ that are named."""
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.batch.first_look import is_entered, looks_like_a_task
+from manipcli.batch.first_look import first_look, is_entered
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
 
 
-def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:
+def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = None) -> tuple[Path, ...]:
     """The task files among and below `paths`, each once, folder by folder in the order of names.
+
+    Args:
+        paths: files and folders.
+        tell: takes a line about each file in a folder that looks like a task and is left out.
 
     Raises:
         InvalidInput: a path is not there, or is a file but no task.
@@ -23,7 +27,11 @@ def task_files(paths: Sequence[Path]) -> tuple[Path, ...]:
     refused: list[Finding] = []
     for path in paths:
         if path.is_dir():
-            below = [file for file in _files(path) if looks_like_a_task(file)]
+            looks = [(file, first_look(file)) for file in _files(path)]
+            below = [file for file, look in looks if look == "task"]
+            if tell is not None:
+                for file in (file for file, look in looks if look == "no robot"):
+                    tell(f"{shown_path(file)} has `task:` but no `robot:`; not run")
         else:
             below = [path]
             refused += _no_task(path)
@@ -107,7 +115,7 @@ def _no_task(path: Path) -> tuple[Finding, ...]:
         read_bytes(path)
     except InvalidInput as invalid:
         return invalid.findings
-    if looks_like_a_task(path, named=True):
+    if first_look(path, named=True) == "task":
         return ()
     message = "this is no task file: a YAML file with the top-level keys `task` and `robot` was expected"
     return (Finding("USE105", message, Place(str(path), 1, 1)),)

@@ -2,42 +2,66 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from pathlib import Path
+from typing import Literal
 
 SUFFIXES = (".yaml", ".yml")
 SNIFFED = 65536
 """Bytes of a file in which keys are looked for: nothing else of foreign files is read."""
 NOT_ENTERED = frozenset({"runs", "build", "dist", "node_modules", "site-packages", "__pycache__"})
 """Folders that hold results and what others wrote; as well as hidden ones and virtual environments."""
-_KEY = rb"""(?:^|\A\s*\{(?s:.*[,{])?\s*)(["']?)%b\1[ \t]*:(?=\s)"""
-_TASK, _ROBOT = (re.compile(_KEY % key, re.MULTILINE) for key in (b"task", b"robot"))
+_KEY = rb"""(?:^|\A\s*\{(?s:.*[,{])?\s*)(["']?)(?:%b)\1[ \t]*:(?=\s)"""
+_TASK, _ROBOT, _OURS = (
+    re.compile(_KEY % key, re.MULTILINE)
+    for key in (b"task", b"robot", b"controllers|scene|steps|expect|start|simulation")
+)
 _NAME = re.compile(rb"""[ \t]+(?!(?:null|true|false|[\d.]+)\s*(?:#|$))["']?[^\W_]""", re.MULTILINE)
 """A text that begins as a name does, and no list, mapping, alias or tag."""
+_NO_SCALAR = re.compile(
+    rb"""[ \t]+[\[{*&!]|[ \t]*(?:#[^\n]*)?\r?\n(?:\s*#[^\n]*\n)*\s*(?:-[ \t]|[ \t][^\s#][^\n]*:\s)"""
+)
+
+Look = Literal["task", "no robot", "other"]
+"""`no robot`: begins like a task that lacks its robot, or has it misspelt."""
 
 
-def looks_like_a_task(path: Path, *, named: bool = False) -> bool:
-    """Whether a file begins like a task: by its name and its first bytes, so that any file may be asked about.
+def first_look(path: Path, *, named: bool = False) -> Look:
+    """What a file is by its name and its first bytes, so that any file may be asked about.
 
     Args:
         path: the file.
-        named: somebody said that it is one: then the key `task` is enough, and what is wrong with it is told.
+        named: somebody said that it is a task: then the key `task` is enough, and what is wrong with it is told.
     """
-    if path.suffix not in SUFFIXES or path.name.startswith("."):
-        return False
+    if path.suffix.lower() not in SUFFIXES or path.name.startswith("."):
+        return "other"
     try:
         if not path.is_file():  # opening a pipe would wait for who writes into it
-            return False
+            return "other"
         with path.open("rb") as file:
-            text = file.read(SNIFFED).removeprefix(b"\xef\xbb\xbf")
+            text = _utf_8(file.read(SNIFFED))
     except OSError:
-        return False
+        return "other"
     task = _TASK.search(text)
     if task is None or named:
-        return task is not None
-    return _NAME.match(text, task.end()) is not None and _ROBOT.search(text) is not None
+        return "other" if task is None else "task"
+    robot = _ROBOT.search(text) is not None
+    if robot and _NAME.match(text, task.end()):
+        return "task"
+    # Others have a `task:` as well: who else has such keys, and no mapping or list there, has written one of ours.
+    if _OURS.search(text) is None or _NO_SCALAR.match(text, task.end()):
+        return "other"
+    return "task" if robot else "no robot"
 
 
 def is_entered(folder: Path) -> bool:
     """Whether tasks are looked for in a folder that nobody named."""
     return not (folder.name.startswith(".") or folder.name in NOT_ENTERED or (folder / "pyvenv.cfg").exists())
+
+
+def _utf_8(text: bytes) -> bytes:
+    """Without the mark at its beginning; of UTF-16, in which no task can be written, so that this is told."""
+    if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return text.decode("utf-16", "replace").encode("utf-8", "replace")
+    return text.removeprefix(codecs.BOM_UTF8)

@@ -49,9 +49,8 @@ def bless(
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
         )
-        chosen = [
-            Job(read_case(file, shown=shown_path(file)), file, settings) for file in task_files(paths or [Path()])
-        ]
+        files = task_files(paths or [Path()], tell=console.talk)
+        chosen = [Job(read_case(file, shown=shown_path(file)), file, settings) for file in files]
         if not chosen:
             console.result("nothing to bless: there is no task file")
             return ExitCode.NOTHING_TO_RUN

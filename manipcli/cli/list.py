@@ -84,5 +84,5 @@ def _yaml_files(folder: Path) -> list[Path]:
     return sorted(
         path
         for path in folder.rglob("*.y*ml")
-        if path.suffix in (".yaml", ".yml") and not any(part.startswith(".") for part in path.parts)
+        if path.suffix.lower() in (".yaml", ".yml") and not any(part.startswith(".") for part in path.parts)
     )

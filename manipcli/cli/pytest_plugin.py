@@ -51,12 +51,12 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
 
     That is one that is named, and has the top-level key `task`; of others, those with a name there and the key `robot`.
     """
-    if file_path.suffix not in SUFFIXES:
+    if file_path.suffix.lower() not in SUFFIXES:
         return None
-    from manipcli.batch.first_look import looks_like_a_task
+    from manipcli.batch.first_look import first_look
 
     named = parent.session.isinitpath(file_path)
-    if not looks_like_a_task(file_path, named=named) or not _is_looked_for(file_path, parent.session):
+    if first_look(file_path, named=named) != "task" or not _is_looked_for(file_path, parent.session):
         return None
     return TaskFile.from_parent(parent, path=file_path)
 

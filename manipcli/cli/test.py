@@ -115,7 +115,7 @@ def _jobs(
     failed = known(settings.folder) if last_failed else frozenset()
     found: list[Job] = []
     again: list[Job] = []
-    for file in task_files(paths):
+    for file in task_files(paths, tell=console.talk):
         case = read_case(file, shown=shown_path(file))
         cases = samples_of(case, samples)
         found += (Job(one, file, settings) for one in cases)

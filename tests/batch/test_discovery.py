@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.batch.discovery import read_case, samples_of, task_files
-from manipcli.batch.first_look import looks_like_a_task
+from manipcli.batch.first_look import first_look
 from manipcli.core.errors import InvalidInput
 
 TASKS = {
@@ -20,6 +20,10 @@ TASKS = {
     "tasks/more.yaml": '{\n  "robot": "r.yaml",\n  "steps": [{"wait": 1}],\n  "task": "more"\n}\n',
     "tasks/nullable.yaml": "task: nullable\nrobot: r.yaml\n",
     "tasks/windows.yaml": "\ufeff# a comment\r\ntask: windows\r\nrobot: r.yaml\r\n",
+    "tasks/LOUD.YAML": "task: loud\nrobot: r.yaml\n",
+    "tasks/empty.yaml": "task:  # later\nrobot: r.yaml\nsteps: []\n",
+    "tasks/three.yaml": "task: 3\nrobot: r.yaml\ncontrollers: c.yaml\n",
+    "tasks/accent.yaml": "task: été\nrobot: r.yaml\nsteps: []\n",
     "tasks/broken.yaml": "task: broken\nrobot: r.yaml\nsteps: [\n",
 }
 OTHERS = {
@@ -31,6 +35,10 @@ OTHERS = {
     "group.yaml": "task:\n  name: a mapping\nrobot: r.yaml\n",
     "comment.yaml": "# task: no\ntask: # nothing\nrobot: r.yaml\n",
     "robotless.yaml": "task: hello\nsteps: {robot: r}\nvars:\n  robot: r\n",
+    "hydra.yaml": "task:\n  # chosen\n  name: Lift\nrobot: panda\nscene: kitchen\nsimulation: {dt: 1}\n",
+    "list_below.yaml": "task:\n- a\nrobot: r\nsteps: 5\n",
+    "azure.yml": "trigger: [main]\nsteps:\n- task: UsePythonVersion@0\n",
+    "template.yaml": "task: {{ name }}\nrobot: r\nsteps: []\n",
     "map.yaml": "task: {a: b}\nrobot: r.yaml\n",
     "list.yaml": "task: [1, 2]\nrobot: r.yaml\n",
     "null.yaml": "task: ~\nrobot: r.yaml\n",
@@ -58,6 +66,32 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_task_files_below_a_folder_and_no_others(folder: Path) -> None:
     assert {str(path) for path in task_files([Path()])} == set(TASKS)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "task: t\ncontrollers: c.yaml\nsteps: []\n",
+        "Robot: r.yaml\ntask: t\nsteps: []\n",
+        "task: 3\nstart: home\n",
+        "task:\nscene: {}\n",
+        "{task: t, robt: r, expect: []}",
+    ],
+)
+def test_what_looks_like_a_task_without_its_robot_is_told(folder: Path, text: str) -> None:
+    (folder / "tasks" / "left.yaml").write_text(text)
+    told: list[str] = []
+    assert Path("tasks/left.yaml") not in task_files([Path("tasks"), Path("runs")], tell=told.append)
+    assert told == ["tasks/left.yaml has `task:` but no `robot:`; not run"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
+def test_a_task_in_utf_16_is_one_that_cannot_be_read(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "t.yaml"
+    text = "task: t\nrobot: r.yaml\nsteps: []\n"
+    path.write_bytes((text if encoding == "utf-16" else f"\ufeff{text}").encode(encoding))
+    assert task_files([tmp_path]) == (path,)
+    assert "UTF-8" in str(read_case(path).findings[0].hint)
 
 
 def test_a_folder_that_is_named_is_entered_whatever_it_is_called(folder: Path) -> None:
@@ -90,13 +124,15 @@ def test_a_file_that_is_named_is_a_case_that_tells_what_is_wrong(folder: Path, n
 def test_only_the_beginning_of_a_foreign_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "large.yaml"
     path.write_text("robot: r\n" + "a: 1\n" * 100_000 + "task: late\n")
-    assert not looks_like_a_task(path)
-    assert not looks_like_a_task(tmp_path / "absent.yaml")
+    assert first_look(path) == "other"
+    assert first_look(tmp_path / "absent.yaml") == "other"
 
 
 def test_a_case_knows_name_tags_and_engine(tmp_path: Path) -> None:
     path = tmp_path / "t.yaml"
-    path.write_text("# about it\ntask: t\ntags: [slow, nightly]\nsimulation: {engine: kinematic}\nvary: {scene.a.mass: 1}\n")
+    path.write_text(
+        "# about it\ntask: t\ntags: [slow, nightly]\nsimulation: {engine: kinematic}\nvary: {scene.a.mass: 1}\n"
+    )
     case = read_case(path, shown="tasks/t.yaml")
     assert (case.id, case.line) == ("tasks/t.yaml::t", 2)
     assert case.tags == ("slow", "nightly", "engine_kinematic")
