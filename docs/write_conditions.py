@@ -68,9 +68,10 @@ tolerance (`within`, `below`, ...; where a condition has none, its section says 
 tolerance left and signs come first: 5 mm of 20 mm left (0.25) is less than 2 deg of 5 deg (0.4).
 
 An expectation that could not be looked at is `not_evaluated`, which is no pass, and says why: a step that never ran, an
-engine without physics, a topic that is not in the log, an object that was never held, a state that is not finite. One
-member that cannot be evaluated makes a combination so, whatever the others are; a tick at which one has nothing to say
-(no hand holds the object of `slip`) does not count.
+engine without physics (which moves no object, needs no efforts and makes references come true at once), a topic that is
+not in the log, an object that was never held, a state that is not finite. One member that cannot be evaluated makes a
+combination so, whatever the others are; a tick at which one has nothing to say (no hand holds the object of `slip`)
+does not count.
 
 ## Names in reports
 

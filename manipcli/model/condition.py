@@ -130,6 +130,11 @@ def untouchable(world: World) -> str | None:
     return world.unrecorded.get("contacts")
 
 
+def effortless(world: World) -> str | None:
+    """Why nothing can be said of efforts."""
+    return None if world.physics else "the engine has no physics, so no joint needs any effort"
+
+
 def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable: bool = False) -> tuple[Problem, ...]:
     """Empty if the scene has a (movable) body of this name."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))

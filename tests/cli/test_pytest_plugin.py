@@ -38,7 +38,7 @@ steps:
   - wait: 0.2 s
 expect:
   - duration: {{{{below: {{below}}}}}}
-  - tracking: {{{{group: arm, within: 0.05 rad}}}}
+  - at_pose: {{{{pose: home, within: 0.05 rad}}}}
 """
 
 
@@ -155,7 +155,7 @@ def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pyte
     told = result.stdout.str()
     assert re.search(r"failed: duration: fails by \d+ ms|failed: duration: fails by 0\.\d+ s", told)
     assert "tasks/late.yaml:9:5: duration: fails by" in told
-    assert "✓ tracking: 2.9 deg to spare" in told
+    assert "✓ at_pose: 2.9 deg to spare" in told
     assert "again: manipcli run tasks/late.yaml" in told
     assert "tasks/broken.yaml:4:1: error[YAML100]" in told
     assert "Traceback" not in told
@@ -199,7 +199,7 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
     result = project.runpytest_subprocess(*LOADED, "test_a_python_test_runs_a_task_and_looks_at_its_report.py")
     result.assert_outcomes(passed=3, failed=1)
     told = result.stdout.str()
-    for line in ("tasks/late.yaml:9:5: duration: fails by", "✓ tracking: 2.9 deg to spare", "log: /", "picture: /"):
+    for line in ("tasks/late.yaml:9:5: duration: fails by", "✓ at_pose: 2.9 deg to spare", "log: /", "picture: /"):
         assert line in told
 
 

@@ -145,7 +145,7 @@ def test_a_run_switches_and_the_log_tells_of_it(tmp_path: Path) -> None:
 
     steps = f"{MOVE}  - switch_controllers: soft_arm\n    id: soften\n  - move: {{to: {{joint_1: -0.2}}}}\n"
     log = tmp_path / "t.mcap"
-    file = task_file(tmp_path, steps + "expect:\n  - tracking: {group: arm, within: 0.01}\n")
+    file = task_file(tmp_path, steps)
     report = run_task(file, log=log, allow_outside=True)
     assert report.verdict.verdict == "passed", report.verdict.text
     step = next(one for one in report.verdict.steps if one.id == "soften")
@@ -165,5 +165,3 @@ def test_a_run_switches_and_the_log_tells_of_it(tmp_path: Path) -> None:
         has_reference = np.isfinite(trace.reference_position).all(axis=1)
         assert has_reference[active].all(), "what was active has a reference"
         assert np.count_nonzero(has_reference) == len(has_reference[active]), "and nothing else"
-    (tracking,) = report.verdict.expectations
-    assert (tracking.outcome, tracking.margin) == ("passed", pytest.approx(0.01, abs=1e-6))

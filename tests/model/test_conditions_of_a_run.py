@@ -279,6 +279,34 @@ def test_tracking_of_a_joint_without_a_controller_cannot_be_judged() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "written", "told"),
+    [
+        ("energy", {"below": 1}, "no joint needs any effort"),
+        ("tracking", {"group": "arm", "within": 0.1}, "every reference comes true at once"),
+        ("limits", {}, "no joint needs any effort; `of: [position, velocity]` asks for the rest"),
+        ("limits", {"of": ["effort"]}, "no joint needs any effort"),
+        ("limits", {"of": ["velocity", "position"]}, None),
+    ],
+)
+def test_what_is_true_by_definition_without_physics_is_not_judged(
+    name: str, written: dict[str, Any], told: str | None
+) -> None:
+    condition: Condition[Any] = CONDITIONS[name]
+    spec = condition.spec.model_validate(written)
+    world = replace(WORLD, referenced=frozenset(ROBOT.joint_names))
+    assert condition.absent(spec, world) is None
+    reason = None if told is None else f"the engine has no physics, so {told}"
+    assert condition.absent(spec, replace(world, physics=False)) == reason
+
+
+def test_without_limits_of_efforts_there_is_nothing_that_needs_physics() -> None:
+    joints = tuple(replace(one, limits=replace(one.limits, effort=None)) for one in ROBOT.joints)
+    world = replace(WORLD, robot=replace(ROBOT, joints=joints), physics=False)
+    condition: Condition[Any] = CONDITIONS["limits"]
+    assert condition.absent(condition.spec(), world) is None
+
+
 def test_duration_counts_from_the_first_tick_that_is_shown() -> None:
     condition: Condition[Any] = CONDITIONS["duration"]
     late = condition.open(condition.spec(below="250 ms"), WORLD)(still().part(20, 61))

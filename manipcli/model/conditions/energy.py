@@ -9,7 +9,7 @@ from pydantic import Field
 
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
-from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.spec.base import Model
@@ -71,6 +71,6 @@ ENERGY = Condition(
     units=("J",),
     open=gauge,
     check=check,
-    absent=lambda spec, world: None,
+    absent=lambda spec, world: effortless(world),
     example="energy: {below: 50 J}",
 )

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.core.units import readable
-from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
+from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Measured, Reading
 from manipcli.model.robot import RobotModel
@@ -54,6 +54,7 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
     """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
 
     The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
+    Where the engine has no physics there are no efforts: say `of: [position, velocity]`.
     """
     bounds = _bounds(spec, world.robot)
     columns = [bound.column for bound in bounds]
@@ -112,13 +113,22 @@ def check(spec: LimitsSpec, setting: Setting) -> tuple[Problem, ...]:
     return unknown
 
 
+def absent(spec: LimitsSpec, world: World) -> str | None:
+    """A limit of an effort is asked for, and nothing has efforts."""
+    reason = effortless(world)
+    if reason is None or all(bound.what != "effort" for bound in _bounds(spec, world.robot)):
+        return None
+    others = [what for what in spec.of if what != "effort"]
+    return f"{reason}; `of: [{', '.join(others)}]` asks for the rest" if others else reason
+
+
 LIMITS = Condition(
     name="limits",
     spec=LimitsSpec,
     units=("rad", "m", "rad/s", "m/s", "N m", "N"),
     open=gauge,
     check=check,
-    absent=lambda spec, world: None,
+    absent=absent,
     scope="always",
     example="limits: {group: arm, of: [velocity, effort], spare: 10 %}",
 )
