@@ -207,7 +207,7 @@ class StepsRun:
                 self._believed = now
                 why = f", where {'; '.join(differences)}" if differences else ""
                 return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}")
-            why = "; ".join(differences) or "it is tried again"
+            why = "; ".join(differences) or ("it is tried again" if again else "the step before it failed")
             self._event("replanned", planned, "", why)
             self._tell(f"planned again: {why}", detail=True)
             self._failed = False

@@ -118,6 +118,14 @@ def test_a_failure_that_is_tolerated_does_not_count_and_the_next_step_begins_whe
     assert abs(states.position[-1, 0]) < 1e-9
 
 
+def test_what_follows_a_tolerated_failure_where_nothing_differs_says_why_it_is_planned_again(run: Run) -> None:
+    never = "  - wait: 0.1 s\n    until: {not: {at_pose: {pose: up}}}\n    timeout: 0.2 s\n    on_fail: %s\n"
+    verdict = run(f"steps:\n{never % 'continue'}  - wait: 0.1 s\n  - wait: 0.1 s\n")
+    assert [step.replanned for step in verdict.steps] == [(), ("the step before it failed",), ()]
+    (step,) = run(f"steps:\n{never % '{retry: 1}'}").steps
+    assert step.replanned == ("it is tried again",)
+
+
 WATCH = "watch:\n  - always: {at_pose: {pose: up, within: 0.2}}\n"
 
 
