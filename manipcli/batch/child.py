@@ -52,6 +52,7 @@ class _Beats:
         self.warnings: tuple[Finding, ...] = ()
         self._parent = parent
         self._doing = ""
+        self._written = ""
         self._at = 0.0
         self._next = 0.0
 
@@ -69,23 +70,25 @@ class _Beats:
 
     def told(self, text: str, *, detail: bool) -> None:
         """A step was planned again, which may have taken long, or is tried again."""
-        self._parent.send(Beat(self._doing, self._at))
+        self._parent.send(Beat(self._doing, self._at, written=self._written))
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
         self._doing = f"step {index + 1} of {total}, '{step.id}'"
-        self._parent.send(Beat(self._doing))
+        self._written = step.place
+        self._parent.send(Beat(self._doing, written=self._written))
         self._next = 0.0
 
     def tick(self, simulated_time: float, wall: float) -> None:
         self._at = simulated_time
         if wall >= self._next:
             self._next = wall + BEAT_PERIOD
-            self._parent.send(Beat(self._doing or "before the first step", simulated_time))
+            doing = self._doing or "before the first step"
+            self._parent.send(Beat(doing, simulated_time, written=self._written))
 
     def step_ended(self, outcome: StepOutcome) -> None:
         """The next one begins, or the run is judged."""
         self._doing = f"after {self._doing}"
-        self._parent.send(Beat(self._doing, self._at))
+        self._parent.send(Beat(self._doing, self._at, written=self._written))
 
 
 def _end_of(job: Job, beats: _Beats) -> End:

@@ -7,7 +7,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Place
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Case, Trouble
 
@@ -113,11 +113,17 @@ class Job:
 @dataclass(frozen=True, slots=True)
 class Beat:
     """A sign of life: what is done, and at which time of the run [s]. `judged`: the run has its verdict, and what is
-    left is to tell of it."""
+    left is to tell of it. `written`: where the step stands that is on, as the log has it."""
 
     doing: str
     at: float | None = None
     judged: bool = False
+    written: str = ""
+
+    def place(self, file: str) -> Place | None:
+        """Of the step that is on, in the task file of this name; of one that an option wrote, None."""
+        _, line, column = self.written.rsplit(":", 2) if self.written else ("", "0", "0")
+        return Place(file, int(line), int(column)) if int(line) > 0 else None
 
     def __str__(self) -> str:
         return self.doing if self.at is None else f"{self.doing} at {self.at:.2f} s"

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -17,6 +18,7 @@ from struct import pack
 
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
+from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
 from manipcli.report.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of
 
@@ -170,7 +172,8 @@ class Process:
 
     def _report(self, outcome: CaseWord, text: str, *, end: End | None = None, verb: str = "run") -> CaseReport:
         job, took = self.job, self.elapsed
-        end = end if end is not None else End(None, troubles=(Trouble(text, at=self.doing.at),))
+        if end is None:
+            end = End(None, troubles=(Trouble(text, self.doing.place(job.case.file), self.doing.at),))
         if outcome == "passed" and not job.settings.keep_logs:
             job.log.unlink(missing_ok=True)
         if outcome not in ("crashed", "hung"):
@@ -180,7 +183,7 @@ class Process:
             if job.output.exists() and not job.output.stat().st_size:
                 job.output.unlink()
         kept = {path: str(path) if path.exists() else None for path in (job.log, job.partial, job.picture, job.output)}
-        return CaseReport(
+        report = CaseReport(
             case=job.case,
             outcome=outcome,
             duration=took,
@@ -197,6 +200,21 @@ class Process:
             junit=end.junit,
             notes=end.notes,
         )
+        return report if outcome not in ("crashed", "hung") else self._with_page(report)
+
+    def _with_page(self, report: CaseReport) -> CaseReport:
+        """With the page about it that its own process did not write, where one is wanted."""
+        page = self.job.page
+        if page is None:
+            return report
+        from manipcli.report.case_page import render_case_page
+
+        try:
+            page.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(page, render_case_page(report, page.parent).encode())
+        except OSError as error:
+            return replace(report, notes=(*report.notes, f"no page: {error}"))
+        return replace(report, page=str(page))
 
     def _draw_what_is_left(self) -> None:
         """The end of the log as far as it got, drawn where whatever went wrong cannot do so once more."""

@@ -19,7 +19,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from manipcli.batch.child import _Beats
-from manipcli.batch.job import End, Job, Settings, limit
+from manipcli.batch.job import Beat, End, Job, Settings, limit
 from manipcli.batch.pool import remove_empty, run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
@@ -59,6 +59,27 @@ def test_a_crash_costs_one_run_and_names_signal_and_step(tmp_path: Path, number:
     assert one.outcome == "crashed"
     assert f"crashed by signal {int(number)} ({number.name}); step 1 of 1, 'lift_1' at 2.50 s" in one.text
     assert other.outcome == "invalid"  # it came to its end, and said that there was nothing to run
+
+
+def test_a_crash_has_the_line_of_its_step_and_a_page_with_what_it_left(tmp_path: Path) -> None:
+    code = (
+        "parent.send(Beat('step 1', 2.5, written='t0.yaml:8:5')); print('<last> words', flush=True)\n"
+        "open(job.log.with_name(job.log.name + '.partial'), 'w').close(); os.abort()"
+    )
+    (job,) = jobs(tmp_path, code)
+    (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "pages"))])
+    assert report.troubles[0].place == Place("t0.yaml", 8, 5)
+    assert report.page == str(tmp_path / "pages" / "t0.html")
+    page = Path(report.page).read_text()
+    assert "crashed by signal 6" in page
+    assert "t0.yaml:8:5" in page
+    assert 'href="../runs/t0.mcap.partial"' in page
+    assert "&lt;last&gt; words" in page
+
+
+@pytest.mark.parametrize("written", ["", "--set steps.0.wait=1 s:0:0"])
+def test_what_is_written_nowhere_has_no_line(written: str) -> None:
+    assert Beat("loading", written=written).place("t.yaml") is None
 
 
 def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -> None:
@@ -136,13 +157,15 @@ def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None
 
 def test_a_step_that_is_planned_again_and_the_end_of_one_are_signs_of_life() -> None:
     ours, childs = Pipe()
-    step = cast("PlannedStep", SimpleNamespace(id="pick_1"))
+    step = cast("PlannedStep", SimpleNamespace(id="pick_1", place="t.yaml:8:5"))
     beats = _Beats(childs)
     beats.step_started(step, 1, 2)
     beats.tick(2.5, 1.0)
     beats.told("planned again", detail=True)
     beats.step_ended(StepOutcome("pick_1", "pick", "done", started=2.0, ended=2.5, planned_duration=0.5))
-    told = [str(ours.recv()) for _ in range(4)]
+    heard = [cast("Beat", ours.recv()) for _ in range(4)]
+    assert {beat.place("tasks/t.yaml") for beat in heard} == {Place("tasks/t.yaml", 8, 5)}
+    told = [str(beat) for beat in heard]
     one = "step 2 of 2, 'pick_1'"
     assert told == [one, f"{one} at 2.50 s", f"{one} at 2.50 s", f"after {one} at 2.50 s"]
 
@@ -277,7 +300,9 @@ def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path
         (tmp_path / "runs" / f"t0{suffix}").write_text("old")
     (job,) = jobs(tmp_path, "sys.exit(3)")
     (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "runs"))])
-    assert (report.log, report.picture, report.page) == (None, None, None)
+    assert (report.log, report.picture) == (None, None)
+    assert report.page is not None
+    assert "ended with exit code 3" in Path(report.page).read_text()
 
 
 def test_folders_that_hold_nothing_are_removed(tmp_path: Path) -> None:
