@@ -214,3 +214,22 @@ def _boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_stable(loop_at(middle)) else (low, middle)
     return low
+
+
+def velocity_loop_poles(*, p: float, i: float = 0.0, d: float = 0.0, period: float) -> npt.NDArray[np.complex128]:
+    """Poles, the largest first, of a joint whose velocity is commanded and comes true at once: 3; 2 without i.
+
+    v = -p q - i z - d v_before, q' = q + period v, z' = z + period q: there is no inertia in it, and no delay.
+    """
+    law = np.array([-p, -i, -d])
+    A = np.array([[1.0, 0.0, 0.0] + period * law, [period, 1.0, 0.0], law])
+    found = np.linalg.eigvals(A if i else A[::2, ::2])  # z, which is not fed back, would stand at 1
+    return np.asarray(found[np.argsort(-np.abs(found))], dtype=np.complex128)
+
+
+def largest_velocity_gain(*, i: float = 0.0, d: float = 0.0, period: float) -> float:
+    """The p of such a joint at which a pole reaches -1: 2 (1 - d) / period + i period / 2; not below 0.
+
+    The characteristic polynomial (x - 1)^2 (x + d) + period x (p (x - 1) + i period) at x = -1.
+    """
+    return max(2.0 * (1.0 - d) / period + 0.5 * i * period, 0.0)

@@ -2,7 +2,7 @@
 
 Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
 and whether there is effort enough for gravity, for the planned motions and grasps, and for standing near where it is
-to stand.
+to stand. Joints on other interfaces: `drives.py`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from manipcli.control.stability import (
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
+from manipcli.flow.drives import drive_findings, driven_joints, too_weak
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.model.kinematics import Kinematics
@@ -64,8 +65,8 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         plan: of it; None: it is planned here; where that is not possible, that is told, and named poses are looked at.
     """
     robot = task.robot
-    loops = _loops(task)
-    if not loops:
+    loops, drives = _loops(task), driven_joints(task)
+    if not (loops or drives):
         return ()
     kinematics = Kinematics(robot, gravity=task.scene.gravity)
     unplanned: tuple[Finding, ...] = ()
@@ -77,9 +78,13 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
     postures = (
         _planned(task, plan) if plan is not None else Postures.at_rest(named_postures(robot, start_position(task)))
     )
-    load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-    strained = () if plan is None else _strained(task, plan)
-    return (*unplanned, *strained, *_findings(task, loops, load, planned=plan is not None))
+    found = [] if plan is None else list(_strained(task, plan))
+    if loops:
+        load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
+        found += _findings(task, loops, load, planned=plan is not None)
+    if drives:
+        found += drive_findings(task, drives, kinematics, postures, planned=plan is not None)
+    return (*unplanned, *found)
 
 
 def named_postures(robot: RobotModel, start: Array) -> Array:
@@ -224,15 +229,10 @@ def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Itera
     weight, needed = (float(np.abs(part[:, k]).max()) for part in (load.gravity, load.needed))
     limit = float(load.effort[k])
     place = _place(task, loop)
-    if weight > limit:
-        message = (
-            f"{loop.joint}: holding against gravity takes up to {weight:.3g} {unit}, its limit is {limit:.3g} {unit}"
-        )
-        yield Finding("CTRL155", message, place, "it will sink; check the effort limit and the masses", "warning")
-    elif planned and needed > limit:
-        message = f"{loop.joint}: the planned motions need up to {needed:.3g} {unit}, its limit is {limit:.3g} {unit}"
-        hint = f"it will lag behind; lower its acceleration limit (robot file, limits.{loop.joint}.acceleration)"
-        yield Finding("CTRL155", message, place, hint, "warning")
+    needed = needed if planned else 0.0
+    weak = too_weak(task.robot, loop.joint, place, weight=weight, needed=needed, limit=limit)
+    if weak is not None:
+        yield weak
     if loop.weightless or loop.gains.i > 0.0 or loop.gains.p == 0.0 or loop.tolerance is None:
         return
     sag = min(weight, limit) / loop.gains.p

@@ -16,8 +16,10 @@ from manipcli.control.stability import (
     largest_damping,
     largest_integral,
     largest_stiffness,
+    largest_velocity_gain,
     poles,
     unstable_share,
+    velocity_loop_poles,
 )
 
 H = 1e-3
@@ -155,3 +157,20 @@ def test_a_loop_without_stiffness_is_stable_where_its_velocity_is() -> None:
         assert is_stable(loop) is stable
     assert gain_margin(Loop.of_joint(0.002, p=0.0, d=1.0, period=H)) == pytest.approx(4.0, rel=2e-3)
     assert not is_stable(Loop.of_joint(0.002, p=1.0, d=0.0, period=H))  # swings for ever
+
+
+@pytest.mark.parametrize(("i", "d"), [(0.0, 0.0), (0.0, 0.3), (500.0, 0.0), (500.0, 0.3)])
+def test_the_largest_gain_on_a_velocity_is_where_the_loop_itself_stops_to_settle(i: float, d: float) -> None:
+    def left(p: float) -> float:
+        q, z, v = 1.0, 0.0, 0.0
+        for _ in range(3000):
+            v = -p * q - i * z - d * v
+            z += H * q
+            q += H * v
+        return abs(q)
+
+    most = largest_velocity_gain(i=i, d=d, period=H)
+    for share, stable in ((0.98, True), (1.02, False)):
+        assert bool(abs(velocity_loop_poles(p=share * most, i=i, d=d, period=H)[0]) < 1.0) is stable
+        assert (left(share * most) < 1e-3) is stable
+    assert abs(velocity_loop_poles(p=most, i=i, d=d, period=H)[0]) == pytest.approx(1.0)

@@ -13,6 +13,7 @@ from manipcli.control.command import JointCommand, Mode
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
 from manipcli.control.motors import MotorLimits
+from manipcli.control.stability import largest_velocity_gain
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, Mimic, RobotModel
@@ -51,6 +52,28 @@ def obstacle(height: float) -> Body:
 def opened(limits: JointLimits = FREE, *, step: float = 1e-3, bodies: tuple[Body, ...] = ()) -> Engine:
     scene = Scene(bodies, (), frozen((0.0, 0.0, -9.81)))
     return ENGINES["pybullet"].open(robot(limits), scene, EngineSettings(step, 1, np.zeros(1)))
+
+
+def following(
+    interface: str, gains: GainsSpec, *, rate: float | None = None, limits: JointLimits = FREE
+) -> tuple[Session, JointTrajectoryController]:
+    """A session in which a trajectory controller commands the hinge; the gains count on velocities alone."""
+    arm = JointTrajectoryController(
+        name="arm", joints=["hinge"], command_interfaces=[interface],
+        gains={"hinge": gains} if interface == "velocity" else {}, limits=[limits], types=["revolute"],
+    )  # fmt: skip
+    manager = ControllerManager(joints=["hinge"], period=1e-3)
+    manager.load(arm, update_rate=rate)
+    manager.configure("arm")
+    manager.switch(["arm"])
+    scene = Scene((), (), frozen((0.0, 0.0, -9.81)))
+    return Session(robot=robot(limits), scene=scene, engine=opened(limits), manager=manager, period=1e-3), arm
+
+
+def way_to(angle: float) -> JointTrajectory:
+    """From 0, in half a second, from rest to rest."""
+    zero = np.zeros((2, 1))
+    return JointTrajectory.of_arrays(("hinge",), np.array([0.0, 0.5]), np.array([[0.0], [angle]]), zero, zero)
 
 
 def commanded(mode: Mode, value: float) -> JointCommand:
@@ -133,25 +156,11 @@ def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: s
     and the same way but for the time that a slower one learns of it."""
     ways = {}
     for rate in (1000.0, 500.0, 250.0):
-        model = robot()
-        arm = JointTrajectoryController(
-            name="arm", joints=["hinge"], command_interfaces=[interface],
-            gains={"hinge": GainsSpec(p=30.0, ff_velocity_scale=1.0)} if interface == "velocity" else {},
-            limits=[model.joints[0].limits], types=["revolute"],
-        )  # fmt: skip
-        manager = ControllerManager(joints=["hinge"], period=1e-3)
-        manager.load(arm, update_rate=rate)
-        manager.configure("arm")
-        manager.switch(["arm"])
-        engine = opened()
-        scene = Scene((), (), frozen((0.0, 0.0, -9.81)))
-        session = Session(robot=model, scene=scene, engine=engine, manager=manager, period=1e-3)
+        session, arm = following(interface, GainsSpec(p=30.0, ff_velocity_scale=1.0), rate=rate)
         session.tick()
-        zero = np.zeros((2, 1))
-        way = JointTrajectory.of_arrays(("hinge",), np.array([0.0, 0.5]), np.array([[0.0], [0.3]]), zero, zero)
-        handle = arm.send_goal(way)
+        handle = arm.send_goal(way_to(0.3))
         ways[rate] = np.array([session.tick().position[0] for _ in range(900)])
-        engine.close()
+        session.engine.close()
         assert handle.status == "succeeded", handle.result
     peak = 0.3 * 1.875 / 0.5
     for rate, position in ways.items():
@@ -159,24 +168,29 @@ def test_what_a_controller_brings_about_does_not_depend_on_its_rate(interface: s
         assert np.abs(position - ways[1000.0]).max() < peak * (1.0 / rate + 1e-3)
 
 
+@pytest.mark.parametrize("d", [0.0, 0.3])
+@pytest.mark.parametrize("rate", [1000.0, 500.0])
+def test_a_velocity_loop_settles_up_to_the_gain_that_is_said_of_it(rate: float, d: float) -> None:
+    """The engine has no delay that the bound does not know of."""
+    most = largest_velocity_gain(d=d, period=1.0 / rate)
+    for share, settles in ((0.95, True), (1.05, False)):
+        gains = GainsSpec(p=share * most, d=d, ff_velocity_scale=1.0)
+        session, arm = following("velocity", gains, rate=rate)
+        session.tick()
+        arm.send_goal(way_to(0.3))
+        position = np.array([session.tick().position[0] for _ in range(600)])
+        session.engine.close()
+        assert bool(np.abs(position[-50:] - 0.3).max() < 1e-6) is settles
+
+
 @pytest.mark.parametrize("interface", ["position", "velocity"])
 @pytest.mark.parametrize(("share", "counted"), [(0.9, 300), (1.1, 0)])
 def test_a_motor_that_gives_all_it_may_is_counted(interface: str, share: float, counted: int) -> None:
     limits = replace(FREE, effort=share * GRAVITY_EFFORT)
-    arm = JointTrajectoryController(
-        name="arm", joints=["hinge"], command_interfaces=[interface],
-        gains={"hinge": GainsSpec(p=30.0)} if interface == "velocity" else {}, limits=[limits], types=["revolute"],
-    )  # fmt: skip
-    manager = ControllerManager(joints=["hinge"], period=1e-3)
-    manager.load(arm)
-    manager.configure("arm")
-    manager.switch(["arm"])
-    engine = opened(limits)
-    scene = Scene((), (), frozen((0.0, 0.0, -9.81)))
-    session = Session(robot=robot(limits), scene=scene, engine=engine, manager=manager, period=1e-3)
+    session, _ = following(interface, GainsSpec(p=30.0), limits=limits)
     for _ in range(301):  # the first tick measures what was before it
         session.tick()
-    engine.close()
+    session.engine.close()
     assert session.saturations[0] == pytest.approx(counted, abs=3)
 
 
