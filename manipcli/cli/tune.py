@@ -23,7 +23,14 @@ def tune(
         str, typer.Option("--bandwidth", metavar="F", help="Natural frequency of the loops: 5, '5 Hz'.")
     ] = "5 Hz",
     damping: Annotated[
-        float, typer.Option("--damping", metavar="Z", min=0.05, max=10.0, help="Damping ratio; 1: no overshoot.")
+        float,
+        typer.Option(
+            "--damping",
+            metavar="Z",
+            min=0.05,
+            max=10.0,
+            help="Damping ratio of kp and kd; from 1 on, only a ki makes a step overshoot.",
+        ),
     ] = 1.0,
     joint: Annotated[
         list[str] | None,

@@ -23,7 +23,7 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
         row += [f"{one.damping:.2f}", *_answer(one.predicted)]
         row += (_answer(one.simulated) if one.simulated is not None else ["-", "-"]) if simulated else []
         row += [f"{one.bandwidth:.2g} Hz", f"x {one.margin:.1f}"]
-        rows.append((*row, one.limited_by or "-"))
+        rows.append((*row, one.limited_by or "nothing"))
     lines = [
         f"{robot}: gains for {wish.bandwidth:g} Hz and a damping ratio of {wish.damping:g}, "
         f"at a control period of {1e3 * wish.period:g} ms",

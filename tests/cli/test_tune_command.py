@@ -21,6 +21,7 @@ def test_the_table_names_the_joint_and_says_what_its_numbers_are(capsys: pytest.
     (row,) = [line for line in out.splitlines() if line.startswith("joint_6 ")]
     assert " Hz " in row
     assert " ms " in row
+    assert row.endswith("nothing")  # limits it
     assert "of each joint alone" in out
 
 
