@@ -161,7 +161,9 @@ class RatesSpec(Model):
     )
     reference: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
     error: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
-    actuator_states: Rate | None = Field(None, description="Behind the transmissions [Hz]. Default 100 Hz.")
+    actuator_states: Rate | None = Field(
+        None, description="Behind the transmissions [Hz]; efforts as they reach the gears. Default 100 Hz."
+    )
     wrench: Rate | None = Field(None, description="Of every force sensor [Hz]. Default: the control rate.")
 
     @property
