@@ -12,7 +12,7 @@ from pathlib import Path
 from manipcli.batch.job import Job
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding
-from manipcli.report.suite import CaseReport, troubles_of
+from manipcli.report.suite import CaseReport, Trouble, troubles_of
 
 WATCH_PERIOD = 0.1
 """[s] between two looks at what is being done, where nothing comes to an end."""
@@ -46,6 +46,8 @@ def run_jobs(
                     continue
                 try:
                     running.append(Process(job, command=command))
+                except BlockingIOError:
+                    yield _taken(job)
                 except OSError as error:
                     yield _not_run(job, "it cannot be run", (Finding("USE106", f"it cannot be run: {error}"),))
             if not running:
@@ -72,6 +74,11 @@ def remove_empty(folder: Path) -> None:
     for place, _, _ in os.walk(folder, topdown=False):
         with suppress(OSError):
             Path(place).rmdir()
+
+
+def _taken(job: Job) -> CaseReport:
+    text = f"another process is running this task, and writes into '{job.settings.folder}', too; nothing was run"
+    return CaseReport(job.case, "error", 0.0, job.command(), text, troubles=(Trouble(text),))
 
 
 def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:

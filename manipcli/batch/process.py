@@ -10,11 +10,13 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
+from fcntl import LOCK_EX, LOCK_NB, flock
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
+from typing import BinaryIO
 
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
@@ -67,9 +69,12 @@ class Process:
             command: another program that speaks with its parent as `batch/child.py` does.
 
         Raises:
+            BlockingIOError: another process, of another batch, is doing it.
             OSError: its files cannot be written, or there is no process to be had.
         """
         self.job = job
+        job.output.parent.mkdir(parents=True, exist_ok=True)
+        self._output = _locked(job.output)
         self.doing = Beat("starting")
         self._end: End | None = None
         self._judged: float | None = None
@@ -78,18 +83,16 @@ class Process:
         with socket(fileno=os.dup(self.connection.fileno())) as one:
             one.setsockopt(SOL_SOCKET, SO_RCVTIMEO, pack("ll", *divmod(round(1e6 * HALF_SAID), 1_000_000)))
         self._began = self._heard = time.monotonic()
-        job.output.parent.mkdir(parents=True, exist_ok=True)
         _remove(job.log, job.partial, job.picture, job.page)
-        with job.output.open("wb") as output:
-            self._process = subprocess.Popen(
-                [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                pass_fds=(childs.fileno(),),
-                start_new_session=True,  # no signal of a terminal reaches it: its parent decides
-                env={**ONE_THREAD, **os.environ},
-            )
+        self._process = subprocess.Popen(
+            [*(command or (sys.executable, "-P", "-c", CHILD, json.dumps(sys.path))), str(childs.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=self._output,
+            pass_fds=(childs.fileno(),),
+            start_new_session=True,  # no signal of a terminal reaches it: its parent decides
+            env={**ONE_THREAD, **os.environ},
+        )
         childs.close()
         with suppress(ConnectionError):  # it is gone already, which is heard of
             self.connection.send(job)
@@ -151,6 +154,7 @@ class Process:
         """Ends the process, and removes what it left."""
         self.end()
         _remove(self.job.log, self.job.partial, self.job.picture, self.job.output, self.job.page)
+        self._output.close()
 
     def _gone(self) -> CaseReport:
         with suppress(subprocess.TimeoutExpired):
@@ -182,6 +186,7 @@ class Process:
             self._draw_what_is_left()
             if job.output.exists() and not job.output.stat().st_size:
                 job.output.unlink()
+        self._output.close()
         kept = {path: str(path) if path.exists() else None for path in (job.log, job.partial, job.picture, job.output)}
         report = CaseReport(
             case=job.case,
@@ -233,6 +238,27 @@ class Process:
     def _last_line(self) -> str:
         lines = self.job.output.read_text("utf-8", "replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+
+
+def _locked(path: Path) -> BinaryIO:
+    """The file, empty, for this process alone, as long as it or a child that writes into it has it open.
+
+    Raises:
+        BlockingIOError: somebody else has it.
+    """
+    while True:
+        file = path.open("ab")
+        try:
+            flock(file, LOCK_EX | LOCK_NB)
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                file.truncate(0)
+                return file
+        except FileNotFoundError:
+            pass
+        except OSError:
+            file.close()
+            raise
+        file.close()  # who had it before has removed it meanwhile
 
 
 def _remove(*files: Path | None) -> None:

@@ -13,7 +13,7 @@ from manipcli.judge.verdict import ExpectationOutcome
 from manipcli.report.run_report import RunReport
 
 CaseWord = Literal["passed", "failed", "error", "invalid", "crashed", "hung"]
-"""`error`: there is no verdict on a run that came to its end; `invalid`: nothing was run."""
+"""`error`: there is no verdict, and neither the file nor a crash is why; `invalid`: nothing was run."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -294,6 +294,25 @@ def test_what_a_crash_left_is_drawn_with_the_meshes_of_the_run(tmp_path: Path, m
     assert Path(report.picture).read_text() == f"t0.mcap.partial {how}"
 
 
+def test_a_task_that_another_batch_is_running_is_an_error_and_leaves_its_files(tmp_path: Path) -> None:
+    (job,) = jobs(tmp_path, "open(job.partial, 'w').close(); time.sleep(100)")
+    other = Process(job, command=(sys.executable, "-c", CHILD))
+    try:
+        deadline = time.monotonic() + 20.0
+        while not job.partial.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        (report,) = run([job])
+        assert (report.outcome, report.log, report.output, report.run) == ("error", None, None, None)
+        assert "another process is running this task" in report.troubles[0].message
+        assert job.partial.exists()
+    finally:
+        other.forget()
+    assert not job.output.exists()
+    (report,) = run([replace(job, case=replace(job.case, task=END))])
+    assert report.outcome == "invalid"  # it came to its end, and said that there was nothing to run
+
+
 def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path: Path) -> None:
     (tmp_path / "runs").mkdir()
     for suffix in (".mcap", ".png", ".mcap.partial", ".html"):
