@@ -279,6 +279,18 @@ def test_tracking_of_a_joint_without_a_controller_cannot_be_judged() -> None:
     )
 
 
+def test_a_joint_that_leans_on_its_stop_keeps_its_limit_and_one_beyond_it_is_told_with_digits_that_differ() -> None:
+    position = np.zeros((T, 3))
+    position[10:13, 0] = 2.0 + 5e-5, 2.0 + 2e-4, -1.0 - 9e-5
+    found = read("limits", still(position=position), of=["position"], group="arm")
+    assert found.margins[10:13] == pytest.approx([0.0, -2e-4, 0.0])
+    assert (found.margins >= 0.0)[[10, 12]].all()
+    assert found.found(11).text == "position of joint 'j1' is 114.6 deg; allowed -57.296 deg to 114.59 deg"
+    assert found.found(10).text == "position of joint 'j1' is 114.594 deg; allowed -57.2958 deg to 114.592 deg"
+    spare = read("limits", still(position=position - 0.15), of=["position"], group="arm", spare=0.1)
+    assert spare.margins[10] == pytest.approx(-5e-5), "what is to be left is no stop"
+
+
 @pytest.mark.parametrize(
     ("name", "written", "told"),
     [

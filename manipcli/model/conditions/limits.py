@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +15,11 @@ from manipcli.model.reading import Measured, Reading
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Share
+
+SLACK: Final = 1e-4
+"""[rad or m] An engine meets a stop at the end of a step only: 50 um behind it at 5 cm/s and 1 ms."""
+MOST_DIGITS: Final = 9
+"""With which a value and its limit are told, where they do not differ in fewer."""
 
 Quantity = Literal["position", "velocity", "effort"]
 ALL: tuple[Quantity, ...] = ("position", "velocity", "effort")
@@ -54,18 +59,22 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
     """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
 
     The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
+    A position up to 0.1 mm or 1e-4 rad beyond its limit is at its limit, with a margin of 0: a joint that leans on its
+    stop keeps it, and engines find a stop at the end of a step only.
     Where the engine has no physics there are no efforts: say `of: [position, velocity]`.
     """
     bounds = _bounds(spec, world.robot)
     columns = [bound.column for bound in bounds]
     middle, half = np.array([bound.middle for bound in bounds]), np.array([bound.half for bound in bounds])
     allowed, scale = half * (1.0 - spec.spare), np.where(half > 0.0, half, 1.0)
+    slack = np.array([SLACK if bound.what == "position" and not spec.spare else 0.0 for bound in bounds])
     units = tuple(sorted({bound.unit for bound in bounds}))
 
     def look(moments: Moments) -> Reading:
         states = moments.states
         values = np.concatenate((states.position, states.velocity, states.effort), axis=1)[:, columns]
         margins = allowed - np.abs(values - middle)
+        margins[(margins < 0.0) & (margins >= -slack)] = 0.0
         relative = margins / scale
         worst = np.argmin(margins if len(units) == 1 else relative, axis=1)
         ticks = np.arange(len(worst))
@@ -73,8 +82,8 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
         def found(k: int) -> Measured:
             j = int(worst[k])
             one = bounds[j]
-            low, high = (readable(one.middle + sign * float(allowed[j]), one.unit) for sign in (-1.0, 1.0))
-            value = readable(float(values[k, j]), one.unit)
+            least, most = one.middle - float(allowed[j]), one.middle + float(allowed[j])
+            value, low, high = _apart((float(values[k, j]), least, most), one.unit)
             text = f"{one.what} of joint '{one.joint}' is {value}; allowed {low} to {high}"
             return Measured(float(margins[k, j]), one.unit, float(moments.times[k]), text)
 
@@ -82,6 +91,16 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
         return Reading(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
 
     return look
+
+
+def _apart(values: tuple[float, float, float], unit: str) -> tuple[str, str, str]:
+    """A value and the two ends of what is allowed, with as many digits as it takes to see that it is at neither."""
+    value, low, high = (readable(one, unit) for one in values)
+    for digits in range(4, MOST_DIGITS + 1):
+        if value not in (low, high):
+            break
+        value, low, high = (readable(one, unit, digits=digits) for one in values)
+    return value, low, high
 
 
 def _bounds(spec: LimitsSpec, robot: RobotModel) -> list[_Bound]:
