@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from manipcli.batch.job import own_stem
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
@@ -91,7 +92,7 @@ _WORDS: Final[Mapping[str, tuple[str, str, str, str]]] = {
 
 def baseline_path(task: Path) -> Path:
     """Where the baseline of a task file is, if it has one."""
-    return task.with_name(f"{task.stem}.baseline.json")
+    return task.with_name(f"{own_stem(task)}.baseline.json")
 
 
 def measured(verdict: Verdict, log: Path) -> Measures:

@@ -20,6 +20,13 @@ def limit(seconds: float) -> float:
     return seconds if seconds > 0.0 else math.inf
 
 
+def own_stem(file: Path) -> str:
+    """What files about this task file are called, and about no other beside it: `a` of `a.yaml`, `a@yml` of `a.yml`; `@`
+    is doubled."""
+    kind = "" if file.suffix == ".yaml" else f"@{file.suffix[1:]}"
+    return f"{file.stem.replace('@', '@@')}{kind}"
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What holds for all runs of a batch; as the options of `run`, and what is made of each.
@@ -100,14 +107,14 @@ class Job:
         """Where a file of this job goes; no two jobs of a batch, nor the index of pages, share one.
 
         Names of folders that are nothing but `_` grow by two, which leaves `_` for the root and `__` for `..`. In a
-        stem `@` is doubled; a single one begins a suffix other than `.yaml`, or a sample.
+        stem a single `@` begins a suffix other than `.yaml`, or a sample.
         """
         file = Path(self.case.file)
         names = {file.anchor: "_", "..": "__"}
         parts = [names.get(part, part if part.strip("_") else f"{part}__") for part in file.parts[:-1]]
-        kind = "" if file.suffix == ".yaml" and file.stem != "index" else f"@{file.suffix[1:]}"
+        stem = own_stem(file) if file.name != "index.yaml" else "index@yaml"
         sample = "" if self.case.sample is None else f"@{self.case.sample}"
-        return folder.joinpath(*parts, f"{file.stem.replace('@', '@@')}{kind}{sample}{suffix}")
+        return folder.joinpath(*parts, f"{stem}{sample}{suffix}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,6 +59,14 @@ def test_only_what_is_worse_by_more_than_its_share_is_worse(
     assert (good.key, good.worse) == (key, False)
 
 
+def test_tasks_beside_each_other_share_no_baseline() -> None:
+    tasks = [Path("t", name) for name in ("a.yaml", "a.yml", "a.YAML", "a@yml.yaml", "a@@yml.yaml", "index.yaml")]
+    assert len({baseline_path(task) for task in tasks}) == len(tasks)
+    assert baseline_path(tasks[0]) == Path("t/a.baseline.json")
+    assert baseline_path(tasks[1]) == Path("t/a@yml.baseline.json")
+    assert baseline_path(tasks[5]) == Path("t/index.baseline.json")
+
+
 def test_the_tolerance_is_the_tasks() -> None:
     new = OLD | {("duration",): Measure(10.6, "s")}
     assert compared(OLD, new, ToleranceSpec(duration=0.07)) == ()
