@@ -15,6 +15,7 @@ from typing import Final
 
 from manipcli.batch.job import own_stem
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.text import listed
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
 from manipcli.report.quantity import quantity
@@ -24,6 +25,9 @@ DIGITS: Final = 6
 """Significant digits that are kept."""
 FLOORS: Final[Mapping[str, float]] = {"s": 0.05, "J": 1.0, "m": 1e-3, "rad": math.radians(0.5), "N": 0.5}
 """Differences that never count, by unit."""
+
+ALWAYS: Final = ("duration", "margins", "steps")
+"""Keys that every baseline has."""
 
 Key = tuple[str, ...]
 """`("duration",)`, `("steps", id)`, `("energy",)`, `("margins", name)`: as in the file."""
@@ -149,7 +153,7 @@ def write_baseline(path: Path, measures: Measures) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    tree: dict[str, object] = {"duration": 0.0, "margins": {}, "steps": {}}
+    tree: dict[str, object] = dict(zip(ALWAYS, (0.0, {}, {}), strict=True))
     for key, one in measures.items():
         value = float(f"{one.value:.{DIGITS}g}")
         inner = tree[key[0]] if len(key) > 1 else None
@@ -172,6 +176,9 @@ def read_baseline(path: Path) -> Measures | None:
         return None
     except (OSError, ValueError) as error:
         raise InvalidInput([_no_baseline(path, str(error))]) from None
+    lacking = [key for key in ALWAYS if isinstance(tree, dict) and key not in tree]
+    if lacking:
+        raise InvalidInput([_no_baseline(path, f"it lacks {listed([f'`{key}`' for key in lacking])}")])
     try:
         return dict(_measures(tree))
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -21,8 +21,10 @@ def limit(seconds: float) -> float:
 
 
 def own_stem(file: Path) -> str:
-    """What files about this task file are called, and about no other beside it: `a` of `a.yaml`, `a@yml` of `a.yml`; `@`
-    is doubled."""
+    """What files about this task file are called, and about no other beside it; `@` is doubled.
+
+    `a` of `a.yaml`, `a@yml` of `a.yml`.
+    """
     kind = "" if file.suffix == ".yaml" else f"@{file.suffix[1:]}"
     return f"{file.stem.replace('@', '@@')}{kind}"
 

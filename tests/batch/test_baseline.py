@@ -112,7 +112,18 @@ def test_a_baseline_reads_back_and_its_bytes_do_not_depend_on_order(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{", '{"duration": "x"}', '{"margins": {"a": 1}}', '{"duration": NaN}', '{"speed": 1}']
+    "text",
+    [
+        "",
+        "[]",
+        "{",
+        "{}",
+        '{"duration": 1.0}',
+        '{"duration": "x", "margins": {}, "steps": {}}',
+        '{"duration": 1.0, "margins": {"a": 1}, "steps": {}}',
+        '{"duration": NaN, "margins": {}, "steps": {}}',
+        '{"duration": 1.0, "margins": {}, "steps": {}, "speed": 1}',
+    ],
 )
 def test_what_is_no_baseline_is_told(tmp_path: Path, text: str) -> None:
     path = tmp_path / "x.baseline.json"
