@@ -45,7 +45,11 @@ def arm() -> RobotModel:
             joint("slide", "prismatic", "two", "finger"),
         ),
         groups=(Group("arm", ("j1", "j2")), Group("hand", ("slide",))),
-        poses=(NamedPose("home", ("j1", "j2"), (0.5, -1.0)), NamedPose("all", ("j1", "j2", "slide"), (0.5, -1.0, 0.0))),
+        poses=(
+            NamedPose("home", ("j1", "j2"), (0.5, -1.0)),
+            NamedPose("all", ("j1", "j2", "slide"), (0.5, -1.0, 0.0)),
+            NamedPose("out", ("slide",), (0.1,)),
+        ),
         transmissions=(),
         X_WB=Transform.identity(),
         urdf="",
@@ -276,6 +280,7 @@ def test_at_pose_is_what_is_left_of_the_worst_joint() -> None:
     now = state(position=(0.51, -1.03, 0.2))
     assert margin("at_pose", now, pose="home", within=0.05) == pytest.approx(0.02)
     assert margin("at_pose", now, pose="all", group="arm", within=0.02) == pytest.approx(-0.01)
+    assert margin("at_pose", now, pose="all", within=0.05) == pytest.approx(0.02), "what slides does not count"
 
 
 SPECS: list[tuple[str, dict[str, Any]]] = [
@@ -347,7 +352,8 @@ def test_all_ticks_at_once_give_what_pieces_of_them_give(
         ("at_pose", {"pose": "hom"}, ("pose",), "did you mean 'home'?"),
         ("at_pose", {"pose": "home", "group": "ram"}, ("group",), None),
         ("at_pose", {"pose": "home", "group": "hand"}, ("group",), None),
-        ("at_pose", {"pose": "all"}, ("pose",), "name a `group` without it"),
+        ("at_pose", {"pose": "all", "group": "hand"}, ("group",), None),
+        ("at_pose", {"pose": "out"}, ("pose",), None),
     ],
 )
 def test_what_robot_and_scene_do_not_know_is_told(

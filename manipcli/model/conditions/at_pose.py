@@ -26,7 +26,7 @@ class AtPoseSpec(Model):
 
 
 def gauge(spec: AtPoseSpec, world: World) -> Gauge:
-    """`within` minus the largest |q - q_pose| [rad] over the joints."""
+    """`within` minus the largest |q - q_pose| [rad] over the joints; those that slide do not count."""
     joints, wanted = _targets(spec, world.robot)
     columns, goal = world.robot.indices(joints), np.array(wanted)
 
@@ -44,15 +44,16 @@ def gauge(spec: AtPoseSpec, world: World) -> Gauge:
 
 
 def _targets(spec: AtPoseSpec, robot: RobotModel) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """The joints that are compared, and their values in the pose."""
+    """The joints that are compared, and their values in the pose; what slides has none that an angle could bound."""
     pose = robot.pose(spec.pose)
-    wanted = None if spec.group is None else frozenset(robot.group(spec.group).joints)
-    pairs = [pair for pair in zip(pose.joints, pose.positions, strict=True) if wanted is None or pair[0] in wanted]
+    wanted = frozenset(pose.joints if spec.group is None else robot.group(spec.group).joints)
+    turning = {name for name in wanted & set(pose.joints) if robot.joint(name).type != "prismatic"}
+    pairs = [pair for pair in zip(pose.joints, pose.positions, strict=True) if pair[0] in turning]
     return tuple(name for name, _ in pairs), tuple(value for _, value in pairs)
 
 
 def check(spec: AtPoseSpec, setting: Setting) -> tuple[Problem, ...]:
-    """Pose and group exist, have joints in common, and these rotate (an angle cannot bound what slides)."""
+    """Pose and group exist, and have joints in common that rotate."""
     robot = setting.robot
     problems = []
     poses = [pose.name for pose in robot.poses]
@@ -64,11 +65,9 @@ def check(spec: AtPoseSpec, setting: Setting) -> tuple[Problem, ...]:
         return tuple(problems)
     joints, _ = _targets(spec, robot)
     if not joints:
-        problems.append(Problem(("group",), f"pose '{spec.pose}' says nothing of group '{spec.group}'"))
-    for name in joints:
-        if robot.joint(name).type == "prismatic":
-            message = f"joint '{name}' of pose '{spec.pose}' slides, and `within` is an angle"
-            problems.append(Problem(("pose",), message, "name a `group` without it"))
+        of = "" if spec.group is None else f" of group '{spec.group}'"
+        loc = "pose" if spec.group is None else "group"
+        problems.append(Problem((loc,), f"pose '{spec.pose}' names no rotating joint{of}, and `within` is an angle"))
     return tuple(problems)
 
 
