@@ -5,6 +5,8 @@ It is loaded into every run of pytest, so nothing of manipcli is imported before
 
 from __future__ import annotations
 
+import math
+from argparse import ArgumentTypeError
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -27,14 +29,14 @@ MARKS_OF_PYTEST = frozenset(
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("manipcli", "tasks of manipcli")
     group.addoption(
-        "--manipcli-samples", type=int, metavar="N", help="run samples 0 to N-1 of each task that has a `vary:`"
+        "--manipcli-samples", type=_count, metavar="N", help="run samples 0 to N-1 of each task that has a `vary:`"
     )
     group.addoption(
-        "--manipcli-timeout", type=float, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
+        "--manipcli-timeout", type=_limit, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
     )
     group.addoption(
         "--manipcli-silence",
-        type=float,
+        type=_limit,
         default=60.0,
         metavar="S",
         help="end a task that shows no progress for so long [s]; 0: never",
@@ -201,6 +203,22 @@ def _is_looked_for(path: Path, session: pytest.Session) -> bool:
         if place != path and not is_entered(place):
             return False
     return True
+
+
+def _count(word: str) -> int:
+    if not word.isdecimal() or int(word) == 0:
+        raise ArgumentTypeError(f"'{word}' is no number from 1 on")
+    return int(word)
+
+
+def _limit(word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not value >= 0.0:
+        raise ArgumentTypeError(f"'{word}' is no number of seconds, or 0 for never")
+    return value
 
 
 def _register(config: pytest.Config, name: str, about: str) -> None:

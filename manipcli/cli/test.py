@@ -84,8 +84,8 @@ def test(
             pages=report,
             junit=junit is not None,
             keep_logs=keep_logs,
-            silence=limit(seconds(silence)),
-            timeout=limit(seconds(timeout)),
+            silence=limit(_time("--silence", silence)),
+            timeout=limit(_time("--timeout", timeout)),
         )
         check_outputs(("--junit", junit))
         _check_replaced(junit)
@@ -226,6 +226,18 @@ def _write(suite: Suite, junit: Path | None, report: Path | None) -> None:
         report.mkdir(parents=True, exist_ok=True)
         write_whole(report / "index.html", render_page(suite, report).encode())
         console.talk(f"written: {report / 'index.html'}")
+
+
+def _time(option: str, word: str) -> float:
+    """
+    Raises:
+        InvalidInput: it is no time, or below 0.
+    """
+    value = seconds(word)
+    if value < 0.0:
+        message = f"{option} {word}: this is below 0"
+        raise InvalidInput([Finding("USE049", message, hint="write '10 min', 90, or 0 for never")])
+    return value
 
 
 def _check_replaced(junit: Path | None) -> None:

@@ -130,6 +130,18 @@ def test_silence_and_timeout_are_options(pytester: pytest.Pytester, word: str, s
     assert (settings.silence, settings.timeout) == (seconds, seconds)
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["--manipcli-samples=0", "--manipcli-samples=-1", "--manipcli-timeout=-1", "--manipcli-silence=nan"],
+)
+def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, words: str) -> None:
+    result = pytester.runpytest_inprocess(*LOADED, *ALONE, words)
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(
+        [f"*error: argument {words.partition('=')[0]}: '{words.partition('=')[2]}' is no number*"]
+    )
+
+
 def test_the_plugin_loads_nothing_but_itself() -> None:
     script = f"import sys, {PLUGIN}; print(*(name for name in sys.modules if name.startswith('manipcli')))"
     environment = {"PYTHONPATH": str(ROOT)}

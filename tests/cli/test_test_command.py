@@ -59,6 +59,8 @@ def test_nothing_to_run_is_5(folder: Path, capsys: pytest.CaptureFixture[str]) -
         ["-n", "0"],
         ["--samples", "0"],
         ["--timeout", "soon"],
+        ["--timeout", "-1"],
+        ["--silence", "-1 s"],
         ["--junit", "absent/x.xml"],
         ["--report", "a.yaml"],
     ],
