@@ -53,7 +53,7 @@ def judge(
     examined = examine(
         recording, expect, robot=robot, scene=scene, seam=seam, physics=run.get("physics", "") == "full", steps=steps
     )
-    cause = run.get("cause", "") if status == "failed" else ""
+    cause = run.get("cause", "") if status == "failed" else _broken_after_all(recording)
     word, text = _verdict(errors, cause, steps, examined.outcomes)
     return Verdict(
         task=run.get("task", ""),
@@ -68,6 +68,12 @@ def judge(
         drawn=_drawn(recording),
         cuts=Cuts.from_metadata(recording.metadata, end=examined.end, period=recording.period),
     )
+
+
+def _broken_after_all(recording: Recording) -> str:
+    """The watch that stopped the robot when no step was on any more; within a step, that says it itself."""
+    broken = [event.text for event in recording.events if event.kind == "watch_broken" and not event.step]
+    return f"stopped after the last step: {broken[0]}" if broken else ""
 
 
 def _drawn(recording: Recording) -> Drawn | None:
