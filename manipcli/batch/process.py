@@ -180,6 +180,7 @@ class Process:
             end = End(None, troubles=(Trouble(text, self.doing.place(job.case.file), self.doing.at),))
         if outcome == "passed" and not job.settings.keep_logs:
             job.log.unlink(missing_ok=True)
+            end = replace(end, report=replace(end.report, log=None) if end.report is not None else None)
         if outcome not in ("crashed", "hung"):
             job.output.unlink(missing_ok=True)
         else:

@@ -26,7 +26,7 @@ class RunReport:
         verdict: read from the log alone.
         wall_time: [s] of the whole run.
         real_time_factor: simulated time over the wall time of its simulation.
-        log: path of the log, as text; None where nothing was run.
+        log: path of the log, as text; None where nothing was run, or it was not kept.
         timing: the parts of `wall_time`.
     """
 

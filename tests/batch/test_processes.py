@@ -259,7 +259,7 @@ def test_the_verdict_arrives_whole_and_only_what_failed_keeps_its_log(
     )
     code = f"import pickle; open(job.log, 'w').close(); parent.send(pickle.loads({_pickled(sent)!r}))"
     (report,) = run(jobs(tmp_path, code))
-    assert (report.outcome, report.run) == (outcome, sent)
+    assert (report.outcome, report.run) == (outcome, sent if kept else replace(sent, log=None))
     assert (tmp_path / "runs" / "t0.mcap").exists() == kept == (report.log is not None)
     assert report.output is None
 
