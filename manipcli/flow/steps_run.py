@@ -242,7 +242,7 @@ class StepsRun:
                 if end.outcome != "done":
                     return MotionEnd(end.outcome, f"{motion.label}: {end.text}{_missing(end, probe)}")
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
-                    self._holding.taken(planned.plan.end.carried.body, self._session.touched)
+                    self._holding.taken(planned.plan.end.carried.body, self._session.touching)
                 awaited = awaited and not motion.awaits
                 texts += [end.text] if end.text else []
             self._believed = planned.plan.end

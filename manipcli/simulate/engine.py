@@ -61,16 +61,12 @@ class Engine(Protocol):
         ...
 
     def touches_changed(self) -> bool:
-        """Whether the robot touches other things than when `robot_contacts` was last asked, or some point of contact
-        carries much more than any did; cheaper than to ask it."""
+        """Whether other things touch than when `contacts` was last asked, or some point of contact of the robot carries
+        much more than any of them did; cheaper than to ask it."""
         ...
 
-    def robot_contacts(self) -> tuple[Contact, ...]:
-        """What the robot touches now."""
-        ...
-
-    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
-        """Everything that touches now: what the robot touches, and the rest."""
+    def contacts(self) -> tuple[Contact, ...]:
+        """Everything that touches now."""
         ...
 
     def close(self) -> None:

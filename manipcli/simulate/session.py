@@ -101,8 +101,7 @@ class Session:
         self._joint_of_part = _joint_of_part(robot)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
-        self._touched: tuple[Contact, ...] = ()
-        self._others: tuple[Contact, ...] = ()
+        self._touching: tuple[Contact, ...] = ()
         self._watchful = 0  # the tick up to which contacts are looked at every time
 
     @property
@@ -116,9 +115,9 @@ class Session:
         return self._limiter.saturations.astype(np.float64)
 
     @property
-    def touched(self) -> tuple[Contact, ...]:
-        """What the robot touched when it was last looked at; at most ten ticks ago."""
-        return self._touched
+    def touching(self) -> tuple[Contact, ...]:
+        """What touched when it was last looked at; at most ten ticks ago."""
+        return self._touching
 
     def restart_clock(self, observer: Observer) -> None:
         """The next tick is number 0, and the first that `observer` sees; the world stays as it is."""
@@ -181,35 +180,30 @@ class Session:
     def _touch(self, state: WorldState) -> None:
         """What touches, and the force on what each joint moves.
 
-        Everything at every tenth tick. What the robot touches at every tick while a controller asks for forces, and
-        for ten ticks from when that changes or a point is pressed much harder than any was: no short touch is lost.
+        Looked at at every tenth tick, at every one while a controller asks for forces, and for ten ticks from when
+        other things touch than before, or a point of the robot is pressed much harder: no short touch is lost.
         """
         ticks = self.ticks
         slow = ticks % SLOW == 0
-        before = self._touched
         if slow:
             self._refuse_runaway(state)
         if (slow or ticks >= self._watchful) and self.engine.touches_changed():
             self._watchful = ticks + SLOW
         elif not slow and ticks >= self._watchful and not self.manager.senses_contact:
             return
-        if slow:
-            self._touched, self._others = self.engine.contacts()
-        else:
-            self._touched = self.engine.robot_contacts()
-        if self._touched or before:
-            forces = [0.0] * len(self._contact_force)
-            for a, b, force, _ in self._touched:
-                joint_a, joint_b = self._joint_of_part.get(a), self._joint_of_part.get(b)
-                if joint_a is None:
-                    if joint_b is not None:
-                        forces[joint_b] += force
-                elif joint_b is None:
-                    forces[joint_a] += force
-            self._contact_force[:] = forces
-            self.observer.contacts(ticks, self._touched + self._others)
-        elif slow:
-            self.observer.contacts(ticks, self._others)
+        before, self._touching = self._touching, self.engine.contacts()
+        if not (slow or before or self._touching):
+            return
+        forces = [0.0] * len(self._contact_force)
+        for a, b, force, _ in self._touching:
+            joint_a, joint_b = self._joint_of_part.get(a), self._joint_of_part.get(b)
+            if joint_a is None:
+                if joint_b is not None:
+                    forces[joint_b] += force
+            elif joint_b is None:
+                forces[joint_a] += force
+        self._contact_force[:] = forces
+        self.observer.contacts(ticks, self._touching)
 
     def _refuse_runaway(self, state: WorldState) -> None:
         speeds = np.abs(state.velocity)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from manipcli import pipeline
@@ -230,3 +232,18 @@ def test_with_the_ideal_engine_the_plan_comes_true(run: Run, tmp_path: Path) -> 
     recording = read_recording(tmp_path / "small.mcap")
     assert abs(recording.states.position[-1][:7]).max() < 1e-9
     assert verdict.steps[0].ended == pytest.approx(verdict.steps[0].planned_duration, abs=0.005)
+
+
+def test_a_touch_of_a_moment_between_objects_is_not_missed(run: Run, tmp_path: Path) -> None:
+    """A ball that falls 8 cm bounces at t = sqrt(2 h / g) = 0.128 s, within a few ticks."""
+    ball = "ball: {sphere: {radius: 2 cm}, mass: 100 g, restitution: 1.0, pose: {xyz: [0.7, 0, 0.3]}}"
+    table = TABLE.replace("fixed: true", "fixed: true, restitution: 1.0")
+    text = scene(table, ball, steps="wait: 0.2 s") + "expect:\n  - no_collision: {pairs: [[ball, table]]}\n"
+    verdict = run(text, "simulation.settle=0 s")
+    assert verdict.verdict == "failed"
+    (outcome,) = verdict.expectations
+    assert outcome.at == pytest.approx(math.sqrt(2 * 0.08 / 9.81), abs=0.003)
+    states = read_recording(tmp_path / "small.mcap").states
+    height = states.body_position[states.time < 0.25, 0, 2]
+    assert abs(float(states.time[np.argmin(height)]) - outcome.at) < 0.003
+    assert height[-1] > 0.25  # it was a bounce

@@ -86,14 +86,11 @@ class ScriptedEngine:
         self.tick += 1
 
     def touches_changed(self) -> bool:
-        seen, self.seen = self.seen, self.robot_contacts()
+        seen, self.seen = self.seen, self.touching
         return seen != self.seen
 
-    def robot_contacts(self) -> tuple[Contact, ...]:
-        return tuple(c for c in self.touching if "robot/" in c.a + c.b)
-
-    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
-        return self.robot_contacts(), tuple(c for c in self.touching if "robot/" not in c.a + c.b)
+    def contacts(self) -> tuple[Contact, ...]:
+        return self.touching
 
     def close(self) -> None: ...
 

@@ -140,7 +140,7 @@ def test_a_link_that_is_pressed_on_an_obstacle_does_not_pass(mode: Mode, value: 
     height = 1.0 - 0.6 * math.sin(angle) - 0.02 * math.cos(angle)
     engine = opened(replace(FREE, effort=10.0, velocity=2.0), bodies=(obstacle(height),))
     position, velocity, effort = run(engine, commanded(mode, value), 1500)
-    pressing = max(contact.force for contact in engine.robot_contacts())
+    pressing = max(contact.force for contact in engine.contacts())
     engine.close()
     assert position[-1] == pytest.approx(angle, abs=0.01), "on the block, not in it"
     assert abs(velocity[-1]) < 1e-3

@@ -78,11 +78,8 @@ class Standing:
     def touches_changed(self):
         return False
 
-    def robot_contacts(self):
-        return ()
-
     def contacts(self):
-        return (), ()
+        return ()
 
     def close(self):
         pass

@@ -57,11 +57,8 @@ class KinematicEngine:
     def touches_changed(self) -> bool:
         return False
 
-    def robot_contacts(self) -> tuple[Contact, ...]:
+    def contacts(self) -> tuple[Contact, ...]:
         return ()
-
-    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
-        return (), ()
 
     def close(self) -> None:
         """Holds nothing."""

@@ -170,24 +170,20 @@ class PybulletEngine:
         self._points = None
 
     def touches_changed(self) -> bool:
-        points = self._robot_points()
-        if not points:
-            return bool(self._pairs)
-        return touching_pairs(points) != self._pairs or greatest_force(points) > KNOCK * self._greatest + KNOCK_LEAST
+        points = self._contact_points()
+        if touching_pairs(points) != self._pairs:
+            return True
+        return greatest_force(points, self._robot) > KNOCK * self._greatest + KNOCK_LEAST
 
-    def robot_contacts(self) -> tuple[Contact, ...]:
-        points = self._robot_points()
-        self._pairs, self._greatest = touching_pairs(points), greatest_force(points)
+    def contacts(self) -> tuple[Contact, ...]:
+        points = self._contact_points()
+        self._pairs, self._greatest = touching_pairs(points), greatest_force(points, self._robot)
         return self._merge(points)
 
-    def contacts(self) -> tuple[tuple[Contact, ...], tuple[Contact, ...]]:
-        robot, points = self._robot, self._p.getContactPoints(physicsClientId=self._client)
-        return self.robot_contacts(), self._merge([point for point in points if robot not in point[1:3]])
-
-    def _robot_points(self) -> tuple[ContactPoint, ...]:
-        """The robot's points of contact, asked for once a tick: a tuple of a point costs as much as looking at it."""
+    def _contact_points(self) -> tuple[ContactPoint, ...]:
+        """Asked for once a tick: a tuple of a point costs as much as looking at it."""
         if self._points is None:
-            self._points = self._p.getContactPoints(self._robot, physicsClientId=self._client)
+            self._points = self._p.getContactPoints(physicsClientId=self._client)
         return self._points
 
     def close(self) -> None:

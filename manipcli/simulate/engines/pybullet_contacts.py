@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 
 from manipcli.model.state import Contact
 
@@ -14,17 +14,15 @@ ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, flo
 """What PyBullet says of a contact point, up to its distance and normal force."""
 _sides = attrgetter("a", "b")
 
-_force = itemgetter(9)
-
 
 def touching_pairs(points: Sequence[ContactPoint]) -> set[Pair]:
     """The pairs of links that touch."""
     return {point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0}
 
 
-def greatest_force(points: Sequence[ContactPoint]) -> float:
-    """[N] of a single point."""
-    return max(map(_force, points), default=0.0)
+def greatest_force(points: Sequence[ContactPoint], body: int) -> float:
+    """[N] of a single point of this body."""
+    return max([point[9] for point in points if point[1] == body or point[2] == body], default=0.0)
 
 
 class ContactMerger:
