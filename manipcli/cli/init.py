@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from shlex import quote
 from typing import Annotated, Final
@@ -47,6 +48,9 @@ def init(
         raise InvalidInput(
             [Finding("USE088", message, hint="give another folder, or --force to replace what is there")]
         )
+    wrong = sorted({told for path in files if path not in kept for told in _in_the_way(path)})
+    if wrong:
+        raise InvalidInput([Finding("USE088", f"{listed(wrong)}; nothing was written", hint="give another folder")])
     from manipcli.core.whole_file import write_whole
 
     for path, data in files.items():
@@ -59,6 +63,15 @@ def init(
     enter = "" if Path(os.path.realpath(folder)) == Path.cwd() else f"cd {quote(str(folder))} && "
     console.talk(f"next: {enter}manipcli test")
     return ExitCode.PASSED
+
+
+def _in_the_way(path: Path) -> Iterator[str]:
+    """What makes it impossible to write a file there, as far as can be seen."""
+    if path.is_dir():
+        yield f"'{path}' is a folder where a file is to be"
+    for parent in path.parents:
+        if os.path.lexists(parent) and not parent.is_dir():
+            yield f"'{parent}' is a file where a folder is to be"
 
 
 def _files(folder: Path) -> dict[Path, bytes]:

@@ -63,6 +63,27 @@ def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest
     assert capsys.readouterr().err == "next: manipcli test\n"
 
 
+@pytest.mark.parametrize(
+    ("there", "words", "told"),
+    [
+        ("p/tasks", ["p"], "'p/tasks' is a file where a folder is to be"),
+        ("p/tasks", ["p", "--force"], "'p/tasks' is a file where a folder is to be"),
+        ("p", ["p"], "'p' is a file where a folder is to be"),
+        ("p/robots/panda.yaml/x", ["p", "--force"], "'p/robots/panda.yaml' is a folder where a file is to be"),
+    ],
+)
+def test_what_is_in_the_way_is_told_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    there: str, words: list[str], told: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / there).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / there).write_text("mine")
+    assert main(["init", *words]) == 4
+    assert f"error[USE088]: {told}; nothing was written" in capsys.readouterr().err
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / there]
+
+
 @pytest.mark.slow
 def test_what_a_folder_has_before_it_is_a_project_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
