@@ -11,10 +11,13 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 from manipcli.core.text import any_of, nearest, shorten
+
+EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
+"""[m/s2] in the world, where nobody says another."""
 
 
 class UnitError(ManipcliError):

@@ -33,10 +33,16 @@ SETTLED_SHIFT: Final = 0.01
 
 
 def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
-    """The task's controllers, for its robot (and its `kinematics`, if they are at hand) and control period."""
+    """The task's controllers, for its robot, gravity and control period.
+
+    Args:
+        task: whose files say what the controllers know of the robot and of gravity; what was drawn acts on neither.
+        kinematics: of the robot under that gravity, if they are at hand.
+    """
     file = task.true.controllers
     period = task.spec.simulation.control_period
     compat = task.robot_file.spec.compat
+    kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
     return build_controllers(
         file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat
     )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import frozen
 from manipcli.flow.load import Loc, Task, unusable
 from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
@@ -19,9 +20,11 @@ from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.build_scene import build_scene
+from manipcli.model.scene import Scene
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
 
@@ -68,7 +71,14 @@ def recorded_task(
     robot = meshes.robot(recorded_robot(recording, path))
     # What the scene was built from may be files that no log carries; otherwise the task itself says it.
     from_files = any(body.mesh is not None or body.urdf is not None for body in task.spec.scene.values())
-    scene = meshes.scene(recorded_scene(recording, path)) if from_files else build_scene(task.spec)
+    found_scene = meshes.scene(recorded_scene(recording, path)) if from_files else None
+
+    def scene_of(file: Located[TaskSpec]) -> Scene:
+        if found_scene is None:
+            return build_scene(file.spec)
+        return replace(found_scene, gravity=frozen(file.spec.simulation.gravity))  # recorded is what was drawn
+
+    scene = scene_of(task)
     found = unusable(task, controllers, robot, scene)
     if any(finding.severity == "error" for finding in found):
         raise InvalidInput(found)
@@ -88,7 +98,7 @@ def recorded_task(
             bind(task, robot_file, controllers)[0],
             drawn,
             robot_of=lambda file: meshes.robot(rebuild_robot(file.spec, attached(recording, path, URDF))),
-            scene_of=lambda file: scene if from_files else build_scene(file.spec),
+            scene_of=scene_of,
         )
     files = mesh_files(made)
     _check_there(files, path, meshes)

@@ -18,9 +18,10 @@ from manipcli.control.tuning import StepAnswer, Tuned, Wish, tune_efforts, tune_
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
+from manipcli.core.units import EARTH_GRAVITY
 from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
-from manipcli.model.kinematics import STANDARD_GRAVITY, Kinematics
+from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.hand import with_mimics
@@ -229,7 +230,7 @@ class _Tuner:
         if refused:
             raise InvalidInput(refused)
         settings = EngineSettings(wish.period / wish.substeps, wish.substeps, start)
-        gravity = np.array(STANDARD_GRAVITY)
+        gravity = np.array(EARTH_GRAVITY)
         with stdout_to_stderr():
             engine = member.open(robot, Scene(bodies=(), frames=(), gravity=gravity), settings)
             try:

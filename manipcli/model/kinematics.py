@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, cross, frozen
+from manipcli.core.units import EARTH_GRAVITY
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.robot import RobotModel
 
 if TYPE_CHECKING:
     import pinocchio
-
-STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
-"""[m/s2] in the world."""
 
 
 class Kinematics:
@@ -30,7 +28,7 @@ class Kinematics:
         gravity: (3,) [m/s2] in the world.
     """
 
-    def __init__(self, robot: RobotModel, *, gravity: tuple[float, float, float] | Array = STANDARD_GRAVITY) -> None:
+    def __init__(self, robot: RobotModel, *, gravity: tuple[float, float, float] | Array = EARTH_GRAVITY) -> None:
         import pinocchio as pin
 
         self._pin = pin

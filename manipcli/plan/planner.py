@@ -59,7 +59,7 @@ class Planner:
         self.rng = rng
         self.gripper_joints = gripper_joints
         self.gripper_speed = gripper_speed
-        self.kinematics = Kinematics(robot)
+        self.kinematics = Kinematics(robot, gravity=scene.gravity)
         # Fingers may meet each other: their controller stops them.
         hand = moved_links(robot, gripper_joints)
         hand |= {joint.parent for joint in robot.joints if joint.name in gripper_joints}

@@ -12,6 +12,7 @@ from typing import Annotated, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
+from manipcli.core.units import EARTH_GRAVITY
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
@@ -39,7 +40,7 @@ class SimulationSpec(Model):
     ] = 0.001
     seed: Annotated[int, Field(ge=0, description="Of the planner and of noise, 0 or more. Default 0.")] = 0
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
-        (0.0, 0.0, -9.81), description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
+        EARTH_GRAVITY, description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
     )
     settle: Annotated[Time, Field(ge=0, le=60, description="Simulated before the start, 0 to 60 s. Default 0.5 s.")] = (
         0.5

@@ -72,7 +72,7 @@ def test_a_joint_whose_weight_nobody_carries_gets_an_integral_that_can(tmp_path:
     one = tuned(tmp_path, Wish(3.0, 1.0, 1e-3), axis="0 1 0", control=control)
     assert one.i > 0.0
     assert one.i_clamp is not None
-    assert one.i_clamp == pytest.approx(1.2 * 0.5 * 9.80665 * 0.2, rel=0.01)
+    assert one.i_clamp == pytest.approx(1.2 * 0.5 * 9.81 * 0.2, rel=0.01)
 
 
 @pytest.mark.parametrize("axis", ["0 0 1", "1e-14 0 1"])

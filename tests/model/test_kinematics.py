@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.units import EARTH_GRAVITY
 from manipcli.model.batch_kinematics import forward_batch, relative_batch
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
@@ -129,7 +130,7 @@ def potential(robot: RobotModel, q: Array) -> float:
     """Sum of m g h [J] over the links."""
     poses = chain_product(robot, q)
     return sum(
-        link.inertial.mass * 9.80665 * float((poses[link.name] @ link.inertial.X_LI).p[2])
+        -link.inertial.mass * EARTH_GRAVITY[2] * float((poses[link.name] @ link.inertial.X_LI).p[2])
         for link in robot.links
         if link.inertial is not None
     )
@@ -220,7 +221,7 @@ def test_the_engine_puts_links_where_we_do(robot: RobotModel, world: World, q: A
 def test_the_engine_s_inverse_dynamics_agree(robot: RobotModel, world: World, q: Array) -> None:
     rng = np.random.default_rng(3)
     v, a = rng.normal(size=(2, len(q)))
-    world.p.setGravity(0, 0, -9.80665, physicsClientId=world.client)
+    world.p.setGravity(*EARTH_GRAVITY, physicsClientId=world.client)
     order = world.order
     tau = world.p.calculateInverseDynamics(
         world.body, list(q[order]), list(v[order]), list(a[order]), physicsClientId=world.client
@@ -228,14 +229,14 @@ def test_the_engine_s_inverse_dynamics_agree(robot: RobotModel, world: World, q:
     own = Kinematics(robot).inverse_dynamics(q, v, a)[order]
     # PyBullet leaves damping of the file out here too; the mount turns gravity, which it takes in the base frame.
     if robot.X_WB.p.any():
-        g = robot.X_WB.R @ np.array([0.0, 0.0, -9.80665])
+        g = robot.X_WB.R @ np.array(EARTH_GRAVITY)
         own = Kinematics(robot, gravity=g).inverse_dynamics(q, v, a)[order]
     np.testing.assert_allclose(tau, own, atol=1e-10)
 
 
 def test_the_engine_s_free_motion_agrees(robot: RobotModel, world: World, q: Array) -> None:
     p, body, client = world.p, world.body, world.client
-    p.setGravity(0, 0, -9.80665, physicsClientId=client)
+    p.setGravity(*EARTH_GRAVITY, physicsClientId=client)
     for k in range(-1, len(world.infos)):
         p.changeDynamics(body, k, linearDamping=0, angularDamping=0, jointDamping=0, physicsClientId=client)
     for k in world.joints:
