@@ -94,6 +94,7 @@ class _Beats:
 def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; its log, picture and page are written where they are wanted."""
     from manipcli import pipeline
+    from manipcli.batch.baseline import baseline_path
     from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
 
     beats.doing("loading")
@@ -117,7 +118,8 @@ def _end_of(job: Job, beats: _Beats) -> End:
     found = troubles(job, report.verdict)
     findings: tuple[Finding, ...] = ()
     notes: list[str] = []
-    if report.verdict.verdict == "passed" and job.nominal and settings.baseline:
+    compare = report.verdict.verdict == "passed" and job.nominal and settings.baseline
+    if compare and baseline_path(job.path).exists():
         beats.doing("comparing with the baseline")
         try:
             found, better = against_baseline(job, report.verdict)

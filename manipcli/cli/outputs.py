@@ -34,12 +34,16 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
         reads: what the same command reads, or writes under rules of its own.
 
     Raises:
-        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder.
+        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder; or it
+            is `-`, where stdout has the answer.
     """
     taken = [os.path.realpath(path) for path in reads if path is not None]
     for option, path in outputs:
         if path is None:
             continue
+        if str(path) == "-":
+            message = f"{option} '-': stdout has the answer of the command; expected the name of a file"
+            raise InvalidInput([Finding("USE083", message)])
         if os.path.realpath(path) in taken:
             raise InvalidInput([Finding("USE081", f"{option} '{path}': the same command has that file already")])
         if path.is_dir() or not path.parent.is_dir():

@@ -258,8 +258,10 @@ def _check_folder(report: Path | None) -> None:
     """Before anything is run.
 
     Raises:
-        InvalidInput: a file is where the folder should be.
+        InvalidInput: a file is where the folder should be, or it is `-`.
     """
+    if report is not None and str(report) == "-":
+        raise InvalidInput([Finding("USE083", "--report '-': expected the name of a folder")])
     if report is not None and report.exists() and not report.is_dir():
         raise InvalidInput([Finding("USE086", f"--report '{report}': this is a file; a folder was expected")])
 

@@ -63,6 +63,8 @@ def test_nothing_to_run_is_5(folder: Path, capsys: pytest.CaptureFixture[str]) -
         ["--silence", "-1 s"],
         ["--junit", "absent/x.xml"],
         ["--report", "a.yaml"],
+        ["--junit", "-"],
+        ["--report", "-"],
     ],
 )
 def test_wrong_usage_is_4_and_runs_nothing(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
