@@ -5,14 +5,15 @@ A sample is a pure function of seed, sample number and path: the uniform deviate
     u = (first 52 bits of SHA-256("seed/sample/path/k") + 1/2) / 2^52
 
 so that no path changes the draws of another, and no library's version those of any. From it `uniform` is a + (b - a) u,
-`normal` the quantile of u, `choice` item floor(n u).
+`normal` the quantile of F(least) + (F(most) - F(least)) u, where F is its distribution and least and most
+are the field's bounds, `choice` item floor(n u).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from statistics import NormalDist
 from typing import Final
@@ -24,7 +25,7 @@ from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.fields import children, unit_of
+from manipcli.spec.fields import bounds_of, children, unit_of
 from manipcli.spec.located import Area, Located
 from manipcli.spec.quantity import Unit
 from manipcli.spec.robot import RobotSpec
@@ -35,6 +36,8 @@ EVERY: Final = "*"
 """In a path: each name of a mapping, or each item of a list."""
 LARGEST: Final = 1e100
 """Amounts are below this [SI]: what is drawn stays finite."""
+RAREST: Final = 1e-3
+"""A normal distribution has at least this share where the field may be."""
 _TASK_KEYS: Final = ("scene", "frames", "simulation")
 _CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
 
@@ -46,12 +49,14 @@ class Law:
     """What is drawn for one path: `rows` of amounts [SI], one a component.
 
     They are least and most of `uniform`, mean and deviation of `normal`, the items of `choice` and `grid`; of these the
-    components are drawn `together` where an item was written as a list.
+    components are drawn `together` where an item was written as a list. What `normal` draws of each component lies
+    `between` two amounts: the bounds that the field states.
     """
 
     word: str
     rows: tuple[tuple[float, ...], ...]
     together: bool
+    between: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +133,9 @@ class Varied:
                     return least + math.floor(u * (most - least + 1.0))
                 return least + (most - least) * u
             case "normal":
-                return NormalDist(rows[0][k], rows[1][k]).inv_cdf(u)
+                law = NormalDist(rows[0][k], rows[1][k])
+                low, high = map(law.cdf, self.law.between[k])
+                return law.inv_cdf(min(low + (high - low) * u, math.nextafter(1.0, 0.0)))
             case "choice":
                 return rows[math.floor(u * len(rows))][k]
         return rows[items[which]][k]
@@ -171,6 +178,7 @@ class _Leaf:
     parts: Path
     value: object
     unit: Unit | None
+    bounds: tuple[float, float]
 
 
 def bind(
@@ -228,6 +236,9 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
             loc = (*((how,) if how else ()), law.word)
             raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
     _refuse_too_large(law, nominal, how)
+    if law.word == "normal":
+        law = replace(law, between=tuple(_between(leaf.bounds, value, how) for value in nominal))
+        _refuse_too_rare(law, path, how)
     return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
 
 
@@ -238,6 +249,25 @@ def _refuse_too_large(law: Law, nominal: Sequence[float], how: str) -> None:
             reach = amount * value if how == "scale" else amount + (value if how == "offset" else 0.0)
             if not max(abs(amount), abs(reach)) < LARGEST:
                 raise _Problem(f"{amount:g} is too large an amount", loc=(*((how,) if how else ()), law.word))
+
+
+def _between(bounds: tuple[float, float], nominal: float, how: str) -> tuple[float, float]:
+    """Between what an amount must lie so that the value in the file keeps its bounds."""
+    if how == "offset":
+        return bounds[0] - nominal, bounds[1] - nominal
+    if how == "scale":
+        ends = sorted(bound / nominal for bound in bounds) if nominal else (-math.inf, math.inf)
+        return ends[0], ends[1]
+    return bounds
+
+
+def _refuse_too_rare(law: Law, path: str, how: str) -> None:
+    """A normal distribution that has next to nothing where the field may be."""
+    for mean, sd, (least, most) in zip(*law.rows, law.between, strict=True):
+        normal = NormalDist(mean, sd)
+        if normal.cdf(most) - normal.cdf(least) < RAREST:
+            message = f"less than one in a thousand of these is what '{path}' may be"
+            raise _Problem(message, loc=(*((how,) if how else ()), law.word))
 
 
 def _law(
@@ -298,7 +328,7 @@ def _leaves(root: BaseModel, parts: Path) -> list[_Leaf]:
 
 def _below(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> Iterator[_Leaf]:
     if not rest:
-        yield _Leaf(done, value, unit_of(annotation, metadata))
+        yield _Leaf(done, value, unit_of(annotation, metadata), bounds_of(annotation, metadata))
         return
     part, further = rest[0], rest[1:]
     known = children(value, annotation)

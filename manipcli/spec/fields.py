@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import get_args, get_origin
 
+from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from manipcli.spec.quantity import Unit
 
@@ -25,6 +28,22 @@ def children(value: object, annotation: object) -> dict[str, Held]:
     if isinstance(value, tuple):
         return {str(k): (one, annotation, ()) for k, one in enumerate(value)}
     return {}
+
+
+def bounds_of(annotation: object, metadata: Sequence[object]) -> tuple[float, float]:
+    """The least and the most number that a field's type states, however deep in it; infinite where it states none."""
+    least, most = -math.inf, math.inf
+    for one in (*metadata, *getattr(annotation, "__metadata__", ())):
+        for stated in one.metadata if isinstance(one, FieldInfo) else (one,):
+            match stated:
+                case Gt(gt=int() | float() as bound) | Ge(ge=int() | float() as bound):
+                    least = max(least, bound)
+                case Lt(lt=int() | float() as bound) | Le(le=int() | float() as bound):
+                    most = min(most, bound)
+    if (least, most) != (-math.inf, math.inf) or get_origin(annotation) is None:
+        return least, most
+    deeper = (bounds_of(one, ()) for one in get_args(annotation))
+    return next((one for one in deeper if one != (-math.inf, math.inf)), (least, most))
 
 
 def unit_of(annotation: object, metadata: Sequence[object]) -> Unit | None:

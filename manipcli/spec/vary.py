@@ -44,7 +44,10 @@ class DistributionSpec(Model):
     uniform: tuple[Value, Value] | None = Field(
         None, description="[least, most]: every value between them alike; of a whole number each of them alike."
     )
-    normal: NormalSpec | None = Field(None, description="{mean, sd} or [mean, sd]; of a whole number rounded.")
+    normal: NormalSpec | None = Field(
+        None,
+        description="{mean, sd} or [mean, sd], cut off at the field's bounds (a mass at 0); whole numbers rounded.",
+    )
     choice: Annotated[tuple[Value, ...], Field(min_length=1)] | None = Field(
         None, description="One of these, each alike."
     )

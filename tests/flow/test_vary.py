@@ -244,12 +244,36 @@ def test_values_that_must_fit_each_other_are_compared_as_they_are_drawn(write: C
     assert load_task(write(f"{steps}\nsimulation.control_period: {{choice: [2 ms, 4 ms]}}"), sample=3)
 
 
+def test_a_normal_law_is_cut_off_at_the_bounds_of_its_field(values: Values) -> None:
+    """Of the value, its offset and its scale: all the same masses, above 0 and distributed as a cut normal law."""
+    mean, sd, nominal = 0.08, 0.5, 0.08
+    laws = (
+        f"normal: [{mean}, {sd}]",
+        f"offset: {{normal: [{mean - nominal}, {sd}]}}",
+        f"scale: {{normal: [{mean / nominal}, {sd / nominal}]}}",
+    )
+    cut = stats.truncnorm(-mean / sd, math.inf, loc=mean, scale=sd)
+    for law in laws:
+        drawn = values(f"scene.block.mass: {{{law}}}")["scene.block.mass"]
+        assert min(drawn) > 0.0
+        assert stats.kstest(drawn, cut.cdf).pvalue > LEAST_P
+        assert stats.kstest(drawn, stats.norm(mean, sd).cdf).pvalue < LEAST_P
+    both = values("scene.block.restitution: {normal: [0.5, 1]}", 200)["scene.block.restitution"]
+    assert 0.0 <= min(both) < 0.1 < 0.9 < max(both) <= 1.0
+
+
+def test_a_normal_law_with_next_to_nothing_where_its_field_may_be_is_refused(write: Callable[[str], Path]) -> None:
+    (told,) = _told(write("scene.block.mass: {offset: {normal: [-2, 0.1]}}"))
+    assert told.startswith("12:")
+    assert "less than one in a thousand of these is what 'scene.block.mass' may be" in told
+
+
 def test_a_drawn_value_that_cannot_be_is_told_where_it_is_varied(write: Callable[[str], Path]) -> None:
-    path = write("scene.block.mass: {offset: {normal: [-2, 0.1]}}")
+    path = write("scene.block.at: {offset: {normal: [5, 0.1]}}")
     with pytest.raises(InvalidInput) as caught:
         load_task(path, sample=4)
     (finding,) = caught.value.findings
-    assert finding.message.startswith("scene.block.mass: must be more than 0, not -")
+    assert finding.message.startswith("'block' would stand beside 'table' at [5.")
     assert finding.message.endswith("(sample 4)")
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (12, 3)
