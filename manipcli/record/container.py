@@ -51,7 +51,7 @@ class Container:
         from zstandard import ZstdCompressor
 
         self.path = path
-        self.partial = path.with_name(path.name + suffix)
+        self.partial = path.parent / f"{path.name}{suffix}"  # of a folder that has no name, too
         self._fd = _claim(path, self.partial, overwrite=overwrite)
         self._size = 0
         self._crc = 0

@@ -50,7 +50,7 @@ class BadRecording(InvalidInput):
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
         self.cause = cause
-        left = path.with_name(path.name + PARTIAL)
+        left = path.parent / f"{path.name}{PARTIAL}"  # of a folder that has no name, too
         if hint is None and not path.exists() and left.is_file():
             hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))

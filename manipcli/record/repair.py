@@ -71,7 +71,7 @@ class Repaired:
 def default_output(path: Path) -> Path:
     """`run.repaired.mcap` beside `run.mcap` or `run.mcap.partial`."""
     name = path.name.removesuffix(PARTIAL)
-    return path.with_name(f"{name.removesuffix('.mcap')}.repaired.mcap")
+    return path.parent / f"{name.removesuffix('.mcap')}.repaired.mcap"
 
 
 def repair(path: Path, output: Path, *, overwrite: bool = False) -> Repaired:

@@ -90,6 +90,22 @@ def test_what_is_no_log_is_refused(command: str, tmp_path: Path, capsys: pytest.
         assert why in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("folder", [".", "/", ".."])
+def test_a_folder_is_no_log_and_no_place_for_one(
+    folder: str, task: Path, tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    for command in (["judge", folder], ["info", folder], ["replay", folder], ["diff", folder, str(log)]):
+        assert main(command) == 4
+        assert "s a directory" in capsys.readouterr().err, command
+    for command in (["run", str(task), "--log", folder], ["repair", str(log), "--output", folder]):
+        assert main(command) == 4
+        assert "s a directory" in capsys.readouterr().err, command
+    assert main(["repair", folder]) == 4
+    assert not [*tmp_path.iterdir()]
+
+
 def test_at_tells_joints_bodies_and_the_step(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["at", str(log), "0s"]) == 0
     text = capsys.readouterr().out
