@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, PackagePath
 from manipcli.core.errors import ExitCode
+
+UNREADABLE: Final = {"USE101", "USE102", "USE103"}
+"""Findings that say that a file is not there, or cannot be read."""
 
 
 def check(
@@ -33,5 +36,7 @@ def check(
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
     console.result(render(findings, names))
+    if any(finding.code in UNREADABLE for finding in findings):
+        return ExitCode.USAGE
     failed = any(finding.severity == "error" for finding in findings)
     return ExitCode.FAILED if failed else ExitCode.PASSED

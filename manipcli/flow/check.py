@@ -37,9 +37,9 @@ def check_files(
 
 
 def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> tuple[Finding, ...]:
-    if path.suffix.lower() in DESCRIPTIONS:
-        return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings
     try:
+        if path.suffix.lower() in DESCRIPTIONS:
+            return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings
         kind = load.kind_of(path)
         if kind == "task":
             task = load_task(path, package_path=package_path, allow_outside=allow_outside)

@@ -213,6 +213,15 @@ def test_a_run_tells_one_line_a_step_where_there_is_no_terminal(
     assert capsys.readouterr().err == "[1/1] pick_1: done (0.00 s to 6.10 s)\n"
 
 
+def test_check_of_a_file_that_is_not_there_is_a_wrong_call(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path in (tmp_path / "absent.yaml", tmp_path / "absent.urdf", tmp_path):
+        assert main(["check", str(path)]) == 4
+        assert "1 file checked, 1 error" in capsys.readouterr().out
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("task: t\nrobot: absent.yaml\ncontrollers: absent.yaml\nsteps: [{wait: 1 s}]\n")
+    assert main(["check", str(broken)]) == 1
+
+
 @pytest.mark.parametrize(("severity", "code"), [("error", 1), ("warning", 0)])
 def test_check_fails_on_errors_only(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], severity: str, code: int
