@@ -15,7 +15,7 @@ def resolve_mimics(reader: Reader, joints: Mapping[str, Joint], elements: Mappin
     """The joints, each mimic following an independent joint: q = m1 (m2 q' + o2) + o1 = (m1 m2) q' + (m1 o2 + o1).
 
     Args:
-        reader: takes the findings: unknown target, itself, a fixed joint, a circle.
+        reader: takes the findings: unknown target, itself, a fixed joint, multiplied by 0, a circle.
         joints: those that could be read.
         elements: <joint> of every joint of the description.
     """
@@ -55,6 +55,10 @@ def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements:
         reader.report("URDF084", f"joint '{joint.name}' mimics itself", place)
     elif mimic.joint in joints and not joints[mimic.joint].moves:
         reader.report("URDF014", f"joint '{joint.name}' mimics '{mimic.joint}', which is fixed", place)
+    elif mimic.multiplier == 0.0:
+        message = f"joint '{joint.name}' mimics '{mimic.joint}' with a multiplier of 0: it follows nothing"
+        hint = f'make it type="fixed", with its <origin> where it stands at {mimic.offset:g}'
+        reader.report("URDF014", message, place, hint=hint)
     elif mimic.joint in joints:
         return mimic
     return None

@@ -254,6 +254,14 @@ def test_a_chain_of_mimics_follows_the_first_joint(tmp_path: Path) -> None:
     assert parts.joints[1].mimic == Mimic("3", -3.0, 1.0)
 
 
+def test_a_mimic_with_a_multiplier_of_0_follows_nothing(tmp_path: Path) -> None:
+    second = JOINT.replace('"j"', '"k"').replace('"b"', '"c"').replace('"a"', '"b"')
+    follower = second.replace("</joint>", '<mimic joint="j" multiplier="{}" offset="0.4"/></joint>')
+    text = GOOD.replace(JOINT, LINK_B.replace('"b"', '"c"') + JOINT + follower)
+    for multiplier, told in (("0", ["URDF014"]), ("-0.0", ["URDF014"]), ("1e-3", [])):
+        assert [finding.code for finding in errors(tmp_path, text.format(multiplier))] == told
+
+
 def test_colours_come_from_materials_by_name_and_in_place(tmp_path: Path) -> None:
     shape = '<geometry><box size="1 2 3"/></geometry>'
     visuals = f'<visual>{shape}<material name="red"/></visual>'
