@@ -24,8 +24,12 @@ class Drawn:
     values: tuple[tuple[str, Number], ...]
 
     def __str__(self) -> str:
-        """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`."""
-        first = [f"{path}={value_text(value)}" for path, value in self.values[:MOST_SHOWN]]
+        """`sample 17: scene.cup.at=[0.7612, 0.00312], scene.cup.mass=0.2311`, in a line that is not too long."""
+        return self.told(MOST_SHOWN)
+
+    def told(self, most: int | None = None) -> str:
+        """The same with `most` values; by default with all."""
+        first = [f"{path}={value_text(value)}" for path, value in self.values[:most]]
         rest = len(self.values) - len(first)
         return f"sample {self.number}: {', '.join(first)}" + (f", and {rest} more" if rest else "")
 

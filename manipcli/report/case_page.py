@@ -36,7 +36,7 @@ def render_case_page(report: CaseReport, folder: Path) -> str:
     why = element(
         "section",
         *(causes or [element("p", report.text)]),
-        *(element("p", line) for line in (*beforehand(report), *report.notes)),
+        *(element("p", line) for line in (*beforehand(report, whole=True), *report.notes)),
         element("p", "log, as far as it got: ", log) if log is not None else None,
         element("p", "again: ", element("code", report.command)),
         class_="why",

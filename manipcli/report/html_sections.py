@@ -51,7 +51,7 @@ def head(page: RunPage) -> Markup:
         "header",
         element("div", element("h1", verdict.task), word, class_="title"),
         element("p", verdict.text, class_="says") if good or not page.causes else None,
-        element("p", str(verdict.drawn)) if verdict.drawn is not None else None,
+        element("p", verdict.drawn.told()) if verdict.drawn is not None else None,
         lost,
         element("dl", *figures, class_="figures"),
     )

@@ -47,7 +47,7 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     name: str = report.case.file
     if report.page is not None:
         name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
-    more = [] if report.passed else [*beforehand(report), element("code", report.command)]
+    more = [] if report.passed else [*beforehand(report, whole=True), element("code", report.command)]
     return (
         mark(report.passed, report.outcome),
         joined(name, element("div", report.case.task)) if report.case.task else name,

@@ -64,10 +64,13 @@ def case_lines(report: CaseReport) -> list[str]:
     return [*lines, *report.notes, f"again: {report.command}"]
 
 
-def beforehand(report: CaseReport) -> list[str]:
-    """What was known before anything moved: the values that were drawn, and the warnings."""
+def beforehand(report: CaseReport, *, whole: bool = False) -> list[str]:
+    """What was known before anything moved: the values that were drawn, all of them where there is room for the
+    `whole`, and the warnings."""
     warned = [line for one in report.warnings for line in describe(one).split("\n")]
-    return [str(report.drawn), *warned] if report.drawn is not None else warned
+    if report.drawn is None:
+        return warned
+    return [report.drawn.told() if whole else str(report.drawn), *warned]
 
 
 def judged_lines(report: CaseReport) -> list[str]:

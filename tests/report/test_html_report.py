@@ -16,6 +16,7 @@ import pytest
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import frozen
 from manipcli.judge.cuts import Cuts
+from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
 from manipcli.report.facts import JointFacts, Peak, RunFacts, StepFacts, Use
@@ -149,6 +150,13 @@ def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
     words = _Page(render_page(cut)).words
     assert words.index("fails by 2 mm") < words.index(told) < words.index("Tracking and limits")
     assert told not in _Page(render_page(page)).words
+
+
+def test_all_that_was_drawn_stands_at_the_head() -> None:
+    page = _page()
+    drawn = Drawn(3, tuple((f"scene.body_{k}.mass", 0.25) for k in range(9)))
+    told = _Page(render_page(replace(page, verdict=replace(page.verdict, drawn=drawn)))).words
+    assert "scene.body_7.mass=0.25, scene.body_8.mass=0.25" in told
 
 
 def test_what_the_log_lacks_is_said() -> None:

@@ -14,6 +14,7 @@ from manipcli.core.errors import Finding, Place
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report import suite_json
+from manipcli.report.case_page import render_case_page
 from manipcli.report.github import render_annotations
 from manipcli.report.junit import render_junit as render_run_junit
 from manipcli.report.run_page import Written
@@ -178,6 +179,17 @@ def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -
     assert all(line in render_page(Suite((odd,), 1, 1, 1.0), Path()) for line in told)
     (case,) = json.loads(suite_json.render_suite(Suite((odd,), 1, 1, 1.0)))["cases"]
     assert [(one["code"], one["hint"]) for one in case["warnings"]] == [("CTRL153", "kd 3 gives 0.7")]
+
+
+def test_a_page_tells_all_that_was_drawn_and_a_line_the_first_of_it() -> None:
+    many = Drawn(3, tuple((f"scene.body_{k}.mass", 0.25) for k in range(9)))
+    assert FAILED.run is not None
+    run = replace(FAILED.run, verdict=replace(FAILED.run.verdict, drawn=many))
+    odd = replace(FAILED, run=run)
+    assert "scene.body_7.mass=0.25, and 1 more" in render_case(odd)
+    for page in (render_page(Suite((odd,), 1, 1, 1.0), Path()), render_case_page(odd, Path())):
+        assert "scene.body_8.mass=0.25" in page
+        assert "and 1 more" not in page
 
 
 def test_junit_has_times_of_the_wall_and_names_a_log_that_was_kept() -> None:
