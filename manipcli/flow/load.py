@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.changed_files import Files, out_of_range
+from manipcli.flow.gathered import Gathered
 from manipcli.flow.switches import foreseen
 from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
@@ -30,6 +30,7 @@ from manipcli.model.joint_units import misread_units
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
 from manipcli.model.scene import Body, Frame, Interior, Scene
+from manipcli.model.scene_names import misnamed
 from manipcli.plan import retimer
 from manipcli.plan.claims import Claims, no_hand
 from manipcli.plan.names import UnknownPosture
@@ -40,10 +41,10 @@ from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.retry import retried
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.salvage import intended_ids
 from manipcli.spec.task import TaskSpec
 
 Loc = tuple[str | int, ...]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +128,8 @@ def load_task(
     read = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
     if read is None:
         raise gathered.refusal()
+    if task is None:
+        gathered.findings += (*read.findings, *misnamed(read.spec, lambda loc: read.place(*loc)))
     robot_path = gathered(lambda: _named_file(read, path, "robot"))
     controllers_path = gathered(lambda: _named_file(read, path, "controllers"))
     robot_file = robot_path and gathered(lambda: load.load_robot(robot_path, overrides=overrides))
@@ -189,31 +192,6 @@ def unusable(
     return (*unusable, *_refused(task, robot), *claimed, *misread, *warned)
 
 
-class Gathered:
-    """Calls what may refuse its input, and keeps the findings of what does."""
-
-    def __init__(self) -> None:
-        self.findings: list[Finding] = []
-
-    def __call__(self, step: Callable[[], T]) -> T | None:
-        """The result, or None where it was refused."""
-        try:
-            return step()
-        except InvalidInput as invalid:
-            self.findings += invalid.findings
-            return None
-
-    def refusal(self) -> InvalidInput:
-        """All of them, in the order of the files and of their lines."""
-        files = list(dict.fromkeys(finding.place.file for finding in self.findings if finding.place is not None))
-
-        def position(finding: Finding) -> tuple[int, int, int]:
-            place = finding.place
-            return (-1, 0, 0) if place is None else (files.index(place.file), place.line, place.column)
-
-        return InvalidInput(sorted(self.findings, key=position))
-
-
 def named_scene(spec: TaskSpec) -> Scene:
     """The names of a scene that cannot be built: bodies that could be anything, so that only unknown names are told."""
     one = Box((1.0, 1.0, 1.0))
@@ -239,12 +217,14 @@ def load_libraries(task: Task) -> None:
     ENGINES[task.spec.simulation.engine].prepare()
 
 
-def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:
-    """The file that the task names under `key`, relative to the task.
+def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path | None:
+    """The file that the task names under `key`, relative to the task; None where what it names has been refused.
 
     Raises:
         InvalidInput: it is not there; told at the place where it is named.
     """
+    if not task.source.untouched(key):
+        return None
     named: str = getattr(task.spec, key)
     found = Path(os.path.normpath(path.parent / named))
     if not found.is_file():
@@ -260,9 +240,8 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     uncommanded: list[tuple[Loc, Problem]] = []
     refused: list[tuple[Loc, Problem]] = []
     spec = task.spec
-    # Where faulty steps were left out, it is not known which ids there are.
-    ids = None if task.source.kept else tuple(step.id for step in spec.steps if step.id is not None)
-    setting = Setting(robot, scene, ids)
+    ids = tuple(step.id for step in spec.steps if step.id is not None)
+    setting = Setting(robot, scene, intended_ids(task.source, STEPS.names) if task.source.kept else ids)
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, scene)
@@ -282,7 +261,7 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
         for k, expected in enumerate(expectations):
             found += [((key, k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
     again: list[Finding] = []
-    for k, step in enumerate(spec.steps if ids is not None else ()):
+    for k, step in enumerate(() if task.source.kept else spec.steps):
         try:
             tried = retried(task, k)
         except InvalidInput as invalid:

@@ -7,27 +7,24 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.core.text import did_you_mean
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
 from manipcli.model.packages import NotFound
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
 from manipcli.model.scene import Body, Frame, Interior, Scene
+from manipcli.model.scene_names import Loc, Locate, misnamed
 from manipcli.model.start_overlap import overlaps
 from manipcli.spec.base import Model
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.task import BodySpec, TaskSpec
 
-Loc = tuple[str | int, ...]
-Locate = Callable[[Loc], Place | None]
 Resolve = Callable[[str], Path]
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")
-RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 
 
@@ -53,7 +50,7 @@ class _Builder:
         self.spec = spec
         self.place = place
         self.resolve = resolve
-        self.findings: list[Finding] = []
+        self.findings = list(misnamed(spec, place))
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
         self.poses: dict[str, Transform] = {}
@@ -99,14 +96,6 @@ class _Builder:
 
     def _shape(self, name: str, spec: BodySpec) -> None:
         loc: Loc = ("scene", name)
-        if name in RESERVED or "/" in name:
-            self._error(
-                "TASK220",
-                f"a body cannot be called '{name}': "
-                + ("names have no '/'" if "/" in name else "the word means something else in a task"),
-                loc,
-                f"reserved are {', '.join(RESERVED)}",
-            )
         words = [word for word in SHAPES if getattr(spec, word) is not None]
         if len(words) != 1:
             found = f"has {len(words)} shapes ({', '.join(words)})" if words else "has no shape"
@@ -222,19 +211,13 @@ class _Builder:
             return pose_transform(spec.pose)
         word = "rests_on" if spec.rests_on is not None else "inside"
         other = spec.rests_on or spec.inside or ""
-        X_WB = self._other(other, (*loc, word))
+        known = other in self.spec.scene or other in self.poses  # what is not has been told
+        X_WB = self._pose(other) if known else None
         if X_WB is None or name not in self.shapes or other not in self.shapes:
             return None
         if word == "inside":
             return self._inside(name, spec, other, X_WB)
         return self._resting(name, spec, other, X_WB)
-
-    def _other(self, name: str, loc: Loc) -> Transform | None:
-        """Where another body stands, or None with a finding."""
-        if name not in self.spec.scene and name not in self.poses:
-            self._unknown("TASK225", name, (*self.spec.scene, *(("floor",) if self.spec.floor else ())), loc)
-            return None
-        return self._pose(name)
 
     def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
         """Bottom of the body on the top face of the other, exactly touching: the settling lets it land."""
@@ -284,17 +267,9 @@ class _Builder:
 
     def _frames(self) -> Iterable[Frame]:
         for name, frame in self.spec.frames.items():
-            if name in self.shapes or name in RESERVED or "/" in name:
-                self._error("TASK227", f"a frame cannot be called '{name}': the name is taken", ("frames", name))
-            known = ("world", *self.spec.scene, *(("floor",) if self.spec.floor else ()))
-            if frame.parent not in known:
-                self._unknown("TASK227", frame.parent, known, ("frames", name, "parent"))
             yield Frame(name=name, parent=frame.parent, X_PF=pose_transform(frame.pose))
 
     # -- findings
-
-    def _unknown(self, code: str, name: str, known: tuple[str, ...], loc: Loc) -> None:
-        self._error(code, f"'{name}' is not in the scene", loc, did_you_mean(name, known))
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))

@@ -14,7 +14,19 @@ from manipcli.core.errors import Finding, InvalidInput, Place, Severity
 from manipcli.core.text import listed, shorten
 from manipcli.spec.base import Model
 from manipcli.spec.explain import explain
-from manipcli.spec.tree import MappingNode, Node, Path, ScalarNode, dotted, key_place_at, node_at, plain, shown
+from manipcli.spec.tree import (
+    MappingNode,
+    Node,
+    Path,
+    Plain,
+    ScalarNode,
+    child,
+    dotted,
+    key_place_at,
+    node_at,
+    plain,
+    shown,
+)
 
 M = TypeVar("M", bound=Model)
 
@@ -26,12 +38,26 @@ class Source:
     """A file's tree, after parameters and overrides, and what it is called.
 
     `kept`: where items of a list were left out, the indices in the file of those that remain, by the list's key.
+    `whole`: where anything was left out or replaced, the tree before that.
     """
 
     name: str
     root: Node
     area: Area
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    whole: Node | None = None
+
+    def plain(self) -> Plain:
+        """The data alone."""
+        return plain(self.root)
+
+    def untouched(self, *path: str) -> bool:
+        """Whether nothing at or below `path` was left out or replaced."""
+        before: Node | None = self.whole
+        now: Node | None = self.root
+        for part in path if before is not None else ():
+            before, now = before and child(before, part), now and child(now, part)
+        return self.whole is None or before is now
 
     def place(self, *path: str | int) -> Place:
         """Where the value at `path` stands; of what is not written, the nearest block around it."""

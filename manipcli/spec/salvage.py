@@ -5,66 +5,138 @@ The places stay those of the file. Nothing salvaged is ever planned or run.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pydantic import ValidationError
 
-from manipcli.core.errors import Place
+from manipcli.core.errors import Finding
+from manipcli.core.text import nearest
+from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
-from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, plain
+from manipcli.spec.override import step_ids
+from manipcli.spec.task import StepSpec, TaskSpec
+from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, without
 
 LISTS = ("steps", "expect", "watch")
 """Their faulty items are left out one by one."""
 NAMED = ("scene", "frames")
 """Their faulty entries are replaced by a stand-in, since others may speak of them by name."""
 KEPT = ("task", "robot", "controllers")
-"""Without these there is nothing to check."""
+"""Without these there is no task: a text stands in for them."""
+REFERENCES = ("rests_on", "inside", "parent")
+"""The names that a stand-in still speaks of."""
+CLOCK = ("step", "control_period")
+"""One says nothing without the other."""
+_ROUNDS = 4
+"""What pydantic looks at late shows only once the rest is in order, and what a block needs only once it is short."""
 
 
 def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
     """The task without its faulty steps and expectations, and with a stand-in for each faulty body or frame.
 
     Returns:
-        None where nothing coherent remains.
+        With the errors as `findings` that showed only when the others were out of the way; None where nothing coherent
+        remains.
     """
     root = source.root
     if not isinstance(root, MappingNode):
         return None
     kept: dict[str, tuple[int, ...]] = {}
-    for _ in range(2):  # what pydantic looks at late shows only once the rest is in order
+    late: list[Finding] = []
+    for number in range(_ROUNDS):
+        left = Source(source.name, root, source.area, kept, source.root)
         try:
-            return Located(model.model_validate(plain(root)), Source(source.name, root, source.area, kept))
+            return Located(model.model_validate(left.plain()), left, tuple(late))
         except ValidationError as error:
-            root = _without(root, [one["loc"] for one in error.errors(include_url=False)], kept)
+            faults = [one["loc"] for one in error.errors(include_url=False)]
+            if number and faults == [()] and left.untouched("simulation", "control_period"):
+                late += explain(error, root, model, source.area)
+            root = _without(root, faults, kept)
     return None
+
+
+def intended_ids(source: Source, verbs: Sequence[str]) -> tuple[str, ...]:
+    """The ids that the steps of the whole file would have, those that were left out with the verbs nearest to theirs.
+
+    Of a step whose verb cannot be known (none, or several), every id that it could get.
+    """
+    steps = child(source.root if source.whole is None else source.whole, "steps")
+    items = steps.items if isinstance(steps, SequenceNode) else ()
+    known: list[Node] = []
+    for item in items:
+        if isinstance(item, MappingNode):
+            words = [word for word in item.entries if word not in StepSpec.model_fields]
+        else:
+            words = [item.value] if isinstance(item, ScalarNode) and isinstance(item.value, str) else []
+        if len(words) == 1:
+            word = next(iter(nearest(words[0], verbs)), words[0])
+            entries = {"id": item.entries["id"]} if isinstance(item, MappingNode) and "id" in item.entries else {}
+            known.append(MappingNode({**entries, word: Entry(item.place, item)}, item.place))
+        elif isinstance(child(item, "id"), ScalarNode):
+            known.append(item)
+    ids = step_ids(SequenceNode(tuple(known), source.root.place))
+    more = len(items) - len(known)
+    counts = {verb: sum(verb in node.entries for node in known if isinstance(node, MappingNode)) for verb in verbs}
+    possible = (f"{verb}_{number}" for verb in verbs for number in range(1, counts[verb] + more + 1) if more)
+    return tuple(dict.fromkeys((*ids, *possible)))
 
 
 def _without(root: MappingNode, faults: list[Path], kept: dict[str, tuple[int, ...]]) -> MappingNode:
     """The tree without what the faults are in; `kept` follows which items of the file remain."""
+    heads = {str(fault[0]) for fault in faults if len(fault) == 1}
+    if heads & {*NAMED}:  # which names there are is not known
+        heads |= {*LISTS, "frames"}
     items = {(fault[0], fault[1]) for fault in faults if len(fault) > 1 and fault[0] in (*LISTS, *NAMED)}
     for name in LISTS:
-        entry = root.entries.get(name)
-        if entry is not None and isinstance(entry.node, SequenceNode):
-            remaining = [k for k in range(len(entry.node.items)) if (name, k) not in items]
-            before = kept.get(name, tuple(range(len(entry.node.items))))
+        block = root.get(name)
+        if isinstance(block, SequenceNode):
+            remaining = [k for k in range(len(block.items)) if (name, k) not in items and name not in heads]
+            before = kept.get(name, tuple(range(len(block.items))))
             kept[name] = tuple(before[k] for k in remaining)
-            nodes = tuple(entry.node.items[k] for k in remaining)
-            root = root.with_entry(name, Entry(entry.key_place, SequenceNode(nodes, entry.node.place)))
+            root = _with(root, name, SequenceNode(tuple(block.items[k] for k in remaining), block.place))
+    steps = root.get("steps")
+    if not isinstance(steps, SequenceNode) or not steps.items:
+        root = _with(root, "steps", _nothing_to_do(root if steps is None else steps))
+        kept["steps"] = (0,)
     for name in NAMED:
-        entry = root.entries.get(name)
-        if entry is not None and isinstance(entry.node, MappingNode):
-            block = entry.node
+        block = root.get(name)
+        if isinstance(block, MappingNode):
             for key, old in block.entries.items():
                 if (name, key) in items:
-                    block = block.with_entry(key, Entry(old.key_place, _stand_in(name, old.node.place)))
-            root = root.with_entry(name, Entry(entry.key_place, block))
-    whole = {str(fault[0]) for fault in faults if fault and fault[0] not in (*LISTS, *NAMED, *KEPT)}
-    return root.without(*whole)
+                    block = _with(block, key, _stand_in(name, old.node))
+            root = _with(root, name, block)
+    for fault in faults:
+        head = "record" if not fault else str(fault[0])  # of the whole task only the rates are looked at
+        block = root.get(head)
+        if head in KEPT:
+            root = _with(root, head, ScalarNode("left out", root.place))
+        elif head == "simulation" and isinstance(block, MappingNode) and fault[1:2] in ((), *((w,) for w in CLOCK)):
+            root = _with(root, head, block.without(*CLOCK))
+        elif not fault or head not in (*LISTS, *NAMED):
+            root = without(root, (head, *fault[1:2]))
+    return root.without(*(heads & {"frames", "scene", "expect", "watch"}))
 
 
-def _stand_in(block: str, place: Place) -> Node:
-    """A frame at the origin, or a body of no account."""
-    if block == "frames":
-        return MappingNode({}, place)
-    radius = MappingNode({"radius": Entry(place, ScalarNode(1.0, place))}, place)
-    pose = MappingNode({}, place)
-    return MappingNode({"sphere": Entry(place, radius), "pose": Entry(place, pose)}, place)
+def _with(block: MappingNode, key: str, node: Node) -> MappingNode:
+    old = block.entries.get(key)
+    return block.with_entry(key, Entry(node.place if old is None else old.key_place, node))
+
+
+def _nothing_to_do(at: Node) -> Node:
+    """The least that a task may do."""
+    wait = MappingNode({"wait": Entry(at.place, ScalarNode(0.0, at.place))}, at.place)
+    return SequenceNode((wait,), at.place)
+
+
+def _stand_in(block: str, faulty: Node) -> Node:
+    """A frame, or a body of no account, that refers to what the faulty one does."""
+    place = faulty.place
+    entries: dict[str, Entry] = {}
+    for word in REFERENCES[2:] if block == "frames" else REFERENCES[:2]:
+        named = child(faulty, word)
+        if isinstance(named, ScalarNode) and isinstance(named.value, str):
+            entries[word] = Entry(place, named)
+    if block == "scene":
+        radius = MappingNode({"radius": Entry(place, ScalarNode(1.0, place))}, place)
+        entries["sphere"] = Entry(place, radius)
+    return MappingNode(entries, place)

@@ -245,6 +245,13 @@ class StepSpec(KeyedSpec):
         """Which step this is."""
         return self.word
 
+    @field_validator("id", mode="after")
+    @classmethod
+    def _id(cls, own: str | None) -> str | None:
+        if own is not None and not ID.fullmatch(own):
+            raise problem("conflict", f"'{own}' cannot be an id", hint=ID_HINT)
+        return own
+
 
 class TaskSpec(Model):
     """The task. The loader replaces `steps` and `expect` by the unions that the registry offers."""
@@ -341,9 +348,6 @@ class TaskSpec(Model):
     def _named(cls, steps: tuple[StepSpec, ...]) -> tuple[StepSpec, ...]:
         """Every step gets an id: its own, or its verb and the next free number."""
         given = {step.id for step in steps}
-        for index, step in enumerate(steps):
-            if step.id is not None and not ID.fullmatch(step.id):
-                raise problem("conflict", f"'{step.id}' cannot be an id", at=(index, "id"), hint=ID_HINT)
         counts: dict[str, int] = {}
         named: list[StepSpec] = []
         for step in steps:

@@ -97,6 +97,17 @@ def key_place_at(root: Node, path: Path) -> Place:
     return node_at(root, path).place
 
 
+def without(root: MappingNode, path: Path) -> MappingNode:
+    """A copy without what `path` leads to; where it leads nowhere, without the block that it last leads into."""
+    key = path[0]
+    below = child(root, key)
+    if below is None or not isinstance(key, str):
+        return root
+    if len(path) > 1 and isinstance(below, MappingNode) and child(below, path[1]) is not None:
+        return root.with_entry(key, Entry(root.entries[key].key_place, without(below, path[1:])))
+    return root.without(key)
+
+
 def dotted(path: Path) -> str:
     """`scene.cup.mass`, `steps[3].move.to`."""
     text = ""

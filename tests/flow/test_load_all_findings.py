@@ -91,6 +91,83 @@ def test_an_item_keeps_its_number_when_the_one_before_it_is_faulty(tmp_path: Pat
     assert [text.split(":")[0] for _, _, text in found] == ["steps[0]", "steps[1].move.to"]
 
 
+def test_the_only_step_being_wrong_hides_no_other_file(tmp_path: Path) -> None:
+    (tmp_path / "controllers.yaml").write_text("controllers:\n  arm: {type: joint_trajectry}\n")
+    file = tmp_path / "bad.yaml"
+    head = HEAD.replace(f"{ROOT}/controllers/arm7_hand3.yaml", "controllers.yaml")
+    for steps in ("[{mov: {to: home}}]", "[]", "{}", "3"):
+        file.write_text(f"{head}start: hme\nsteps: {steps}\n")
+        with pytest.raises(InvalidInput) as refused:
+            load_task(file)
+        places = [(Path(f.place.file).name, f.place.line) for f in refused.value.findings if f.place is not None]
+        assert places == [("bad.yaml", 4), ("bad.yaml", 5), ("controllers.yaml", 2)]
+
+
+def test_what_a_task_cannot_do_without_hides_nothing(tmp_path: Path) -> None:
+    (tmp_path / "controllers.yaml").write_text("controllers:\n  arm: {type: joint_trajectry}\n")
+    file = tmp_path / "bad.yaml"
+    file.write_text("task: a/b\ncontrollers: controllers.yaml\nscene: []\nexpect: {a: 1}\n")
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file)
+    told = [(Path(f.place.file).name, f.place.line, f.message) for f in refused.value.findings if f.place is not None]
+    assert [one[:2] for one in told] == [*(("bad.yaml", line) for line in (1, 1, 1, 3, 4)), ("controllers.yaml", 2)]
+    assert {one[2] for one in told[:2]} == {"the key 'robot' is missing", "the key 'steps' is missing"}
+
+
+def test_names_in_a_faulty_scene_are_told_with_its_other_mistakes(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+scene:
+  desk: {box: {size: [1, 1, 1]}, pose: {xyz: [2, 0, 0]}, fixed: yes}
+  cup: {cup: {radius: 36 mm, height: 110 mm}, mass: 150 g, rests_on: desc, at: [2, 0]}
+  ball: {sphere: {radius: 14 mm}, mas: 10 g, inside: cpu}
+  world: {sphere: {radius: 14 mm}, mass: 10 g, pose: {}}
+frames:
+  desk: {parent: desk}
+  f: {parent: deks, pos: {}}
+steps:
+  - wait: 1 s
+""",
+    )
+    assert [place[:2] for place in found] == [(5, 65), (6, 70), (7, 35), (7, 54), (8, 10), (10, 9), (11, 15), (11, 21)]
+
+
+def test_a_step_that_is_not_there_is_told_though_others_are_faulty(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+steps:
+  - moove: {to: home}
+  - {}
+  - {wait: 1 s, id: pause}
+expect:
+  - step_done: {step: move_1}
+  - step_done: {step: wait_1}
+  - step_done: {step: pause}
+  - step_done: {step: pase}
+  - duration: {below: 1 s}
+    during: move_3
+""",
+    )
+    assert [place[:2] for place in found] == [(5, 5), (6, 5), (12, 23), (14, 13)]
+    assert "pause" in found[2][2]
+
+
+def test_engine_and_recorded_rates_are_told_with_the_rest(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+simulation: {engine: pybulet, step: 1 mm, control_period: 1.5 ms}
+steps:
+  - wait: 1 s
+""",
+    )
+    assert [place[:2] for place in found] == [(4, 22), (4, 37)]
+    found = findings(tmp_path, "record: {rates: {tf: 300 Hz}}\nsteps:\n  - wait: 1 m\n  - {id: 1a, wait: 1 s}\n")
+    assert [place[:2] for place in found] == [(4, 22), (6, 11), (7, 10)]
+
+
 def test_a_faulty_point_of_a_trajectory_is_told_at_its_line(tmp_path: Path) -> None:
     points = (
         ("[a, b]", "{positions: [0, 0, 0], time_from_start: 1}", "points[1].positions: 3 positions for 2 joints"),
