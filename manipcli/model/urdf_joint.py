@@ -14,7 +14,7 @@ from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import shorten
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, SoftLimits, TransmissionTag
-from manipcli.model.urdf_numbers import Reader
+from manipcli.model.urdf_numbers import FARTHEST, LARGEST, Reader
 
 _TYPES: dict[str, JointType] = {
     "revolute": "revolute",
@@ -51,8 +51,9 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
     dynamics = element.first("dynamics")
     damping = friction = 0.0
     if dynamics is not None:
-        damping = _not_negative(reader, dynamics, "damping", name) or 0.0
-        friction = _not_negative(reader, dynamics, "friction", name) or 0.0
+        damping, friction = (
+            _not_negative(reader, dynamics, key, name, most=LARGEST) or 0.0 for key in ("damping", "friction")
+        )
     if ends[0] is None or ends[1] is None:
         return None
     moves = kind != "fixed"
@@ -100,8 +101,10 @@ def _axis(reader: Reader, element: Element, name: str) -> Array:
     return frozen(unit if abs(length - 1.0) < 1e-15 else unit / length)
 
 
-def _not_negative(reader: Reader, element: Element, attribute: str, joint: str) -> float | None:
-    value = reader.number(element, attribute)
+def _not_negative(
+    reader: Reader, element: Element, attribute: str, joint: str, *, most: float = math.inf
+) -> float | None:
+    value = reader.number(element, attribute, most=most)
     if value is not None and value < 0.0:
         message = f"joint '{joint}': {attribute} is {value:g}; expected 0 or more"
         reader.report("URDF010", message, element.place)
@@ -170,8 +173,8 @@ def _mimic(reader: Reader, element: Element) -> Mimic | None:
     if mimic is None:
         return None
     joint = reader.name(mimic, "joint")
-    multiplier = reader.number(mimic, "multiplier", 1.0)
-    offset = reader.number(mimic, "offset", 0.0)
+    multiplier = reader.number(mimic, "multiplier", 1.0, most=FARTHEST)
+    offset = reader.number(mimic, "offset", 0.0, most=FARTHEST)
     if joint is None or multiplier is None or offset is None:
         return None
     return Mimic(joint=joint, multiplier=multiplier, offset=offset)

@@ -11,7 +11,7 @@ from manipcli.model.located_xml import Element
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Shape, Sphere
 from manipcli.model.urdf_mesh import read_mesh_element
-from manipcli.model.urdf_numbers import Reader
+from manipcli.model.urdf_numbers import FARTHEST, LARGEST, Reader
 from manipcli.model.urdf_schema import is_foreign
 
 Rgba = tuple[float, float, float, float]
@@ -57,7 +57,7 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
         reader.report("URDF011", f"link '{name}': <inertial> has no <mass>", element.place)
         return None
     X_LI = reader.origin(element)
-    mass = reader.required(mass_element, "value")
+    mass = reader.required(mass_element, "value", most=LARGEST)
     if mass is None:
         return None
     if mass < 0.0:
@@ -70,7 +70,7 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
     if moments is None:
         reader.report("URDF011", f"link '{name}': <inertial> has no <inertia>", element.place)
         return None
-    xx, yy, zz = (reader.required(moments, key) for key in ("ixx", "iyy", "izz"))
+    xx, yy, zz = (reader.required(moments, key, most=LARGEST) for key in ("ixx", "iyy", "izz"))
     xy, xz, yz = (_product(reader, moments, key) for key in ("ixy", "ixz", "iyz"))
     if xx is None or yy is None or zz is None:
         return None
@@ -171,7 +171,7 @@ def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tupl
     if attribute not in element.attributes:
         reader.missing(element, attribute)
         return None
-    values = reader.numbers(element, attribute, count)
+    values = reader.numbers(element, attribute, count, most=FARTHEST)
     if values is not None and min(values) <= 0.0:
         message = f'<{element.tag} {attribute}="{element.attributes[attribute]}">: expected positive lengths [m]'
         reader.report("URDF012", message, element.place)

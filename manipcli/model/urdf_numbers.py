@@ -15,6 +15,11 @@ MOST_HINTS: Final = 50
 MOST_NAMES: Final = 2000
 """The nearest name is looked for this often and among this many: a file of errors may not cost minutes."""
 
+FARTHEST: Final = 1e6
+"""[m, rad] of what a description places or measures; beyond it engines, which count in single precision, break."""
+LARGEST: Final = 1e9
+"""Of masses, moments, damping and friction, in SI."""
+
 
 def finite(word: str) -> float | None:
     """The finite number that a word is: digits as C reads them, no `1_000`, no other script's digits; else None."""
@@ -62,8 +67,10 @@ class Reader:
             return None
         return value
 
-    def numbers(self, element: Element, attribute: str, count: int) -> tuple[float, ...] | None:
-        """`count` finite numbers, or None where the attribute is missing or (with a finding) wrong."""
+    def numbers(
+        self, element: Element, attribute: str, count: int, *, most: float = math.inf
+    ) -> tuple[float, ...] | None:
+        """`count` finite numbers of size `most` or less, or None: the attribute is missing or (with a finding) wrong."""
         text = element.attributes.get(attribute)
         if text is None:
             return None
@@ -78,19 +85,24 @@ class Reader:
         if len(words) != count:
             self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
             return None
+        if any(abs(float(word)) > most for word in words):
+            self.report("URDF004", f"{written}: beyond all that is real; expected {most:g} or less", element.place)
+            return None
         return tuple(float(word) + 0.0 for word in words)  # no -0.0: it would not be written again
 
-    def number(self, element: Element, attribute: str, default: float | None = None) -> float | None:
+    def number(
+        self, element: Element, attribute: str, default: float | None = None, *, most: float = math.inf
+    ) -> float | None:
         """One number; `default` where it is missing or (with a finding) wrong."""
-        values = self.numbers(element, attribute, 1)
+        values = self.numbers(element, attribute, 1, most=most)
         return default if values is None else values[0]
 
-    def required(self, element: Element, attribute: str) -> float | None:
+    def required(self, element: Element, attribute: str, *, most: float = math.inf) -> float | None:
         """One number that must be there; None with a finding otherwise."""
         if attribute not in element.attributes:
             self.missing(element, attribute)
             return None
-        return self.number(element, attribute)
+        return self.number(element, attribute, most=most)
 
     def missing(self, element: Element, attribute: str) -> None:
         self.report("URDF059", f"<{element.tag}> has no attribute '{attribute}'", element.place)
@@ -111,9 +123,9 @@ class Reader:
         element = parent.first("origin")
         if element is None:
             return Transform.identity()
-        xyz = self.numbers(element, "xyz", 3) or (0.0, 0.0, 0.0)
+        xyz = self.numbers(element, "xyz", 3, most=FARTHEST) or (0.0, 0.0, 0.0)
         quat = self.numbers(element, "quat_xyzw", 4)
         if quat is not None and math.hypot(*quat) > 1e-6:
             return Transform.of(xyz=xyz, quat_xyzw=quat).by_angles
-        rpy = self.numbers(element, "rpy", 3)
+        rpy = self.numbers(element, "rpy", 3, most=FARTHEST)
         return Transform.of(xyz=xyz, rpy=rpy) if rpy is not None and any(rpy) else Transform.of(xyz=xyz)

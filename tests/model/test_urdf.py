@@ -254,6 +254,21 @@ def test_a_chain_of_mimics_follows_the_first_joint(tmp_path: Path) -> None:
     assert parts.joints[1].mimic == Mimic("3", -3.0, 1.0)
 
 
+@pytest.mark.parametrize(
+    ("text", "most"),
+    [
+        ('<origin xyz="0 0 {}"/>', 1e6),
+        ('<origin rpy="0 -{} 0"/>', 1e6),
+        ('<dynamics damping="{}"/>', 1e9),
+        ('<dynamics friction="{}"/>', 1e9),
+    ],
+)
+def test_what_is_beyond_all_that_is_real_is_an_error(tmp_path: Path, text: str, most: float) -> None:
+    for value, told in ((most, []), (most * 1.001, ["URDF004"]), (1e300, ["URDF004"])):
+        described = joint(ENDS + LIMIT + text.format(value))
+        assert [finding.code for finding in errors(tmp_path, described)] == told
+
+
 def test_a_mimic_with_a_multiplier_of_0_follows_nothing(tmp_path: Path) -> None:
     second = JOINT.replace('"j"', '"k"').replace('"b"', '"c"').replace('"a"', '"b"')
     follower = second.replace("</joint>", '<mimic joint="j" multiplier="{}" offset="0.4"/></joint>')

@@ -7,10 +7,10 @@ CHECK = Check(
     name="bad-number",
     tier="schema",
     severity="error",
-    summary="A value is not a finite number",
+    summary="A value is not a finite number, or larger than anything real",
     reason=(
-        "PyBullet reads text, a decimal comma and a missing value as 0 without a word, and nan or inf make every "
-        "state nan from the first step."
+        "PyBullet reads text, a decimal comma and a missing value as 0 without a word, and nan, inf or what is too "
+        "large for single precision makes every state nan from the first step."
     ),
     bad=(
         '<robot name="r">'
