@@ -15,17 +15,16 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.changed_files import Files, out_of_range
 from manipcli.flow.gathered import Gathered
+from manipcli.flow.robot_file import gather_robot
 from manipcli.flow.switches import foreseen
 from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import Drawn
-from manipcli.judge.expectation import expectation_problems
-from manipcli.model.build_robot import build_robot
+from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.build_scene import build_scene
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
-from manipcli.model.formula import problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, RobotModel
@@ -132,22 +131,12 @@ def load_task(
         gathered.findings += (*read.findings, *misnamed(read.spec, lambda loc: read.place(*loc)))
     robot_path = gathered(lambda: _named_file(read, path, "robot"))
     controllers_path = gathered(lambda: _named_file(read, path, "controllers"))
-    robot_file = robot_path and gathered(lambda: load.load_robot(robot_path, overrides=overrides))
+    robot_read = robot_path and gather_robot(
+        robot_path, gathered, overrides=overrides, package_path=package_path, allow_outside=allow_outside
+    )
+    robot_file, built = (robot_read.file, robot_read.robot) if robot_read else (None, None)
     controllers_file = controllers_path and gathered(
         lambda: load.load_controllers(controllers_path, overrides=overrides)
-    )
-    built = (
-        robot_path
-        and robot_file
-        and gathered(
-            lambda: build_robot(
-                robot_file.spec,
-                file=robot_path,
-                package_path=package_path,
-                allow_outside=allow_outside,
-                source=robot_file.source,
-            )
-        )
     )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = None
@@ -256,7 +245,7 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
                 misfits, claims = foreseen(switch, claims, robot)
                 refused += [(at, p) for p in misfits]
         if step.until is not None:
-            found += [(("steps", k, "until"), p) for p in problems(step.until, setting, CONDITIONS)]
+            found += [(("steps", k, "until"), p) for p in until_problems(step.until, step.id, setting, CONDITIONS)]
     for key, expectations in (("expect", spec.expect), ("watch", spec.watch)):
         for k, expected in enumerate(expectations):
             found += [((key, k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
@@ -270,7 +259,7 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
         if tried is not step:
             loc: Loc = ("steps", k, "on_fail", "with")
             wrong = STEPS[tried.verb].check(tried.body, robot, scene)
-            wrong += () if tried.until is None else problems(tried.until, setting, CONDITIONS)
+            wrong += () if tried.until is None else until_problems(tried.until, step.id, setting, CONDITIONS)
             found += [(loc, replace(p, loc=())) for p in wrong]
     findings = [
         *again,

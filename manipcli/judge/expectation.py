@@ -22,7 +22,7 @@ from manipcli.model.conditions.step_done import StepDoneSpec
 from manipcli.model.formula import absent, opened, problems, scopes
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, never
-from manipcli.spec.condition import END, ExpectationSpec, WatchSpec
+from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
@@ -177,7 +177,7 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
             known = (*setting.steps, END) if loc == ("at",) else setting.steps
             found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
     if not found:
-        found += _too_early(spec, named)
+        found += _too_early(spec, named, setting.steps)
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:
         wanted = scopes(spec.condition, seam)
         if len(wanted) > 1:
@@ -186,17 +186,42 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
     return tuple(found)
 
 
-def _too_early(spec: ExpectationSpec, named: Sequence[tuple[tuple[str | int, ...], str]]) -> Iterator[Problem]:
-    """A step that is to be done while it goes on."""
-    condition = spec.condition
-    needed = () if spec.quantifier == "never" else condition.members if condition.name == "all" else (condition,)
-    if spec.quantifier == "eventually" and len(named) > 1:
+def until_problems(spec: ConditionSpec, step: str | None, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
+    """Everything in the `until` of a step that robot, scene and steps do not know, or that cannot come true in it."""
+    found = problems(spec, setting, seam)
+    if found or step is None or setting.steps is None:
+        return found
+    return tuple(
+        Problem(
+            (spec.name,),
+            f"step '{late}' is not done before its end, and step '{step}' waits for it",
+            "name an earlier step",
+        )
+        for late in _undone(spec, step, setting.steps)
+    )
+
+
+def _too_early(
+    spec: ExpectationSpec, named: Sequence[tuple[tuple[str | int, ...], str]], steps: Sequence[str] | None
+) -> Iterator[Problem]:
+    """A step that is to be done while it, or one before it, goes on."""
+    if spec.quantifier == "never" or (spec.quantifier == "eventually" and len(named) > 1):
         return  # in a later one of them
-    waited = {one.body.step for one in needed if not one.combines and isinstance(one.body, StepDoneSpec)}
-    for loc, name in named:
-        if name in waited:
-            message = f"step '{name}' is not done before its end, and this is asked before"
+    told: set[str] = set()
+    for loc, name in reversed(named):
+        for late in _undone(spec.condition, name, steps or (name,)):
+            if late in told:
+                continue
+            told.add(late)
+            message = f"step '{late}' is not done before its end, and this is asked before"
             yield Problem(loc, message, "say `at: end`, or name a later step")
+
+
+def _undone(condition: ConditionSpec, step: str, steps: Sequence[str]) -> tuple[str, ...]:
+    """The steps without which it does not hold and which are not done before the end of `step`."""
+    needed = condition.members if condition.name == "all" else (condition,)
+    waited = {one.body.step for one in needed if not one.combines and isinstance(one.body, StepDoneSpec)}
+    return tuple(one for one in steps[steps.index(step) :] if one in waited)
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:

@@ -11,7 +11,7 @@ import pytest
 
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.vocabulary import task_spec
-from manipcli.judge.expectation import expectation_problems
+from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.model.build_scene import build_scene
@@ -428,10 +428,23 @@ def test_a_step_is_not_done_before_its_end() -> None:
         (spec,) = expectations({"step_done": {"step": "wait_1"}, **scope})
         (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
         assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
+    (spec,) = expectations({"step_done": {"step": "wait_1"}, "at": "go"})
+    (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
+    assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
     (either,) = expectations({"eventually": {"step_done": {"step": "go"}}, "during": ["go", "wait_1"]})
     assert expectation_problems(either, SETTING, CONDITIONS) == ()
     (later,) = expectations({"step_done": {"step": "go"}, "at": "wait_1"})
     assert expectation_problems(later, SETTING, CONDITIONS) == ()
+
+
+def test_a_step_does_not_wait_for_itself_or_a_later_one() -> None:
+    (spec,) = expectations({"all": [{"step_done": {"step": "wait_1"}}, {"duration": {"below": 60}}]})
+    for step, late in (("go", True), ("wait_1", True), (None, False)):
+        assert bool(until_problems(spec.condition, step, SETTING, CONDITIONS)) is late
+    (earlier,) = expectations({"step_done": {"step": "go"}})
+    assert until_problems(earlier.condition, "wait_1", SETTING, CONDITIONS) == ()
+    (either,) = expectations({"any": [{"step_done": {"step": "wait_1"}}, {"duration": {"below": 60}}]})
+    assert until_problems(either.condition, "wait_1", SETTING, CONDITIONS) == ()
 
 
 @pytest.mark.parametrize(

@@ -331,7 +331,9 @@ def test_a_step_is_done_from_its_end_on() -> None:
     for step, word, done in (("go", "done", 50), ("then", "failed", T), ("last", "not run", T)):
         found = read("step_done", still(), step=step)
         np.testing.assert_array_equal(found.margins, np.where(np.arange(T) >= done, 1.0, -1.0))
-        assert found.found(60).text == f"step '{step}': {word}"
+        assert found.found(T - 1).text == f"step '{step}': {word}"
+    early = read("step_done", still(), step="go").found(30)
+    assert (early.text, early.at) == ("step 'go': not done before 0.50 s", pytest.approx(still().times[30]))
 
 
 @pytest.mark.parametrize(

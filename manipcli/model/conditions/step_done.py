@@ -27,11 +27,20 @@ def gauge(spec: StepDoneSpec, world: World) -> Gauge:
         since = step.ended if done and step.ended is not None else np.inf
         margins = np.where(moments.times >= since - 0.5e-9, 1.0, -1.0)
 
+        def ahead(k: int) -> bool:
+            """Whether it ended, and after this tick."""
+            return step.ended is not None and step.ended - 0.5e-9 > moments.times[k]
+
         def say(k: int) -> str:
             ran = step.outcome or ("not run" if step.started is None else "not ended")
+            if ahead(k):
+                ran = f"not done before {step.ended:.2f} s" if done else "not ended yet"
             return f"step '{step.id}': {ran.replace('_', ' ')}"
 
-        return reading(margins, moments.times, unit="", scale=1.0, say=say, at=lambda k: step.ended)
+        def at(k: int) -> float | None:
+            return float(moments.times[k]) if ahead(k) else step.ended
+
+        return reading(margins, moments.times, unit="", scale=1.0, say=say, at=at)
 
     return look
 
