@@ -70,7 +70,7 @@ class Reader:
     def numbers(
         self, element: Element, attribute: str, count: int, *, most: float = math.inf
     ) -> tuple[float, ...] | None:
-        """`count` finite numbers of size `most` or less, or None: the attribute is missing or (with a finding) wrong."""
+        """`count` finite numbers, none larger than `most`; None where it is missing or (with a finding) wrong."""
         text = element.attributes.get(attribute)
         if text is None:
             return None

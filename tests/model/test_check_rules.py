@@ -36,6 +36,11 @@ def placed(xyz: str) -> str:
     return INERTIAL.replace("<mass", f'<origin xyz="{xyz}"/><mass') + CUBE
 
 
+def heavy(mass: float) -> str:
+    """The cube, of this mass, with the moments of one."""
+    return INERTIAL.replace('value="1"', f'value="{mass!r}"').replace('"0.02"', f'"{0.02 * mass!r}"') + CUBE
+
+
 def moved(text: str, limits: str = LIMIT) -> str:
     return one_joint(text + limits)
 
@@ -102,6 +107,8 @@ QUIET = {
     ),
     "mimic within its limits": one_joint(more=SECOND + '<mimic joint="j" multiplier="-1"/></joint>'),
     "dash and dot": one_joint().replace('"tip"', '"tip-1.a"'),
+    # 0.35^3 m3 = 0.0429 m3 of osmium weigh 969 kg.
+    "a cube of osmium": one_joint(tip=heavy(969.0)),
     "root link without mass": one_joint(),
 }
 
@@ -116,6 +123,8 @@ LOUD = {
     "inertia in g m2": (one_joint(tip=scaled_inertia(1e-3)), "URDF101"),
     "inertia in g mm2": (one_joint(tip=scaled_inertia(1e9)), "URDF101"),
     "centre in millimetres": (one_joint(tip=placed("0 0 35")), "URDF102"),
+    "denser than osmium": (one_joint(tip=heavy(1300.0)), "URDF112"),
+    "eleven tonnes, in no small space": (one_joint(tip=heavy(11000.0).replace("0.35", "0.9")), "URDF112"),
     "negative mass": (one_joint(tip=INERTIAL.replace('value="1"', 'value="-1"') + CUBE), "URDF011"),
     "no mass": (one_joint(tip=INERTIAL.replace('value="1"', 'value="0"') + CUBE), "URDF100"),
     "triangle": (one_joint(tip=INERTIAL.replace('ixx="0.02"', 'ixx="0.05"') + CUBE), "URDF011"),

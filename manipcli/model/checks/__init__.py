@@ -26,6 +26,7 @@ from manipcli.model.checks.foreign_shape import CHECK as FOREIGN_SHAPE
 from manipcli.model.checks.foreign_tags import CHECK as FOREIGN_TAGS
 from manipcli.model.checks.gazebo_tags import CHECK as GAZEBO_TAGS
 from manipcli.model.checks.hardware_interface import CHECK as HARDWARE_INTERFACE
+from manipcli.model.checks.heavy_link import CHECK as HEAVY_LINK
 from manipcli.model.checks.inertia import CHECK as INERTIA
 from manipcli.model.checks.inertia_size import CHECK as INERTIA_SIZE
 from manipcli.model.checks.inertia_without_mass import CHECK as INERTIA_WITHOUT_MASS
@@ -163,6 +164,7 @@ _PHYSICS: tuple[Check, ...] = (
     LIMITS_IN_DEGREES,
     ROOT_INERTIA,
     NO_INERTIAL,
+    HEAVY_LINK,
 )
 _ASSETS: tuple[Check, ...] = (
     MISSING_MESH,
