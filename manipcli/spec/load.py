@@ -20,6 +20,7 @@ from manipcli.spec.override import Override, apply, read_overrides, seed_overrid
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros import rewrite
 from manipcli.spec.salvage import salvage
+from manipcli.spec.salvage_robot import salvage_robot
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.yaml import MAX_BYTES, parse
@@ -172,8 +173,21 @@ def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpe
 
 def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
     """As `load_robot`, from text; places call it `name`."""
-    source, findings = _changed(_source(text, name, "ROBOT", "robot"), read_overrides(overrides), RobotSpec)
+    source, findings = _robot_source(text, name, overrides)
     return validate(source, RobotSpec, findings=findings)
+
+
+def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Finding]]:
+    return _changed(_source(text, name, "ROBOT", "robot"), read_overrides(overrides), RobotSpec)
+
+
+def salvage_robot_file(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec] | None:
+    """What remains of a robot file that `load_robot` refused, for checking it further; None where too little does."""
+    try:
+        source, _ = _robot_source(read_bytes(path), str(path), overrides)
+    except InvalidInput:
+        return None
+    return salvage_robot(source)
 
 
 def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
