@@ -16,7 +16,8 @@ from manipcli.pipeline import run_task
 from manipcli.record.reading import open_recording
 from manipcli.report.log_info import render_text
 
-HOME = Path(__file__).parents[2] / "tasks" / "home.yaml"
+ROOT = Path(__file__).parents[2]
+HOME = ROOT / "tasks" / "home.yaml"
 
 
 class Listener:
@@ -62,3 +63,18 @@ def test_a_run_in_which_nothing_is_cut_says_nothing(tmp_path: Path) -> None:
     assert run_task(HOME, log=log, progress=listener).verdict.verdict == "passed"
     assert listener.doubts == []
     assert "saturated joints" not in open_recording(log).metadata
+
+
+@pytest.mark.slow
+def test_a_joint_that_leans_on_its_stop_where_it_is_wanted_is_not_why_a_step_failed(tmp_path: Path) -> None:
+    """The open hand of a Panda presses on its stop all the time; the run says so, the step does not."""
+    task = tmp_path / "stop.yaml"
+    task.write_text(
+        f"task: stop\nrobot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"
+        "simulation: {engine: kinematic, settle: 0}\nstart: home\n"
+        "steps: [{wait: 0.05 s, until: {duration: {below: 1 ms}}, timeout: 0.1 s}]\n"
+    )
+    verdict = run_task(task, log=tmp_path / "stop.mcap").verdict
+    assert verdict.cuts.joints["panda_finger_joint1"] > 0
+    assert verdict.steps[0].outcome == "timeout"
+    assert "cut at" not in verdict.steps[0].text
