@@ -305,8 +305,8 @@ def _missing(end: MotionEnd, probe: Probe | None) -> str:
 
 
 def _cut_since(before: Cuts, session: Session) -> str:
-    """What had nothing left to give since then; nothing where everything had. A joint that leans on its stop where it is
-    wanted is left out: pressing there costs nothing."""
+    """What had nothing left to give since then; nothing where everything had. A joint that leans on its stop, and is
+    wanted there, is left out: pressing there costs nothing."""
     since = cuts_of(session).since(before)
     leaning = _leaning(session)
     cut = str(replace(since, joints={name: count for name, count in since.joints.items() if name not in leaning}))
