@@ -57,6 +57,13 @@ def control(inside: str, more: str = "") -> str:
     return one_joint(more=f'{more}<ros2_control name="c" type="system">{HARDWARE}{inside}</ros2_control>')
 
 
+def twice(inside: str, second: str = "d") -> str:
+    """The same in a second component."""
+    text = control(inside)
+    one = text[text.index("<ros2_control") : text.index("</robot>")]
+    return text.replace("</robot>", one.replace('name="c"', f'name="{second}"') + "</robot>")
+
+
 def differential(roles: str) -> str:
     joints = "".join(
         f'<joint name="{name}"><role>{role}</role><hardwareInterface>EffortJointInterface</hardwareInterface></joint>'
@@ -101,6 +108,11 @@ QUIET = {
         "<plugin>transmission_interface/SimpleTransmission</plugin>"
         '<joint name="j" role="joint1"><mechanical_reduction>50</mechanical_reduction></joint></transmission>'
     ),
+    "sensors, switches and types": control(
+        '<joint name="j"><limits enable="false"/><state_interface name="position" data_type="double"/>'
+        '<command_interface name="position"/></joint><sensor name="s"><state_interface name="force.x"/></sensor>'
+    ).replace('"system"', '"system" is_async="true"'),
+    "two components, each with an interface of its own": twice('<joint name="j"/>'),
     "mimic with states only": control(
         '<joint name="j"/><joint name="k"><state_interface name="position"/></joint>',
         SECOND + '<mimic joint="j"/></joint>',
@@ -174,6 +186,30 @@ LOUD = {
         "URDF324",
     ),
     "sensor of a wrong kind": (control("<lidar/>"), "URDF325"),
+    "a joint commanded by two": (twice('<joint name="j"><command_interface name="position"/></joint>'), "URDF325"),
+    "two of one name": (twice("", second="c"), "URDF325"),
+    "an interface twice": (
+        control('<joint name="j"><state_interface name="position"/><state_interface name="position"/></joint>'),
+        "URDF325",
+    ),
+    "an interface that is misspelt": (control('<joint name="j"><stat_interface name="position"/></joint>'), "URDF325"),
+    "a sensor that is commanded": (
+        control('<joint name="j"><command_interface name="position"/></joint>').replace('"system"', '"sensor"'),
+        "URDF325",
+    ),
+    "a sensor without a name": (control('<sensor><state_interface name="force.x"/></sensor>'), "URDF325"),
+    "a limit that is empty": (
+        control('<joint name="j"><command_interface name="position"><param name="min"/></command_interface></joint>'),
+        "URDF324",
+    ),
+    "asynchronous, maybe": (control("").replace('"system"', '"system" is_async="maybe"'), "URDF324"),
+    "limits, maybe": (control('<joint name="j"><limits enable="maybe"/></joint>'), "URDF324"),
+    "a type of data that is none": (
+        control('<joint name="j"><state_interface name="position" data_type="foo"/></joint>'),
+        "URDF324",
+    ),
+    "a multiplier of words": (control('<joint name="j"><param name="multiplier">x</param></joint>'), "URDF324"),
+    "one joint in both roles": (differential("joint1 joint2").replace('"k"><role>', '"j"><role>'), "URDF312"),
     "mimic beyond its limits": (one_joint(more=SECOND + '<mimic joint="j" offset="0.5"/></joint>'), "URDF335"),
     "slash in a name": (one_joint().replace('"tip"', '"left/tip"'), "URDF331"),
 }

@@ -1,12 +1,18 @@
-"""Numbers of ros2_control that are no numbers."""
+"""Numbers and switches of ros2_control that are none."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from manipcli.core.errors import Finding
+from manipcli.core.text import shorten
 from manipcli.model.check import Check, Subject
 from manipcli.model.control_tags import controlled_joints
+from manipcli.model.located_xml import Element
 from manipcli.model.samples import one_joint
 from manipcli.model.urdf_numbers import finite
+
+SWITCH: Final = ("true", "false", "True", "False")
+TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", "uint16", "uint32")
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
@@ -17,9 +23,19 @@ def _find(subject: Subject) -> Iterator[Finding]:
                 f"ros2_control '{component.attributes.get('name', '')}': rw_rate is '{rate}'; expected a whole number"
             )
             yield Finding("URDF324", message, component.place, None)
+        yield from _switch(component, "is_async")
     limits = {joint.name: joint.limits for joint in subject.parts.joints}
     for joint in controlled_joints(subject):
+        for each in joint.element.all("limits"):
+            yield from _switch(each, "enable")
+        yield from _legacy(joint.element)
         for interface in (*joint.commands, *joint.element.all("state_interface")):
+            kind = interface.attributes.get("data_type", "double").strip()
+            if kind not in TYPES:
+                message = f"joint '{joint.name}': an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
+                yield Finding("URDF324", message, interface.place, None, "warning")
+            for each in interface.all("limits"):
+                yield from _switch(each, "enable")
             values: dict[str, float] = {}
             size = interface.attributes.get("size", "1").strip()
             if not _whole(size):
@@ -28,10 +44,15 @@ def _find(subject: Subject) -> Iterator[Finding]:
             for parameter in interface.all("param"):
                 key = parameter.attributes.get("name", "")
                 value = finite(parameter.text.strip())
-                if key not in ("min", "max", "initial_value") or not parameter.text.strip():
+                if key not in ("min", "max", "initial_value"):
+                    continue
+                if not parameter.text.strip():
+                    if key != "initial_value":  # an empty one is common, and counts as none
+                        message = f"joint '{joint.name}': <param name=\"{key}\"> is empty; expected a number"
+                        yield Finding("URDF324", message, parameter.place, "state it, or take it out")
                     continue
                 if value is None:
-                    message = f"joint '{joint.name}': '{parameter.text.strip()[:40]}' is no finite number for {key}"
+                    message = f"joint '{joint.name}': '{shorten(parameter.text.strip())}' is no finite number for {key}"
                     yield Finding("URDF324", message, parameter.place, None)
                 else:
                     values[key] = value
@@ -54,6 +75,23 @@ def _find(subject: Subject) -> Iterator[Finding]:
                 yield Finding("URDF324", message, interface.place, hint, "warning")
 
 
+def _switch(element: Element, attribute: str) -> Iterator[Finding]:
+    said = element.attributes.get(attribute, "true").strip()
+    if said not in SWITCH:
+        message = f"<{element.tag}>: {attribute} is '{shorten(said)}'; expected true or false"
+        yield Finding("URDF324", message, element.place, None)
+
+
+def _legacy(joint: Element) -> Iterator[Finding]:
+    """<param name="multiplier"> and "offset" of a joint that follows another by <param name="mimic">."""
+    for parameter in joint.all("param"):
+        key, said = parameter.attributes.get("name", "").strip(), parameter.text.strip()
+        if key in ("multiplier", "offset") and finite(said) is None:
+            name = joint.attributes.get("name", "").strip()
+            message = f"joint '{name}': '{shorten(said)}' is no finite number for {key}"
+            yield Finding("URDF324", message, parameter.place, None)
+
+
 def _whole(text: str) -> bool:
     """Of digits alone and above 0, whatever the locale."""
     return text.isascii() and text.isdigit() and int(text) > 0
@@ -64,7 +102,7 @@ CHECK = Check(
     name="control-number",
     tier="readiness",
     severity="error",
-    summary="A number in <ros2_control> cannot be read, or contradicts the limits",
+    summary="A number or switch in <ros2_control> cannot be read, or contradicts the limits",
     reason=(
         "ros2_control takes its default instead, without a word; an initial position outside of the limits "
         "starts the robot where it cannot be."

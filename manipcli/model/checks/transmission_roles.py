@@ -23,6 +23,10 @@ def _find(subject: Subject) -> Iterator[Finding]:
             elif not pairs and not found.ros1 and "" in roles:
                 message = f"transmission '{found.name}': a {tag} has no role"
                 yield Finding("URDF312", message, elements[roles.index("")].place, how.format(tag))
+            names = [element.attributes.get("name", "").strip() for element in elements]
+            if pairs and len(names) == 2 and names[0] and names[0] == names[1]:
+                message = f"transmission '{found.name}': {tag} '{names[0]}' has both roles; expected two {tag}s"
+                yield Finding("URDF312", message, elements[1].place, None)
 
 
 CHECK = Check(
