@@ -86,3 +86,15 @@ def shorten(text: str, *, width: int = 60) -> str:
 def digits(value: float) -> str:
     """Three digits, and no exponent from 1e-4 to 1e5: `6000`, `0.084`, `164`."""
     return f"{float(f'{value:.3g}'):.5g}"
+
+
+def apart(one: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
+    """Both as text, with as many digits more than `form` has as it takes that numbers that differ look different."""
+    least, kind = int(form[1:-1]), form[-1]
+    for many in range(least, least + 16):
+        first, second = f"{one:.{many}{kind}}", f"{other:.{many}{kind}}"
+        if first != second:
+            break
+    else:
+        first, second = f"{one:{form}}", f"{other:{form}}"
+    return first, second

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.text import any_of, did_you_mean, digits, escape, listed, nearest, number_of, shorten
+from manipcli.core.text import any_of, apart, did_you_mean, digits, escape, listed, nearest, number_of, shorten
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
 
@@ -65,3 +65,18 @@ def test_a_number_of_things_is_told_as_one_says_it(number: int, noun: str, told:
 )
 def test_three_digits_stand_without_an_exponent_while_people_would_write_none(value: float, told: str) -> None:
     assert digits(value) == told
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "form", "told"),
+    [
+        (2.09441, 2.0943951, ".4f", ("2.09441", "2.09440")),
+        (1.0, 2.0, ".4f", ("1.0000", "2.0000")),
+        (100.0001, 100.0, ".3g", ("100.0001", "100")),
+        (1.0 + 2.0**-52, 1.0, ".4g", ("1.0000000000000002", "1")),
+        (5.0, 5.0, ".3g", ("5", "5")),
+        (float("inf"), 1.0, ".4g", ("inf", "1")),
+    ],
+)
+def test_numbers_that_differ_look_different(one: float, other: float, form: str, told: tuple[str, str]) -> None:
+    assert apart(one, other, form=form) == told
