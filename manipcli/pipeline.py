@@ -18,7 +18,7 @@ from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries
-from manipcli.flow.log import default_log, judge_log, known_of, open_log, verdict_metadata
+from manipcli.flow.log import default_log, judge_log, known_of, open_log, run_metadata, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.flow.recorded_task import recorded_task
 from manipcli.flow.sample import load_task
@@ -180,7 +180,7 @@ def _recorded(
             status, cause = "failed", str(failure)
         except KeyboardInterrupt:
             status, cause = "interrupted", "interrupted by the user"
-        recorder.metadata("run", {"status": status, "cause": cause})
+        recorder.metadata("run", run_metadata(task, status=status, cause=cause))
         simulated = time.perf_counter()
         verdict = judge_log(recorder.partial_path, being_written=True, doing=_told(progress))
         recorder.finish(verdict_metadata(verdict))

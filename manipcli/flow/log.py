@@ -72,6 +72,14 @@ def open_log(
         if path.exists() and read.exists() and path.samefile(read):
             raise RecordingRefused(path, "the task is made from this file", hint="choose another name")
     embedded = embeddable(meshes) if embed_meshes else ()
+    attachments = [
+        (TASK, YAML, resolved(_portable_task(task.spec), expressions(task.file)).encode()),
+        (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
+        (CONTROLLERS, YAML, resolved(task.controllers).encode()),
+        (URDF, XML, task.robot.urdf.encode()),
+        (SCENE, JSON, scene_to_json(task.true.scene)),
+        (PLAN, JSON, plan.to_json()),
+    ]
     return Recorder(
         path,
         robot=task.robot,
@@ -79,30 +87,34 @@ def open_log(
         controllers=[recorded(controller) for controller in manager.controllers],
         period=task.spec.simulation.control_period,
         attachments=[
-            (TASK, YAML, resolved(_portable_task(task.spec), expressions(task.file)).encode()),
-            (ROBOT, YAML, resolved(_portable_robot(task.robot_file.spec)).encode()),
-            (CONTROLLERS, YAML, resolved(task.controllers).encode()),
-            (URDF, XML, task.robot.urdf.encode()),
-            (SCENE, JSON, scene_to_json(task.true.scene)),
-            (PLAN, JSON, plan.to_json()),
+            *attachments,
             *((one.attachment, BYTES, one.path.read_bytes()) for one in embedded),
         ],
         metadata={
-            "run": {
-                "task": task.name,
-                "seed": str(task.spec.simulation.seed),
-                "engine": engine.name,
-                "physics": engine.physics,
-                "period": repr(task.spec.simulation.control_period),
-            },
+            "run": run_metadata(task),
             **({SAMPLE: task.drawn.to_metadata()} if task.drawn is not None else {}),
             "versions": {"manipcli": __version__, engine.name: engine.version()},
+            "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
             "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
             **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),
         },
         selection=Selection(task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out),
         overwrite=overwrite,
     )
+
+
+def run_metadata(task: Task, **end: str) -> dict[str, str]:
+    """What a log says of its run: at once, and again with its `end`, for who keeps of two records the last."""
+    simulation = task.spec.simulation
+    engine = ENGINES[simulation.engine]
+    return {
+        "task": task.name,
+        "seed": str(simulation.seed),
+        "engine": engine.name,
+        "physics": engine.physics,
+        "period": repr(simulation.control_period),
+        **end,
+    }
 
 
 def recorded(controller: Controller) -> Recorded:

@@ -128,3 +128,20 @@ def copy(log: Path, to: Path, *, without: str) -> Path:
             writer.add_message(ids[channel.id], message.log_time, message.data, message.publish_time, message.sequence)
         writer.finish()
     return to
+
+
+def test_the_last_record_of_a_name_says_all_that_the_log_says_under_it(log: Path) -> None:
+    with log.open("rb") as file:
+        by_name = {one.name: dict(one.metadata) for one in make_reader(file).iter_metadata()}
+    assert by_name == {name: dict(values) for name, values in read_recording(log).metadata.items()}
+    assert by_name["run"] == {
+        "task": "still", "seed": "0", "engine": "kinematic", "physics": "none", "period": "0.001",
+        "status": "complete", "cause": "",
+    }  # fmt: skip
+
+
+def test_a_log_says_the_hashes_of_the_files_that_it_carries(log: Path) -> None:
+    with log.open("rb") as file:
+        carried = {one.name: hashlib.sha256(one.data).hexdigest() for one in make_reader(file).iter_attachments()}
+    assert read_recording(log).metadata["files"] == carried
+    assert {*carried} == {TASK, ROBOT, CONTROLLERS, URDF, SCENE, PLAN}
