@@ -25,6 +25,7 @@ BoundName = Literal[
     "operations",
     "value_size",
     "yaml_bytes",
+    "characters",
     "seconds",
 ]
 
@@ -44,6 +45,7 @@ class Bounds:
         operations: of all expressions of a description.
         value_size: characters and items of what one expression gives.
         yaml_bytes: of a file that `load_yaml` reads.
+        characters: of all text and attributes that an expansion makes; an element or item of data counts, too.
         seconds: of processor time for one expansion.
     """
 
@@ -57,6 +59,7 @@ class Bounds:
     operations: int = 1_000_000
     value_size: int = 65_536
     yaml_bytes: int = 1_000_000
+    characters: int = 20_000_000
     seconds: int = 20
 
 

@@ -7,20 +7,22 @@ methods of text and mappings, no name that begins with two underscores, and ever
 from __future__ import annotations
 
 import ast
-import math
 import operator
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from typing import Final
+from typing import Final, cast
 
 from manipcli.core.text import did_you_mean
-from manipcli.model.bounds import BoundName, bounds, raised
+from manipcli.model.bounds import bounds
+from manipcli.model.expression_values import Beyond, Clock, Held, Refused, Value, bounded, size_of, too_large
 
 MAX_EXPRESSION: Final = 10_000
-MAX_INTEGER: Final = 2**1024
 MAX_EXPONENT: Final = 64
+MAX_SHIFT: Final = 1024
 
-Value = object
+_DIRECTIVE: Final = re.compile(r"%(?:%|(?:\(\w+\))?[-+ #0]*\d{0,3}(?:\.\d{0,3})?[diouxXeEfFgGcrs])")
+
 _BINARY: Final[dict[type[ast.operator], Callable[..., Value]]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -29,6 +31,13 @@ _BINARY: Final[dict[type[ast.operator], Callable[..., Value]]] = {
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
     ast.Pow: operator.pow,
+}
+_OF_INTEGERS: Final[dict[type[ast.operator], Callable[..., Value]]] = {
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
+    ast.BitXor: operator.xor,
+    ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
 }
 _UNARY: Final[dict[type[ast.unaryop], Callable[..., Value]]] = {
     ast.UAdd: operator.pos,
@@ -49,103 +58,23 @@ _COMPARE: Final[dict[type[ast.cmpop], Callable[..., Value]]] = {
 }
 _METHODS: Final[dict[type, frozenset[str]]] = {
     str: frozenset(
-        {"split", "strip", "lstrip", "rstrip", "lower", "upper", "startswith", "endswith", "join", "replace"}
+        {"split", "rsplit", "strip", "lstrip", "rstrip", "lower", "upper", "title", "capitalize", "startswith"}
+        | {"endswith", "join", "replace", "find", "rfind", "index", "count", "isdigit", "isalpha"}
     ),
     dict: frozenset({"get", "keys", "values", "items"}),
     list: frozenset({"index", "count"}),
 }
 
 
-class Refused(Exception):
-    """An expression asks for something that descriptions may not do; `hint` says what to do instead."""
-
-    def __init__(self, message: str, *, hint: str | None = None) -> None:
-        self.hint = hint
-        super().__init__(message)
-
-
-class Beyond(Refused):
-    """A bound is met; `hint` says which and how it is raised."""
-
-    def __init__(self, message: str, bound: BoundName) -> None:
-        super().__init__(message, hint=raised(bound))
-
-
-def size_of(value: Value) -> int:
-    """Characters and items in `value` through nesting, counted no further than the bound + 1."""
-    limit = bounds().value_size
-    total = 0
-    stack = [value]
-    while stack and total <= limit:
-        item = stack.pop()
-        total += 1
-        if isinstance(item, str):
-            total += len(item)
-        elif isinstance(item, dict):
-            stack.extend(list(dict.values(item))[: limit + 1])
-            stack.extend(list(dict.keys(item))[: limit + 1])
-        elif isinstance(item, list | tuple | set | frozenset):
-            stack.extend(list.__iter__(item) if isinstance(item, list) else item)
-    return total
-
-
-def bounded(value: Value) -> Value:
-    """`value`, if it is small enough.
-
-    Raises:
-        Refused: a result too large.
-    """
-    if isinstance(value, bool | float) or value is None:
-        return value
-    if isinstance(value, int):
-        if not -MAX_INTEGER < value < MAX_INTEGER:
-            raise Refused("an integer of this size is not allowed")
-    elif size_of(value) > bounds().value_size:
-        raise too_large("a value")
-    return value
-
-
-def too_large(what: str) -> Beyond:
-    return Beyond(f"{what} of more than {bounds().value_size} characters or items is not allowed", "value_size")
-
-
-def math_symbols() -> dict[str, Value]:
-    """The constants and functions of `math` whose cost does not grow with their argument."""
-    costly = {"factorial", "comb", "perm", "prod", "lcm", "gcd", "isqrt", "dist", "fsum", "sumprod"}
-    return {name: value for name, value in vars(math).items() if not name.startswith("_") and name not in costly}
-
-
-def python_symbols() -> dict[str, Value]:
-    """The built-in functions that expressions may call."""
-
-    def bounded_range(*ends: int) -> list[int]:
-        steps = range(*ends)
-        if len(steps) > bounds().value_size:
-            raise too_large("a range")
-        return list(steps)
-
-    def bounded_list(function: Callable[..., Value]) -> Callable[..., Value]:
-        # A Value may be a number; zip, map and their like answer that with the TypeError that becomes a finding.
-        return lambda *values: bounded(list(function(*(bounded(value) for value in values))))  # type: ignore[call-overload]
-
-    def text(value: Value = "") -> str:
-        return str(bounded(value))
-
-    def apply(function: Callable[..., Value], *values: Iterator[Value]) -> Value:
-        return bounded([bounded(function(*items)) for items in zip(*values, strict=False)])
-
-    kept = (float, int, bool, len, min, max, round, abs, all, any, sum, divmod, isinstance, ord, dict, tuple, set)
-    symbols: dict[str, Value] = {function.__name__: function for function in kept}
-    listed = (list, sorted, zip, enumerate, reversed)
-    symbols |= {function.__name__: bounded_list(function) for function in listed}
-    return symbols | {"range": bounded_range, "str": text, "map": apply, "True": True, "False": False, "None": None}
-
-
 class Evaluator:
-    """Computes expressions; one object serves one expansion and counts its operations."""
+    """Computes expressions; one object serves one expansion and counts its operations.
 
-    def __init__(self) -> None:
+    One operation touches values of bounded size, so that a look at the clock before each bounds the time of all.
+    """
+
+    def __init__(self, clock: Clock | None = None) -> None:
         self._left = bounds().operations
+        self._clock = clock or Clock()
 
     def __call__(self, text: str, symbols: Mapping[str, Value]) -> Value:
         """The value of `text`.
@@ -165,6 +94,7 @@ class Evaluator:
         self._left -= 1
         if self._left < 0:
             raise Beyond("the expressions of the description compute too much", "operations")
+        self._clock.look()
         compute = getattr(self, "_" + type(node).__name__.lower(), None)
         if compute is None:
             raise Refused(f"'{ast.unparse(node)[:80]}': {type(node).__name__} is not allowed in an expression")
@@ -185,8 +115,12 @@ class Evaluator:
 
     def _binop(self, node: ast.BinOp, names: Mapping[str, Value]) -> Value:
         left, right = self._value(node.left, names), self._value(node.right, names)
+        if type(node.op) in _OF_INTEGERS:
+            return _of_integers(node.op, left, right)
         if type(node.op) not in _BINARY:
             raise Refused(f"operator {type(node.op).__name__} is not allowed")
+        if isinstance(node.op, ast.Mod) and isinstance(left, str):
+            return _formatted(left, right)
         numbers = isinstance(left, int | float) and isinstance(right, int | float)
         if isinstance(node.op, ast.Mod | ast.Pow) and not numbers:
             raise Refused("only numbers have a remainder or a power")
@@ -225,16 +159,29 @@ class Evaluator:
         return self._value(node.body if self._value(node.test, names) else node.orelse, names)
 
     def _list(self, node: ast.List, names: Mapping[str, Value]) -> Value:
-        return [self._value(item, names) for item in node.elts]
+        return self._each(node.elts, names)
 
     def _tuple(self, node: ast.Tuple, names: Mapping[str, Value]) -> Value:
-        return tuple(self._value(item, names) for item in node.elts)
+        return tuple(self._each(node.elts, names))
+
+    def _each(self, nodes: list[ast.expr], names: Mapping[str, Value]) -> list[Value]:
+        held = Held()
+        found: list[Value] = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                several = held.add(self._value(node.value, names))
+                if not isinstance(several, str | list | tuple | dict | set):
+                    raise Refused(f"'{ast.unparse(node)[:80]}': only a list can be spread")
+                found += several
+            else:
+                found.append(held.add(self._value(node, names)))
+        return found
 
     def _dict(self, node: ast.Dict, names: Mapping[str, Value]) -> Value:
         if any(key is None for key in node.keys):
             raise Refused("** is not allowed in an expression")
-        keys = [self._value(key, names) for key in node.keys if key is not None]
-        return dict(zip(keys, (self._value(value, names) for value in node.values), strict=True))
+        keys = self._each([key for key in node.keys if key is not None], names)
+        return dict(zip(keys, self._each(node.values, names), strict=True))
 
     def _subscript(self, node: ast.Subscript, names: Mapping[str, Value]) -> Value:
         container = self._value(node.value, names)
@@ -288,28 +235,65 @@ class Evaluator:
 
     def _call(self, node: ast.Call, names: Mapping[str, Value]) -> Value:
         function = self._value(node.func, names)
-        if not callable(function) or any(isinstance(item, ast.Starred) for item in node.args):
+        if not callable(function):
             raise Refused(f"'{ast.unparse(node)[:80]}' cannot be called")
         if any(keyword.arg is None for keyword in node.keywords):
             raise Refused("** is not allowed in an expression")
-        positional = [self._value(item, names) for item in node.args]
-        named = {str(keyword.arg): self._value(keyword.value, names) for keyword in node.keywords}
-        return function(*positional, **named)
+        positional = self._each(node.args, names)
+        given = self._each([keyword.value for keyword in node.keywords], names)
+        named = {str(keyword.arg): value for keyword, value in zip(node.keywords, given, strict=True)}
+        if function is not isinstance:  # what others call again and again (map, the key of sorted) is watched
+            positional = [self._watched(value) if callable(value) else value for value in positional]
+            named = {name: self._watched(value) if callable(value) else value for name, value in named.items()}
+        return self._watched(function)(*positional, **named)
+
+    def _watched(self, function: Callable[..., Value]) -> Callable[..., Value]:
+        """`function`, with a look at the clock before each call and a bound on what all calls give together."""
+        held = Held()
+        called = self._set if function is set else self._mapping if function is dict else function
+
+        def call(*values: Value, **named: Value) -> Value:
+            self._clock.look()
+            return held.add(called(*values, **named))
+
+        return call
+
+    def _set(self, *values: Value) -> Value:
+        found: set[Value] = set()
+        for part in self._parts(*values):
+            found.update(part)
+        return found
+
+    def _mapping(self, *values: Value, **named: Value) -> Value:
+        if any(isinstance(value, dict) for value in values):
+            return dict(*values, **named)
+        found: dict[Value, Value] = {}
+        for part in self._parts(*values):
+            found.update(cast("list[tuple[Value, Value]]", part))
+        return found | named
+
+    def _parts(self, values: Value = ()) -> Iterator[list[Value]]:
+        """A few items at a time: numbers can be chosen so that a hash table of many takes for ever."""
+        items = list(values)  # type: ignore[call-overload]
+        for start in range(0, len(items), 256):
+            self._clock.look()
+            yield items[start : start + 256]
 
     def _listcomp(self, node: ast.ListComp, names: Mapping[str, Value]) -> Value:
-        found: list[Value] = []
-        for scope in self._scopes(node.generators, _Scope(names, {})):
-            found.append(self._value(node.elt, scope))
-            if len(found) > bounds().value_size:
-                raise too_large("a list")
-        return found
+        held = Held()
+        scopes = self._scopes(node.generators, _Scope(names, {}))
+        return [held.add(self._value(node.elt, scope)) for scope in scopes]
 
     def _generatorexp(self, node: ast.GeneratorExp, names: Mapping[str, Value]) -> Value:
         return self._listcomp(ast.ListComp(elt=node.elt, generators=node.generators), names)
 
     def _dictcomp(self, node: ast.DictComp, names: Mapping[str, Value]) -> Value:
         scopes = self._scopes(node.generators, _Scope(names, {}))
-        return {self._value(node.key, scope): self._value(node.value, scope) for scope in scopes}
+        held = Held()
+        return {held.add(self._value(node.key, one)): held.add(self._value(node.value, one)) for one in scopes}
+
+    def _setcomp(self, node: ast.SetComp, names: Mapping[str, Value]) -> Value:
+        return self._set(self._listcomp(ast.ListComp(elt=node.elt, generators=node.generators), names))
 
     def _scopes(self, generators: list[ast.comprehension], scope: _Scope) -> Iterator[_Scope]:
         if not generators:
@@ -351,3 +335,25 @@ def _targets(target: ast.expr, item: Value) -> dict[str, Value]:
             found |= _targets(part, value)
         return found
     raise Refused("a comprehension names its variables plainly")
+
+
+def _of_integers(kind: ast.operator, left: Value, right: Value) -> Value:
+    if not isinstance(left, int) or not isinstance(right, int):
+        raise Refused(f"operator {type(kind).__name__} is of integers alone")
+    if isinstance(kind, ast.LShift) and right > MAX_SHIFT:
+        raise Refused(f"a shift by more than {MAX_SHIFT} is not allowed")
+    return _OF_INTEGERS[type(kind)](left, right)
+
+
+def _formatted(text: str, values: Value) -> Value:
+    """`text % values`, with widths of three digits at most.
+
+    Raises:
+        Refused: another directive, or too much text.
+    """
+    directives = _DIRECTIVE.findall(text)
+    if "%" in _DIRECTIVE.sub("", text):
+        raise Refused(f"'{text[:80]}' is no format that is understood", hint="write %d, %s or %.3f; %% is the sign")
+    if len(directives) * size_of(values) > bounds().value_size * 4:
+        raise too_large("a text")
+    return text % values

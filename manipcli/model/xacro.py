@@ -10,7 +10,6 @@ import importlib.util
 import os
 import re
 import threading
-import time
 import xml.dom.minidom
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
@@ -20,12 +19,13 @@ from xml.dom.minidom import Document
 from xml.dom.minidom import Element as DomElement
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.text import any_of, did_you_mean, nearest
 from manipcli.model.bounds import bounds
-from manipcli.model.expression import Beyond, Evaluator, Refused, bounded, math_symbols, python_symbols
+from manipcli.model.expression import Evaluator
+from manipcli.model.expression_values import Beyond, Clock, Refused, math_symbols, python_symbols, size_of, too_large
 from manipcli.model.located_xml import invalid, place_of, read_document
 from manipcli.model.packages import NotFound, Packages
-from manipcli.model.xacro_yaml import load_yaml
+from manipcli.model.xacro_names import UnknownArgument, names_of, near_macro, near_name
+from manipcli.model.xacro_yaml import Mistyped, load_yaml
 
 _loading = threading.Lock()
 _ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "Invalid parameter", "unknown macro")
@@ -34,18 +34,9 @@ _ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "I
 _MACRO_ARGUMENT = re.compile(
     r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
 )
+_NODE = 16
+"""What an attribute, a text or an element counts besides its characters: they take memory when they are empty, too."""
 _DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
-
-
-class UnknownArgument(NameError):
-    """`$(arg NAME)` of an argument that has neither a value nor a default."""
-
-    def __init__(self, name: str, known: Collection[str]) -> None:
-        self.hint = (
-            did_you_mean(name, known)
-            or f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
-        )
-        super().__init__(f"argument '{name}' is not given and has no default")
 
 
 def expand(
@@ -91,9 +82,10 @@ class _Expansion:
         self._packages = packages
         self._allow_env = allow_env
         self._module = _private_module()
-        self._evaluate = Evaluator()
+        self._clock = Clock()
+        self._evaluate = Evaluator(self._clock)
         self._bounds = bounds()
-        self._until = time.process_time() + self._bounds.seconds
+        self._characters = 0
         self._findings: list[Finding] = []
         self._current: DomElement | None = None
         self._calls: list[DomElement] = []
@@ -160,7 +152,7 @@ class _Expansion:
 
     def _failed(self, error: Exception) -> InvalidInput:
         cause: BaseException | None = error
-        code, own_hint = "XACRO001", None
+        code, own_hint, place = "XACRO001", None, self._place()
         while cause is not None:
             if isinstance(cause, Beyond):
                 code, own_hint = "XACRO004", cause.hint
@@ -170,20 +162,22 @@ class _Expansion:
                 code, own_hint = "XACRO003", cause.hint
             elif isinstance(cause, NotFound):
                 own_hint = cause.hint
+            elif isinstance(cause, Mistyped):
+                place, own_hint = cause.place, f"it is read at {self._place()}"
             cause = getattr(cause, "exc", None) or cause.__cause__
         lines = str(error).replace(" (<unknown>, line 1)", "").splitlines()
         message = "; ".join(line.strip() for line in lines if line.strip()) or repr(error)
         if self._calls and message.startswith(_ABOUT_A_CALL):
-            self._current = self._calls[-1]
+            place = place_of(self._calls[-1])
         around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
         more = [f"{len(around) - 4} more"] if len(around) > 4 else []
         hint = "expanded from " + ", from ".join([*around[:4], *more]) if around else None
         if message.startswith("unknown macro") and self._calls:
-            own_hint = _near_macro(self._calls[-1].tagName, _names(self._macros))
+            own_hint = near_macro(self._calls[-1].tagName, names_of(self._macros))
         elif "is not defined" in message:
             own_hint = own_hint or self._near
         hints = [each for each in (own_hint, hint) if each]
-        return invalid(code, message, self._place(), "; ".join(hints) or None)
+        return invalid(code, message, place, "; ".join(hints) or None)
 
     def _warn(self, *words: object, **options: object) -> str:
         message = " ".join(str(word) for word in words)
@@ -199,18 +193,24 @@ class _Expansion:
         return read_document(Path(str(filename)))
 
     def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
-        self._check_time()
+        self._clock.look()
         try:
             return self._evaluate(expr, globals)
         except NameError as error:
-            self._near = _near_name(error, _names(globals))
+            self._near = near_name(error, names_of(globals))
             raise
 
     def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
-        return bounded(self._eval_text(text, symbols))
+        value: object = self._eval_text(text, symbols)
+        size = size_of(value)
+        if size > self._bounds.value_size:
+            raise too_large("a value")
+        self._grow(size)
+        return value
 
     def _door_eval_all(self, node: DomElement, macros: object, symbols: object) -> None:
         self._count()
+        self._grow(_NODE * (len(node.childNodes) + len(node.attributes)))
         self._current = node if place_of(node) is not None else self._current
         self._eval_all(node, macros, symbols)
 
@@ -233,11 +233,12 @@ class _Expansion:
         self._expansions += 1
         if self._expansions > self._bounds.expansions:
             raise Beyond(f"more than {self._bounds.expansions} elements are expanded", "expansions")
-        self._check_time()
+        self._clock.look()
 
-    def _check_time(self) -> None:
-        if time.process_time() > self._until:
-            raise Beyond(f"the expansion takes more than {self._bounds.seconds} s", "seconds")
+    def _grow(self, size: int) -> None:
+        self._characters += size
+        if self._characters > self._bounds.characters:
+            raise Beyond(f"the description expands to more than {self._bounds.characters} characters", "characters")
 
     def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
         self._current = tag
@@ -318,7 +319,9 @@ class _Expansion:
 
     def _load_yaml(self, name: str) -> object:
         path = self._packages.resolve(name, relative_to=self._folder())
-        return self._module.YamlListWrapper.wrap(load_yaml(path, lambda text: self._evaluate(text, math_symbols())))
+        return self._module.YamlListWrapper.wrap(
+            load_yaml(path, lambda text: self._evaluate(text, math_symbols()), self._clock)
+        )
 
     def _absolute(self, name: str) -> str:
         return str(self._folder() / name)
@@ -346,26 +349,6 @@ class _Expansion:
             "math": namespace(math_symbols()),
             "xacro": namespace({**own, **speak, "tokenize": _tokenize, "arg": self._argument}),
         }
-
-
-def _names(symbols: object) -> list[str]:
-    """The names that an expression could have meant: of a table of the library and of all around it."""
-    found: list[str] = []
-    while isinstance(symbols, Mapping) and len(found) < 2000:
-        found += [str(name) for name in dict.keys(symbols)] if isinstance(symbols, dict) else list(symbols)
-        symbols = getattr(symbols, "parent", None)
-    return found
-
-
-def _near_name(error: NameError, known: Collection[str]) -> str | None:
-    quoted = str(error).split("'")
-    close = nearest(quoted[1], known) if len(quoted) > 2 else ()
-    return f"did you mean {any_of(close)}?" if close else None
-
-
-def _near_macro(tag: str, known: Collection[str]) -> str | None:
-    close = nearest(tag.removeprefix("xacro:"), [name.removeprefix("xacro:") for name in known])
-    return f"did you mean <xacro:{close[0]}>?" if close else None
 
 
 def _typed(text: str) -> object:

@@ -152,6 +152,46 @@ def test_yaml_with_code_in_it_is_refused(tmp_path: Path) -> None:
         refused(tmp_path, "<link name=\"${xacro.load_yaml('d.yaml')}\"/>")
 
 
+def test_yaml_that_grows_by_merging_is_refused_at_once(tmp_path: Path) -> None:
+    (tmp_path / "d.yaml").write_text(
+        "a0: &a0 {x: 1}\n" + "".join(f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 10)}]}}\n" for k in range(1, 12))
+    )
+    (finding,) = refused(tmp_path, "<link name=\"${len(load_yaml('d.yaml'))}\"/>").findings
+    assert finding.code == "XACRO004"
+    (tmp_path / "d.yaml").write_text("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n")
+    body = '<xacro:property name="d" value="${load_yaml(\'d.yaml\')}"/><link name="${d.b.x}_${d.b.y}"/>'
+    assert names(expand(tmp_path, body)) == ["1_3"]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"), [("a: [1,\nb: }\n", (2, 4)), ("a: 1\n\tb: 2\n", (2, 1)), ("\xe4: \0", (1, 1))]
+)
+def test_a_typing_mistake_in_yaml_is_told_at_its_place(tmp_path: Path, text: str, place: tuple[int, int]) -> None:
+    (tmp_path / "d.yaml").write_text(text, encoding="latin-1")
+    (finding,) = refused(tmp_path, "<link name=\"${load_yaml('d.yaml')}\"/>").findings
+    assert finding.code == "XACRO001"
+    assert finding.place is not None
+    assert (Path(finding.place.file).name, (finding.place.line, finding.place.column)) == ("d.yaml", place)
+    assert "r.urdf.xacro:2:1" in (finding.hint or "")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '<l a="${a}0" b="${a}1"/>' * 20,
+        "<l>${a}${a}</l>" * 20,
+        "".join(f'<xacro:property name="q{k}" value="${{a + \'{k}\'}}" lazy_eval="false"/>' for k in range(40)),
+    ],
+)
+def test_the_expanded_document_has_a_bounded_size(tmp_path: Path, body: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIPCLI_BOUNDS", "characters=10000000")
+    long = '<xacro:property name="a" value="${\'a\' * 30000}"/>'
+    macro = f'<xacro:macro name="m" params="">{body}</xacro:macro>'
+    (finding,) = refused(tmp_path, long + macro + "<xacro:m/>" * 400).findings
+    assert finding.code == "XACRO004"
+    assert "characters=20000000" in (finding.hint or "")
+
+
 def test_a_pipe_cannot_be_included(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.xacro")
     refused(tmp_path, '<xacro:include filename="pipe.xacro"/>')

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.model.expression import Evaluator, Refused, math_symbols, python_symbols
+from manipcli.model.expression import Evaluator
+from manipcli.model.expression_values import Beyond, Refused, math_symbols, python_symbols
 
 OWN = {"x": 3, "text": "a b", "data": {"joint": {"lower": -1.5}}, "_y": 2.0}
 NAMES = {**math_symbols(), **python_symbols(), **OWN}
@@ -37,6 +39,15 @@ NAMES = {**math_symbols(), **python_symbols(), **OWN}
         "round(2.567, 1)",
         "sum([a * b for a, b in zip([1, 2], [3, 4])])",
         "radians(90)",
+        "'%d_%s %.2f%%' % (3, text, pi)",
+        "sorted([3, 1, 2], reverse=True)",
+        "sorted(['ccc', 'a'], key=len)",
+        "max(*[1, 2], 0)",
+        "5 & 1 | 2 ^ 8 << 3 >> 1",
+        "len({i % 2 for i in range(4)})",
+        "dict([['a', 1]], b=2)",
+        "len(set([1, 1]))",
+        "sum([1, 2], 3) + 'abc'.find('c')",
     ],
 )
 def test_the_value_is_python_s(text: str) -> None:
@@ -70,7 +81,15 @@ def test_keys_of_data_can_be_written_as_attributes() -> None:
         "10 ** 9 * 'a'",
         "range(10 ** 9)",
         "'%0999999999d' % 1",
+        "'%*d' % (999999999, 1)",
+        "'%(a)s' * 3000 % {'a': 'b' * 60000}",
         "1 << 10 ** 9",
+        "[range(60000) for i in range(100)]",
+        "{i: range(60000) for i in range(100)}",
+        "map(range, [60000, 60000])",
+        "sorted(range(60000), key=range)",
+        "max(range(60000), range(60000))",
+        "sum([[]] * 60000, range(60000))",
         "[i for i in range(60000) for j in range(60000)]",
         "str([[['a' * 60000] * 60000] * 60000])",
         "('b' * 60000).replace('b', 'a' * 60000)",
@@ -96,6 +115,25 @@ def test_many_small_operations_end(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(Refused, match="too much"):
         for _ in range(100):
             evaluate("sum([i for i in range(50)])", NAMES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[sum(x) for i in range(60000)]",
+        "len([x.count(-1) for i in range(60000)])",
+        "[1 for i in range(60000) if x + [1] == x + [2]]",
+        "set([i * (2 ** 61 - 1) for i in range(30000)])",
+        "dict([[i * (2 ** 61 - 1), 0] for i in range(15000)])",
+    ],
+)
+def test_few_costly_operations_end(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIPCLI_BOUNDS", "seconds=1")
+    start = time.process_time()
+    with pytest.raises(Beyond, match="more than 1 s"):
+        Evaluator()(text, {**NAMES, "x": list(range(60000))})
+    assert time.process_time() - start < 1.5
 
 
 @given(st.text(alphabet="x+-*/().[]{}'_,: 0123456789abdefilmnorst", max_size=40))

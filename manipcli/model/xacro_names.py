@@ -1,0 +1,38 @@
+"""The names that a xacro file could have meant."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from manipcli.core.text import any_of, did_you_mean, nearest
+
+
+class UnknownArgument(NameError):
+    """`$(arg NAME)` of an argument that has neither a value nor a default."""
+
+    def __init__(self, name: str, known: Collection[str]) -> None:
+        self.hint = (
+            did_you_mean(name, known)
+            or f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
+        )
+        super().__init__(f"argument '{name}' is not given and has no default")
+
+
+def names_of(symbols: object) -> list[str]:
+    """The names that an expression could have meant: of a table of the library and of all around it."""
+    found: list[str] = []
+    while isinstance(symbols, Mapping) and len(found) < 2000:
+        found += [str(name) for name in dict.keys(symbols)] if isinstance(symbols, dict) else list(symbols)
+        symbols = getattr(symbols, "parent", None)
+    return found
+
+
+def near_name(error: NameError, known: Collection[str]) -> str | None:
+    quoted = str(error).split("'")
+    close = nearest(quoted[1], known) if len(quoted) > 2 else ()
+    return f"did you mean {any_of(close)}?" if close else None
+
+
+def near_macro(tag: str, known: Collection[str]) -> str | None:
+    close = nearest(tag.removeprefix("xacro:"), [name.removeprefix("xacro:") for name in known])
+    return f"did you mean <xacro:{close[0]}>?" if close else None
