@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Iterable
 
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ufeff\ud800-\udfff]")
+_UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Categories of Unicode: control, format (direction marks, spaces of no width), surrogates, ends of lines."""
+_LONG_WORD = re.compile(r"\S{241,}")
 _SHORT = {"\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -68,13 +71,22 @@ def number_of(number: int, noun: str) -> str:
 
 
 def escape(text: str) -> str:
-    r"""`text` on one line, with control characters, direction marks and lone surrogates written as `\x1b`, `\u202e`."""
-    return _CONTROL.sub(lambda match: _escaped(match.group()), text)
+    r"""`text` on one line, with what cannot be seen (control and format characters) written as `\x1b`, `\u202e`."""
+    if text.isprintable():
+        return text
+    return "".join(_escaped(c) if unicodedata.category(c) in _UNSEEN else c for c in text)
 
 
 def _escaped(character: str) -> str:
     code = ord(character)
-    return _SHORT.get(character) or (f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}")
+    numeric = f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+    return _SHORT.get(character) or numeric
+
+
+def one_line(text: str) -> str:
+    """`text`, escaped, with the middle left out of words that nobody reads to their end: names of thousands of
+    letters."""
+    return _LONG_WORD.sub(lambda match: f"{match.group()[:160]}...{match.group()[-60:]}", escape(text))
 
 
 def shorten(text: str, *, width: int = 60) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import number_of
+from manipcli.core.text import number_of, one_line
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport
@@ -53,8 +53,9 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
 
 
 def describe(finding: Finding) -> str:
-    """One finding: where, how grave, what; and below it the hint."""
-    return f"{finding}\n  hint: {finding.hint}" if finding.hint else str(finding)
+    """One finding on one line, whatever names it quotes: where, how grave, what; and below it the hint."""
+    line = one_line(str(finding))
+    return f"{line}\n  hint: {one_line(finding.hint)}" if finding.hint else line
 
 
 def describe_step(step: StepOutcome) -> str:

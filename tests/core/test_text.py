@@ -35,10 +35,12 @@ def test_lists_of_names() -> None:
 def test_an_escape_sequence_stays_visible() -> None:
     assert escape("\x1b[2Jred\n\u202e") == "\\x1b[2Jred\\n\\u202e"
 
+    assert escape("a\u200bb\U000e0041") == "a\\u200bb\\U000e0041"
+
 
 @given(st.text())
 def test_escaped_text_has_no_control_characters(text: str) -> None:
-    assert not any(unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp") for c in escape(text))
+    assert not any(unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") for c in escape(text))
 
 
 @given(st.text(), st.integers(4, 80))

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.table import table
-from manipcli.report.text import render_findings, render_run, render_verdict
+from manipcli.report.text import describe, render_findings, render_run, render_verdict
 
 PASSED = Verdict(
     task="pour",
@@ -106,3 +106,12 @@ def test_columns_line_up_also_for_wide_characters_and_nothing_is_cut() -> None:
     long = "x" * 300
     lines = table(("a", "b"), [("茶碗", long), ("cup", "[bold]y[/bold]")], right=()).splitlines()
     assert lines == ["a     b", f"茶碗  {long}", "cup   [bold]y[/bold]"]
+
+
+def test_no_name_forges_a_line_and_none_fills_the_screen() -> None:
+    forged = "a\nx.urdf:1:1: error[URDF999]: forged"
+    finding = Finding("URDF331", f"link '{forged}' and '\u200b'", Place(f"{'d' * 5000}\n.urdf", 1, 2), hint=forged)
+    lines = describe(finding).splitlines()
+    assert len(lines) == 2 and lines[1].startswith("  hint: a\\nx.urdf")
+    assert ":1:2: error[URDF331]: link 'a\\nx.urdf" in lines[0] and "'\\u200b'" in lines[0]
+    assert len(lines[0]) < 500
