@@ -145,7 +145,9 @@ class Expected:
             return found
         best = ("at best",) if self._spec.quantifier == "eventually" else ()
         words = ", ".join(word for word in (self._when.words, *best) if word)
-        return replace(found, text=f"{words}: {found.text}" if words else found.text)
+        broken = self._extreme.broken if isinstance(self._spec, WatchSpec) else None
+        since = "" if broken is None or broken == found.at else f"; broken at t = {broken:.3f} s"
+        return replace(found, text=f"{words}: {found.text}{since}" if words else f"{found.text}{since}")
 
 
 def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:

@@ -171,6 +171,8 @@ class Extreme:
         self._order = 0.0
         self._fault: NotEvaluated | None = None
         self._idle = ""
+        self.broken: float | None = None
+        """The first moment [s] that counts at which it did not hold."""
 
     def add(self, more: Reading, times: Array, first: int = 0, last: int | None = None) -> None:
         """The ticks from `first` up to and without `last` count, too."""
@@ -186,6 +188,9 @@ class Extreme:
             unit = more.units[0] if len(more.units) == 1 else ""
             self._fault = NotEvaluated(f"the recorded state is not finite at t = {at:.3f} s", unit)
             return
+        failing = np.flatnonzero(order < 0.0)
+        if self.broken is None and len(failing):
+            self.broken = float(times[first + ticks[failing[0]]])
         k = int(np.argmin(order) if self._pick == "least" else np.argmax(order))
         value = float(order[k])
         if self._best is None or (value < self._order if self._pick == "least" else value > self._order):

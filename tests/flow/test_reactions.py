@@ -164,7 +164,9 @@ def test_a_watch_that_is_broken_after_the_last_step_fails_the_run(run: Run, tmp_
     assert verdict.verdict == "failed"
     assert verdict.steps[0].outcome == "done"
     assert [one.step for one in events(tmp_path, "watch_broken")] == [""]
-    assert verdict.text.startswith("stopped after the last step: 'watch_duration' is broken at t = 0.3")
+    broken = "broken at t = 0.302 s"
+    assert verdict.text.startswith(f"stopped after the last step: 'watch_duration' is {broken}")
+    assert verdict.expectations[0].text.endswith(f"; {broken}"), "its worst moment is a later one"
     assert verdict.simulated_time == pytest.approx(0.3 + REST, abs=0.03)
 
 
