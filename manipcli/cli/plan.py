@@ -10,7 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode
+from manipcli.core.errors import ExitCode, NotPlannable
 
 
 def plan(
@@ -42,7 +42,16 @@ def plan(
         package_path=tuple(package_path or ()),
         allow_outside=allow_outside,
     )
-    motions = pipeline.plan_task(loaded).motions
+    try:
+        motions = pipeline.plan_task(loaded).motions
+    except NotPlannable as refusal:
+        if format_ != "json":
+            raise
+        from manipcli.flow.plan import refused
+        from manipcli.report.json import render_verdict
+
+        console.result(render_verdict(refused(loaded, refusal)))
+        return refusal.exit_code
     if csv is not None:
         from manipcli.core.whole_file import whole_file
 

@@ -111,7 +111,7 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
                 outcome="failed" if step.id == refusal.step else "not_run",
                 started=None,
                 ended=None,
-                planned_duration=0.0,
+                planned_duration=None,
                 text=f"cannot be planned: {refusal.cause}" if step.id == refusal.step else "",
             )
             for step in task.spec.steps

@@ -31,7 +31,8 @@ class Attempt:
 class StepOutcome:
     """How one step went; times in simulated seconds, None where it never started or ended.
 
-    `outcome` and `text` are those of the last of `attempts`. `tolerated`: it failed, and the task says that it may.
+    `planned_duration`: None where it has no plan. `outcome` and `text` are those of the last of `attempts`.
+    `tolerated`: it failed, and the task says that it may.
     `replanned`: each time that it was planned again while the task ran, why.
     """
 
@@ -40,7 +41,7 @@ class StepOutcome:
     outcome: StepWord
     started: float | None
     ended: float | None
-    planned_duration: float
+    planned_duration: float | None
     text: str = ""
     attempts: tuple[Attempt, ...] = ()
     tolerated: bool = False

@@ -133,15 +133,16 @@ def steps(page: RunPage) -> Markup | None:
         timed: list[tuple[str, ...]] = []
         for step, written in page.located_steps:
             took = None if step.started is None or step.ended is None else step.ended - step.started
+            planned = step.planned_duration
             mine = by_id.get(step.id)
             timed.append(
                 (
                     _outcome(step),
                     _step_name(page, step, written),
                     _gantt(page, step, end),
-                    f"{step.planned_duration:.2f} s",
+                    "" if planned is None else f"{planned:.2f} s",
                     "" if took is None else f"{took:.2f} s",
-                    "" if took is None else _late(took - step.planned_duration),
+                    "" if took is None or planned is None else _late(took - planned),
                     "" if mine is None else number(float(mine.given.sum()), "J"),
                     "" if mine is None else number(mine.total.value, "W"),
                     seek(step.started) if step.started is not None else "",
@@ -181,7 +182,7 @@ def _step_name(page: RunPage, step: StepOutcome, written: Written) -> Markup:
 
 def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
     """One row of the Gantt chart: two bars over the time of the whole run."""
-    if step.started is None:
+    if step.started is None or step.planned_duration is None:
         return element("small", "not begun")
     last = end if step.ended is None else step.ended
     scale = 1000.0 / end

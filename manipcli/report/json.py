@@ -40,8 +40,8 @@ def render_run(report: RunReport) -> str:
     )
 
 
-def render_verdict(verdict: Verdict, log: str) -> str:
-    """A log, judged."""
+def render_verdict(verdict: Verdict, log: str | None = None) -> str:
+    """A log, judged; without one, a task that cannot be planned."""
     return dumps(_object(verdict=verdict.verdict, judged=verdict, log=log, errors=verdict.errors))
 
 

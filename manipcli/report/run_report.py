@@ -25,14 +25,14 @@ class RunReport:
     Attributes:
         verdict: read from the log alone.
         wall_time: [s] of the whole run.
-        real_time_factor: simulated time over the wall time of its simulation.
+        real_time_factor: simulated time over the wall time of its simulation; None where nothing was.
         log: path of the log, as text; None where nothing was run, or it was not kept.
         timing: the parts of `wall_time`.
     """
 
     verdict: Verdict
     wall_time: float
-    real_time_factor: float
+    real_time_factor: float | None
     log: str | None
     timing: Timing
 

@@ -33,5 +33,9 @@ def test_a_step_that_cannot_be_planned_is_told_at_its_line(
     told = capsys.readouterr()
     assert "task.yaml:8:24: error[PLAN100]: step 'reach': " in told.out + told.err
     assert main([command, "task.yaml", "--format", "json"]) == 1
-    (error,) = json.loads(capsys.readouterr().out)["errors"]
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["task"], answer["seed"], answer["engine"]) == ("far", 0, "kinematic")
+    assert answer["real_time_factor"] is None
+    assert [step["planned_duration"] for step in answer["steps"]] == [None, None]
+    (error,) = answer["errors"]
     assert (error["file"], error["line"], error["column"]) == ("task.yaml", 8, 24)
