@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.spec.located import apart
 
 T = TypeVar("T")
 
 
 class Gathered:
-    """Calls what may refuse its input, and keeps the findings of what does."""
+    """Calls what may refuse its input, and keeps the findings of what does; `unknown`: as of `Source`."""
 
     def __init__(self) -> None:
         self.findings: list[Finding] = []
+        self.unknown: frozenset[Place] = frozenset()
 
     def __call__(self, step: Callable[[], T]) -> T | None:
         """The result, or None where it was refused."""
@@ -32,4 +34,4 @@ class Gathered:
             place = finding.place
             return (-1, 0, 0) if place is None else (files.index(place.file), place.line, place.column)
 
-        return InvalidInput(sorted(self.findings, key=position))
+        return InvalidInput(sorted(apart(self.findings, self.unknown), key=position))

@@ -127,6 +127,7 @@ def load_task(
     read = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
     if read is None:
         raise gathered.refusal()
+    gathered.unknown = read.source.unknown
     if task is None:
         gathered.findings += (*read.findings, *misnamed(read.spec, lambda loc: read.place(*loc)))
     robot_path = gathered(lambda: _named_file(read, path, "robot"))

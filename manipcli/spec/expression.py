@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Place
 from manipcli.core.text import did_you_mean, escape, shorten
 from manipcli.core.units import (
     NUMBER,
@@ -31,6 +31,9 @@ from manipcli.core.units import (
 from manipcli.spec.tree import Entry, MappingNode, Node, Path, Scalar, ScalarNode, SequenceNode, dotted
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
+NAME = re.compile(r"[A-Za-z_]\w*")
+"""What a parameter may be called."""
+_NAMES = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)([A-Za-z_]\w*)")
 _ALONE = re.compile(r"\s*\$([A-Za-z_]\w*)\s*")
 _TOKEN = re.compile(
     rf"\s*(?:(?P<name>\$[A-Za-z_]\w*)|(?P<quantity>{NUMBER_PATTERN}(?:\s*{UNIT_PATTERN})?)|(?P<sign>[-+*/()]))"
@@ -57,25 +60,20 @@ def is_expression(text: str) -> bool:
 def evaluate(text: str, params: Params) -> Scalar:
     """A parameter as it is, or the quantity that an expression computes: a text in SI, a number if it has no unit.
 
+    `params` has every name in it.
+
     Raises:
-        ExpressionError: an unknown parameter, no expression, dimensions that cannot be added, division by zero.
+        ExpressionError: no expression, dimensions that cannot be added, division by zero.
     """
     alone = _ALONE.fullmatch(text)
     if alone is not None:
-        return _param(alone.group(1), params)
+        return params[alone.group(1)]
     value = _Parser(text, params).whole()
     if not math.isfinite(value.value):
         raise ExpressionError(f"'{shorten(text)}' is too large to be a number")
     if value.dimension == NUMBER:
         return int(value.value) if value.value.is_integer() and abs(value.value) < 2**53 else value.value
     return format_quantity(value.value, value.dimension)
-
-
-def _param(name: str, params: Params) -> Scalar:
-    if name not in params:
-        hint = did_you_mean(name, params, kind="params") or no_params(name)
-        raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
-    return params[name]
 
 
 class _Parser:
@@ -164,7 +162,7 @@ class _Parser:
         raise ExpressionError(f"a value is missing in '{shorten(self.text)}'")
 
     def quantity(self, name: str) -> Quantity:
-        value = _param(name, self.params)
+        value = self.params[name]
         if isinstance(value, str):
             return parse_quantity(value)
         if value is None or isinstance(value, bool):
@@ -172,35 +170,48 @@ class _Parser:
         return Quantity(float(value), NUMBER)
 
 
-def substitute(root: Node, area: str) -> tuple[Node, list[Finding]]:
-    """The task with every expression computed, and what could not be.
+def substitute(root: Node, area: str, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Finding], frozenset[Place]]:
+    """The task with every expression computed, what could not be, and which values are unknown because of that.
 
-    Parameters may use those above them in `params:`.
+    Parameters may use those above them in `params:`. `refused`: places of values that are none.
     """
-    work = _Substitution(area)
+    work = _Substitution(area, refused)
     if not isinstance(root, MappingNode):
-        return root, []
+        return root, [], frozenset()
     block = root.get("params")
     if isinstance(block, MappingNode):
         entries: dict[str, Entry] = {}
+        work.declared = list(block.entries)
+        work.below = list(block.entries)
         for name, entry in block.entries.items():
             node = work.node(entry.node, ("params", name))
+            work.below.remove(name)
             entries[name] = Entry(entry.key_place, node)
-            if isinstance(node, ScalarNode):
+            if isinstance(node, ScalarNode) and node.place not in work.refused:
                 work.params[name] = node.value
+            else:
+                work.lost.add(name)
         root = root.with_entry("params", Entry(root.entries["params"].key_place, MappingNode(entries, block.place)))
     done = {
         key: entry if key == "params" else Entry(entry.key_place, work.node(entry.node, (key,)))
         for key, entry in root.entries.items()
     }
-    return MappingNode(done, root.place), work.findings
+    return MappingNode(done, root.place), work.findings, frozenset(work.unknown)
 
 
 class _Substitution:
-    def __init__(self, area: str) -> None:
+    """`params`: those with a value; `lost`: those without one, which has been told; `below`: not reached yet, the one
+    that is computed first."""
+
+    def __init__(self, area: str, refused: Iterable[Place]) -> None:
         self.area = area
         self.params: dict[str, Scalar] = {}
+        self.lost: set[str] = set()
+        self.declared: list[str] = []
+        self.below: list[str] = []
         self.findings: list[Finding] = []
+        self.refused = set(refused)
+        self.unknown: set[Place] = set()
 
     def node(self, node: Node, path: Path) -> Node:
         if isinstance(node, MappingNode):
@@ -212,12 +223,32 @@ class _Substitution:
             return node
         if not is_expression(node.value):
             return ScalarNode(node.value.replace("$$", "$"), node.place)
+        names = _NAMES.findall(node.value)
+        if self.lost.intersection(names):
+            self.refused.add(node.place)
+            self.unknown.add(node.place)
+            return node
         try:
+            self.in_order(names)
             return ScalarNode(evaluate(node.value, self.params), node.place, written=node.value)
         except ExpressionError as error:
             code = f"{self.area}{203 if error.unknown else 211}"
             self.findings.append(Finding(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
+            self.refused.add(node.place)
             return node
+
+    def in_order(self, names: Sequence[str]) -> None:
+        """Parameters, and only those, are spoken of; in `params:` by what stands below them."""
+        for name in names:
+            if self.below and name == self.below[0]:
+                raise ExpressionError(f"the parameter '${name}' is computed from itself", "give it a value")
+            if name in self.below:
+                cause = f"the parameter '${name}' stands below; one is computed from those above it"
+                raise ExpressionError(cause, f"move '{escape(name)}' above '{escape(self.below[0])}'", unknown=True)
+            if name not in self.params:
+                known = [one for one in self.declared if one not in self.below[:1]]
+                hint = did_you_mean(name, known, kind="params") if self.declared else no_params(name)
+                raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
 
 
 def no_params(name: str) -> str:

@@ -64,7 +64,8 @@ def sibling(path: Path) -> str | None:
 
 def load(path: Path, model: type[M], area: Area) -> Located[M]:
     """A file of any model, without parameters and overrides."""
-    return validate(_source(read_bytes(path), str(path), area), model)
+    source, told = _source(read_bytes(path), str(path), area)
+    return validate(source, model, findings=told)
 
 
 def kind_of(path: Path, *, sure: bool = False) -> FileKind:
@@ -77,7 +78,10 @@ def kind_of(path: Path, *, sure: bool = False) -> FileKind:
     Raises:
         InvalidInput: it cannot be read, is no YAML mapping, or with `sure` none of the three.
     """
-    root = parse(read_bytes(path), str(path), infinite=True)
+    told: list[Finding] = []
+    root = parse(read_bytes(path), str(path), infinite=True, told=None if sure else told)
+    if not isinstance(root, MappingNode) and told:
+        raise InvalidInput(told)
     if not isinstance(root, MappingNode):
         raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
@@ -145,10 +149,12 @@ def _task_source(
 ) -> tuple[Source, list[Finding]]:
     """The tree of a task, overrides and parameters put in, and what is wrong with those."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
-    source, findings = _changed(_source(text, name, "TASK", "task"), wanted, model)
-    root, more = substitute(source.root, "TASK")
-    source = Source(name, root, "TASK")
-    return source, [*findings, *more, *_taken_twice(source)]
+    written, told = _source(text, name, "TASK", "task")
+    source, findings = _changed(written, wanted, model)
+    refused = {finding.place for finding in told if finding.place is not None}
+    root, more, unknown = substitute(source.root, "TASK", refused=refused)
+    source = Source(name, root, "TASK", unknown=unknown)
+    return source, [*told, *findings, *more, *_taken_twice(source)]
 
 
 def _taken_twice(source: Source) -> Iterator[Finding]:
@@ -178,7 +184,9 @@ def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = 
 
 
 def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Finding]]:
-    return _changed(_source(text, name, "ROBOT", "robot"), read_overrides(overrides), RobotSpec)
+    written, told = _source(text, name, "ROBOT", "robot")
+    source, findings = _changed(written, read_overrides(overrides), RobotSpec)
+    return source, [*told, *findings]
 
 
 def salvage_robot_file(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec] | None:
@@ -197,18 +205,21 @@ def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[Co
 
 def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
     """As `load_controllers`, from text; places call it `name`."""
-    root, told = rewrite(_source(text, name, "CTRL", "controllers").root)
+    written, told = _source(text, name, "CTRL", "controllers")
+    root, more = rewrite(written.root)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
-    return validate(source, ControllersSpec, findings=[*told, *findings])
+    return validate(source, ControllersSpec, findings=[*told, *more, *findings])
 
 
-def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> Source:
+def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Finding]]:
+    """The tree of a file, and what is wrong with its text."""
     if kind is not None:
         refuse_description(name, kind)
-    root: Node | None = parse(text, name, infinite=area == "CTRL")
+    told: list[Finding] = []
+    root: Node | None = parse(text, name, infinite=area == "CTRL", told=told)
     if kind is not None and root is not None:
         refuse_other_kind(root, name, kind)
-    return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area)
+    return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area), told
 
 
 def _changed(source: Source, overrides: Sequence[Override], model: type[Model]) -> tuple[Source, list[Finding]]:

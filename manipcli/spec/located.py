@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from typing import Generic, Literal, TypeVar
 
@@ -39,6 +40,7 @@ class Source:
 
     `kept`: where items of a list were left out, the indices in the file of those that remain, by the list's key.
     `whole`: where anything was left out or replaced, the tree before that.
+    `unknown`: the values that are not known, since what they are computed from has been refused.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Source:
     area: Area
     kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     whole: Node | None = None
+    unknown: frozenset[Place] = frozenset()
 
     def plain(self) -> Plain:
         """The data alone."""
@@ -112,14 +115,15 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()
     Raises:
         InvalidInput: with every finding.
     """
-    _check_top(source, model)
+    told = apart(findings, source.unknown)
+    if not any(finding.code.startswith("YAML") for finding in told):
+        _check_top(source, model)
     _check_version(source)
-    told = tuple(findings)
     try:
         spec = model.model_validate(plain(source.root))
     except ValidationError as error:
         # A text whose expression failed stays in the tree; that it is no quantity either needs no second telling.
-        places = {finding.place for finding in told if finding.severity == "error"}
+        places = {finding.place for finding in told if finding.severity == "error"} | source.unknown
         more = [f for f in explain(error, source.root, model, source.area) if f.place not in places]
         raise InvalidInput([*told, *more]) from None
     except RecursionError:
@@ -127,6 +131,16 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()
     if any(finding.severity == "error" for finding in told):
         raise InvalidInput(told)
     return Located(spec, source, told)
+
+
+def apart(findings: Sequence[Finding], unknown: AbstractSet[Place] = frozenset()) -> tuple[Finding, ...]:
+    """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
+    places = {one.place for one in findings if one.code.startswith("YAML")}
+    return tuple(
+        one
+        for one in findings
+        if one.code.startswith("YAML") or one.place is None or (one.place not in places and one.place not in unknown)
+    )
 
 
 def _check_top(source: Source, model: type[Model]) -> None:

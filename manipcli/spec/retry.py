@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
-from manipcli.spec.located import Located, Source, validate
+from manipcli.spec.located import Located, validate
 from manipcli.spec.task import StepSpec, TaskSpec
 from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, node_at
 
@@ -33,8 +34,9 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
             told.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
         entries[name] = Entry(entry.key_place, _escaped(entry.node))
     block = Entry(changed.place, MappingNode(entries, changed.place))
-    again, findings = substitute(MappingNode({"params": block, **root.without("params").entries}, root.place), "TASK")
-    tree = Source(source.name, again, source.area, source.kept)
+    changed_root = MappingNode({"params": block, **root.without("params").entries}, root.place)
+    again, findings, unknown = substitute(changed_root, "TASK")
+    tree = replace(source, root=again, unknown=unknown)
     return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
 
 

@@ -6,6 +6,7 @@ The places stay those of the file. Nothing salvaged is ever planned or run.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pydantic import ValidationError
 
@@ -44,7 +45,7 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
     kept: dict[str, tuple[int, ...]] = {}
     late: list[Finding] = []
     for number in range(_ROUNDS):
-        left = Source(source.name, root, source.area, kept, source.root)
+        left = replace(source, root=root, kept=kept, whole=source.root)
         try:
             return Located(model.model_validate(left.plain()), left, tuple(late))
         except ValidationError as error:

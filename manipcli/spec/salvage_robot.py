@@ -5,6 +5,8 @@ As of tasks (`salvage.py`): the places stay those of the file, and nothing salva
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pydantic import ValidationError
 
 from manipcli.spec.located import Located, Source
@@ -24,7 +26,7 @@ def salvage_robot(source: Source) -> Located[RobotSpec] | None:
     for _ in range(_ROUNDS):
         if not isinstance(root, MappingNode):
             return None
-        left = Source(source.name, root, source.area, whole=source.root)
+        left = replace(source, root=root, whole=source.root)
         try:
             return Located(RobotSpec.model_validate(left.plain()), left)
         except ValidationError as error:

@@ -10,12 +10,14 @@ import math
 import re
 from typing import Annotated, Final, Literal, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
+from manipcli.core.text import escape
 from manipcli.core.units import EARTH_GRAVITY
 from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
+from manipcli.spec.expression import NAME as PARAM
 from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Pause, Time
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
@@ -253,6 +255,16 @@ class StepSpec(KeyedSpec):
         return own
 
 
+def _usable(name: str) -> str:
+    if not PARAM.fullmatch(name):
+        hint = "`$name` is letters, digits and '_', and begins with a letter from a to z or with '_'"
+        raise problem("conflict", f"'{escape(name)}' cannot be the name of a parameter", key=True, hint=hint)
+    return name
+
+
+ParamName = Annotated[str, AfterValidator(_usable)]
+
+
 class TaskSpec(Model):
     """The task. The loader replaces `steps` and `expect` by the unions that the registry offers."""
 
@@ -262,7 +274,7 @@ class TaskSpec(Model):
     controllers: str = Field(description="Path of the controllers file, relative to this file.", min_length=1)
     description: str = Field("", description="What it is for, in words.")
     tags: tuple[str, ...] = Field((), description="Words that choose it among tests: `-k slow`; markers in pytest.")
-    params: dict[str, bool | int | float | str] = Field(
+    params: dict[ParamName, bool | int | float | str] = Field(
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")

@@ -53,13 +53,15 @@ _NOT_FINITE = re.compile(_INFINITE.pattern + r"|\.(nan|NaN|NAN)")
 _LONGEST_NUMBER = 400
 
 
-def parse(data: bytes | str, name: str, *, infinite: bool = False) -> Node | None:
+def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Finding] | None = None) -> Node | None:
     """The tree of one YAML document; None when there is nothing but comments.
 
     Args:
         data: the file's bytes, or its text.
         name: what places call the file.
         infinite: take `.inf` as a number, for the files of others, who write it where there is no limit.
+        told: gets what is wrong with single keys and values, instead of raising it. A value that is no number is
+            nothing then, and of two keys the first counts.
 
     Raises:
         InvalidInput: with every finding up to the first syntax error.
@@ -85,10 +87,13 @@ def parse(data: bytes | str, name: str, *, infinite: bool = False) -> Node | Non
     try:
         root = composer.document(_events(text))
     except yaml.YAMLError as error:
-        composer.findings.append(_syntax_finding(error, text, name))
-        root = None
-    if composer.findings:
+        if not isinstance(error, _Limit):
+            composer.findings.append(_syntax_finding(error, text, name))
+        raise InvalidInput(composer.findings) from None
+    if composer.findings and told is None:
         raise InvalidInput(composer.findings)
+    if told is not None:
+        told += composer.findings
     return root
 
 
@@ -227,12 +232,6 @@ class _Composer:
     nodes: int = 0
 
     def document(self, events: Iterator[yaml.Event]) -> Node | None:
-        try:
-            return self._document(events)
-        except _Limit:
-            return None
-
-    def _document(self, events: Iterator[yaml.Event]) -> Node | None:
         root: Node | None = None
         documents = 0
         for event in events:
@@ -356,13 +355,13 @@ class _Composer:
             return -math.inf if text.startswith("-") else math.inf
         if _NOT_FINITE.fullmatch(text):
             self.tell("YAML111", f"'{text}' is not a finite number", event, "write a finite number")
-            return 0.0
+            return None
         if whole or based or _FLOAT.fullmatch(text):
             value = math.inf if len(text) > _LONGEST_NUMBER or number is not None else float(text)
             if math.isfinite(value):
                 return value
             self.tell("YAML111", f"'{shorten(text, width=24)}' is too large to be a number", event)
-            return 0.0
+            return None
         return text
 
     def composed(self, node: Node, parts: list[_Composed]) -> _Composed:

@@ -511,6 +511,45 @@ def test_parameters_build_on_those_above_them_and_may_be_texts() -> None:
     assert (finding.code, str(finding.place)) == ("TASK203", "t.yaml:4:16")
 
 
+def test_what_is_wrong_with_a_parameter_is_told_once_and_there() -> None:
+    """Not again where it is used: the values of those, and of what is computed from them, are not known."""
+    wrong = "{b: $a / 2, a: 30 deg, c: $c, d: [1, 2], e: $bb, f: 2 * $e, 1a: 3, ä: 1, a b: 2}"
+    used = "- wait: $b\n  - wait: 2 * $c + 1 s\n  - wait: $d\n  - wait: $e\n  - wait: $f"
+    text = TASK.replace("{tilt: 120 deg, n: 2}", wrong).replace("$tilt, count: $n", "1")
+    text = text.replace("- wait:\n", f"{used}\n")
+    assert used in text
+    found = sorted((str(f.place), f.message, f.hint or "") for f in findings(text))
+    expected = [
+        ("13", "params.b: the parameter '$a' stands below", "move 'a' above 'b'"),
+        ("35", "params.c: the parameter '$c' is computed from itself", "value"),
+        ("42", "params.d: expected true or false", ""),
+        ("53", "params.e: unknown parameter '$bb'", "did you mean 'b'?"),
+        ("69", "params: '1a' cannot be the name of a parameter", "begins with a letter"),
+        ("76", "params: 'ä' cannot", "from a to z"),
+        ("82", "params: 'a b' cannot", "letters, digits and '_'"),
+    ]
+    assert [place for place, _, _ in found] == [f"t.yaml:4:{column}" for column, _, _ in expected]
+    for (_, message, hint), (_, start, part) in zip(found, expected, strict=True):
+        assert message.startswith(start)
+        assert part in hint
+
+
+def test_a_value_that_is_no_yaml_hides_nothing_and_is_told_once() -> None:
+    text = TASK.replace(
+        "task: pour", "task: pour\ntask: twice\nsimulatoin: {}\nsimulation: {step: .nan, settle: !!float 1}"
+    )
+    text = text.replace("{tilt: 120 deg, n: 2}", "{tilt: .inf, n: 2, n: 3}")
+    told = [(f.code, f.place and (f.place.line, f.place.column)) for f in findings(text)]
+    assert sorted(told, key=lambda one: one[1] or (0, 0)) == [
+        ("YAML106", (2, 1)),
+        ("TASK201", (3, 1)),
+        ("YAML111", (4, 20)),
+        ("YAML104", (4, 34)),
+        ("YAML111", (7, 16)),
+        ("YAML106", (7, 28)),
+    ]
+
+
 def test_a_doubled_dollar_is_a_dollar() -> None:
     spec = load(TASK.replace("task: pour", "task: pour\ndescription: costs $5 or $$tilt")).spec
     assert spec.description == "costs $5 or $tilt"

@@ -211,3 +211,24 @@ def test_a_tree_can_be_copied_with_a_change() -> None:
     assert isinstance(root, MappingNode)
     assert plain(root.without("a").with_entry("c", root.entries["a"])) == {"b": 2, "c": 1}
     assert plain(root) == {"a": 1, "b": 2}
+
+
+def test_a_reader_that_goes_on_gets_the_first_of_two_keys_and_nothing_for_no_number() -> None:
+    told: list[Finding] = []
+    root = parse("a: 1\na: 2\nb: .nan\nc: [-.inf, 1e999, !!str x]\n? [k]\n: 3\n", "f", told=told)
+    assert root is not None
+    assert plain(root) == {"a": 1, "b": None, "c": [None, None, "x"]}
+    assert [spot(one) for one in told] == [
+        ("YAML106", 2, 1), ("YAML111", 3, 4), ("YAML111", 4, 5), ("YAML111", 4, 12), ("YAML104", 4, 19),
+        ("YAML110", 5, 3),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["a: .nan\nb: [\n", "a: .nan\nb: *c\n", "a: .nan\n---\nb: 1\n"])
+def test_a_reader_that_goes_on_stops_where_the_text_is_no_yaml(text: str) -> None:
+    told: list[Finding] = []
+    with pytest.raises(InvalidInput) as caught:
+        parse(text, "f", told=told)
+    first, second = caught.value.findings
+    assert (first.code, second.code[:4]) == ("YAML111", "YAML")
+    assert not told
