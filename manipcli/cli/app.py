@@ -131,18 +131,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return int(code or ExitCode.PASSED)
     except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (the last resort: one message and an exit code)
-        return _fail(error, as_json=_wants_json(words))
+        return _fail(error, format_=_wanted_format(words))
 
 
-def _fail(error: BaseException, *, as_json: bool) -> ExitCode:
-    """Tells an error: as text on stderr, or as the one JSON object on stdout."""
+def _fail(error: BaseException, *, format_: str) -> ExitCode:
+    """Tells an error: as text on stderr; or as the one JSON object, or SARIF, on stdout."""
     from manipcli.report import json, text
 
     code, findings = _classify(error)
     if os.environ.get("MANIPCLI_DEBUG"):
         console.talk("".join(traceback.format_exception(error)).rstrip())
     try:
-        if as_json and not (isinstance(error, OSError) and error.filename == console.STDOUT):
+        written = not (isinstance(error, OSError) and error.filename == console.STDOUT)
+        if format_ == "sarif" and written:
+            from manipcli.report import sarif
+
+            console.result(sarif.render(findings, ()))
+        elif format_ == "json" and written:
             known = error.known if isinstance(error, RecordingFailed) else {}
             console.result(json.render_errors(findings, "failed" if code is ExitCode.FAILED else "error", known=known))
         else:
@@ -184,6 +189,8 @@ def _without_jargon(message: str) -> str:
     return message.replace(": Value error, ", ": ", 1)
 
 
-def _wants_json(words: Sequence[str]) -> bool:
-    """Whether `--format json` stands in the command line: it holds for usage errors, too."""
-    return "--format=json" in words or any(pair == ("--format", "json") for pair in pairwise(words))
+def _wanted_format(words: Sequence[str]) -> str:
+    """What `--format` says in the command line: it holds for usage errors, too."""
+    formats = [second for first, second in pairwise(words) if first == "--format"]
+    formats += [word.removeprefix("--format=") for word in words if word.startswith("--format=")]
+    return next((name for name in ("json", "sarif") if name in formats), "text")

@@ -44,6 +44,7 @@ def check_urdf(
         bool, typer.Option("--fix", help="Mend what is safe to mend, in NAME.fixed.urdf beside the file.")
     ] = False,
     in_place: Annotated[bool, typer.Option("--in-place", help="With --fix: in the file itself.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="With --fix: replace NAME.fixed.urdf if it exists.")] = False,
     tree: Annotated[bool, typer.Option("--tree", help="Print the tree of links and joints.")] = False,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the robot.", show_default=False)
@@ -69,6 +70,8 @@ def check_urdf(
         raise InvalidInput([Finding("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
     if in_place and not fix:
         raise InvalidInput([Finding("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
+    if force and not fix:
+        raise InvalidInput([Finding("USE044", "--force lets --fix replace a file", hint="give --fix, too")])
     check_picture(picture)
     check_outputs(("--picture", picture), reads=(file,))
     codes = describe.wanted_codes(_words(select), _words(ignore))
@@ -85,7 +88,7 @@ def check_urdf(
 
     inspection = inspect(file)
     if fix:
-        inspection = _mended(inspection, inspect, in_place=in_place)
+        inspection = _mended(inspection, inspect, in_place=in_place, force=force)
     told = inspection.told(codes)
     grave = ("error", "warning") if strict else ("error",)
     passed = not any(finding.severity in grave for finding in told)
@@ -100,11 +103,13 @@ def check_urdf(
     return ExitCode.PASSED if passed else ExitCode.FAILED
 
 
-def _mended(inspection: Inspection, inspect: Callable[[Path], Inspection], *, in_place: bool) -> Inspection:
+def _mended(
+    inspection: Inspection, inspect: Callable[[Path], Inspection], *, in_place: bool, force: bool
+) -> Inspection:
     """What there is to say once the file is mended."""
     from manipcli.flow import describe
 
-    path, changes = describe.mend(inspection, in_place=in_place)
+    path, changes = describe.mend(inspection, in_place=in_place, force=force)
     for change in changes:
         console.talk(f"mended: {change}")
     console.talk(f"written: {path}" if changes else "nothing to mend: no file is written")

@@ -109,14 +109,18 @@ def _unknown(word: str) -> Finding:
     return Finding("USE046", f"no check has the code '{shorten(word)}'", hint=f"{hint}; `manipcli list checks`")
 
 
-def mend(inspection: Inspection, *, in_place: bool) -> tuple[Path, tuple[Change, ...]]:
+def mend(inspection: Inspection, *, in_place: bool, force: bool = False) -> tuple[Path, tuple[Change, ...]]:
     """Writes the mended file: `NAME.fixed.urdf` beside it, or the file itself; nothing where nothing is to mend.
+
+    Args:
+        in_place: the file itself.
+        force: replace another file that is there.
 
     Returns:
         The mended file, and what was changed.
 
     Raises:
-        InvalidInput: it is xacro, it could not be read, or it is not UTF-8.
+        InvalidInput: it is xacro, it could not be read, it is not UTF-8, or another file is in the way.
     """
     path, description = inspection.path, inspection.examination.description
     if description is None:
@@ -129,12 +133,19 @@ def mend(inspection: Inspection, *, in_place: bool) -> tuple[Path, tuple[Change,
     data, changes = mended(path, description)
     target = path if in_place else path.with_name(f"{path.name.removesuffix('.urdf')}.fixed.urdf")
     if changes:
+        if not (in_place or force) and target.exists() and not _same(target, data):
+            message = f"'{target}' is there already, and is not what would be written"
+            raise InvalidInput([Finding("USE084", message, hint="--force replaces it")])
         partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
         partial.write_bytes(data)
         if in_place:
             shutil.copymode(path, partial)
         partial.replace(target)
     return target, changes
+
+
+def _same(path: Path, data: bytes) -> bool:
+    return path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data
 
 
 def draw(inspection: Inspection, path: Path) -> tuple[str, ...]:

@@ -121,7 +121,7 @@ def render_json(
         {
             "verdict": "passed" if passed else "failed",
             "files": [file],
-            "findings": [{"severity": finding.severity, **finding_object(finding)} for finding in findings],
+            "findings": [finding_object(finding) for finding in findings],
             "left_out": dict(left_out),
             "summary": _summary_object(summary) if summary is not None else None,
             "tree": list(tree),

@@ -59,7 +59,7 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
         {
             "verdict": "failed" if failed else "passed",
             "files": list(files),
-            "findings": [{"severity": finding.severity, **finding_object(finding)} for finding in findings],
+            "findings": [finding_object(finding) for finding in findings],
         }
     )
 
@@ -147,6 +147,7 @@ def step_object(step: StepOutcome) -> dict[str, Json]:
 def finding_object(finding: Finding) -> dict[str, Json]:
     place = finding.place
     return {
+        "severity": finding.severity,
         "code": finding.code,
         "file": place.file if place is not None else None,
         "line": place.line if place is not None and place.line > 0 else None,

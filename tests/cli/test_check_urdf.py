@@ -130,6 +130,22 @@ class TestCheckUrdf:
         assert (folder / "bad.urdf").read_text() == BAD
         assert (folder / "bad.fixed.urdf").read_text() == BAD.replace('"0 0 2"', '"0 0 1"')
 
+    def test_fix_replaces_no_other_file_unless_told_to(self, folder: Path) -> None:
+        other = folder / "bad.fixed.urdf"
+        other.write_text("mine")
+        assert main(["check-urdf", "bad.urdf", "--fix"]) == 4
+        assert other.read_text() == "mine"
+        assert main(["check-urdf", "bad.urdf", "--fix", "--force"]) == 1
+        assert other.read_text() == BAD.replace('"0 0 2"', '"0 0 1"')
+        assert main(["check-urdf", "bad.urdf", "--fix"]) == 1  # it is what would be written
+
+    def test_an_absent_file_is_told_as_sarif_too(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["check-urdf", "absent.urdf", "--format", "sarif"]) == 4
+        told = capsys.readouterr()
+        (result,) = json.loads(told.out)["runs"][0]["results"]
+        assert result["level"] == "error" and result["ruleId"].startswith("USE")
+        assert told.err == ""
+
     def test_fix_in_place_replaces_the_file_and_good_files_stay(self, folder: Path) -> None:
         assert main(["check-urdf", "axis.urdf", "--fix", "--in-place", "--strict"]) == 0
         assert (folder / "axis.urdf").read_text() == GOOD

@@ -47,8 +47,11 @@ def test_run_judge_and_error_have_the_same_keys() -> None:
     ]
     assert len({tuple(one) for one in objects}) == 1
     assert objects[2]["errors"] == [
-        {"code": "TASK1", "file": "a.yaml", "line": 3, "column": 5, "message": "bad \x1b", "hint": "h"}
-    ]
+        {
+            "severity": "error", "code": "TASK1", "file": "a.yaml", "line": 3, "column": 5, "message": "bad \x1b",
+            "hint": "h",
+        }
+    ]  # fmt: skip
 
 
 def test_judging_a_log_says_what_the_run_said() -> None:
@@ -67,3 +70,9 @@ def test_of_a_file_as_a_whole_line_and_column_are_unknown() -> None:
     finding = Finding("USE101", "there is no such file", Place("a.yaml", 0, 0))
     (error,) = json.loads(render_errors([finding]))["errors"]
     assert (error["file"], error["line"], error["column"]) == ("a.yaml", None, None)
+
+
+def test_a_warning_among_the_errors_says_so() -> None:
+    findings = [Finding("A", "x"), Finding("B", "y", severity="warning"), Finding("C", "z", severity="note")]
+    told = json.loads(render_errors(findings))["errors"]
+    assert [(each["code"], each["severity"]) for each in told] == [("A", "error"), ("B", "warning"), ("C", "note")]
