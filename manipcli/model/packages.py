@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
 from manipcli.core.text import any_of, nearest
 from manipcli.model.located_xml import shown_path
+from manipcli.model.package_xml import package_name, packages_below
 
 LEVELS_ABOVE = 5
 """How many folders above a description are looked at for a folder of a package's name."""
@@ -38,13 +40,29 @@ class RemoteFile(NotFound):
     """An address that only a network could answer."""
 
 
-def own_root(description: Path) -> Path:
-    """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder."""
+def own_root(description: Path) -> Path | None:
+    """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder.
+
+    None where that is a folder of everything: see `_of_everything`.
+    """
     folder = Path(os.path.realpath(description)).parent
     for ancestor in (folder, *list(folder.parents)[:LEVELS_ABOVE]):
-        if (ancestor / "package.xml").is_file():
+        if (ancestor / "package.xml").is_file() and not _of_everything(ancestor):
             return ancestor
-    return folder.parent if folder.name in SUBFOLDERS and folder.parent != folder.parent.parent else folder
+    above = [folder.parent] if folder.name in SUBFOLDERS else []
+    return next((each for each in (*above, folder) if not _of_everything(each)), None)
+
+
+def _of_everything(folder: Path) -> bool:
+    """A folder that holds more than one robot: the home folder or one above it, `/`, or one like /tmp."""
+    if Path(os.path.realpath(Path.home())).is_relative_to(folder) or folder == folder.parent:
+        return True
+    try:
+        # Both: file systems without modes, as a mounted Windows disk, let everybody write everywhere.
+        both = stat.S_ISVTX | stat.S_IWOTH
+        return folder.stat().st_mode & both == both
+    except OSError:
+        return False
 
 
 class Packages:
@@ -69,6 +87,7 @@ class Packages:
         self._folder = Path(os.path.realpath(description)).parent if description is not None else None
         self._own = own_root(description) if description is not None else None
         self._found: dict[str, Path] = {}
+        self._below: dict[str, Path] | None = None
 
     def root(self, name: str) -> Path:
         """The folder of package `name`.
@@ -79,16 +98,13 @@ class Packages:
         if name in self._found:
             return self._found[name]
         searched: list[Path] = []
-        if name and name not in {".", ".."} and "/" not in name and "\\" not in name and "\0" not in name:
-            for candidate in self._candidates(name):
-                if candidate.is_dir():
-                    self._found[name] = candidate.resolve()
-                    return self._found[name]
-                searched.append(candidate)
-            installed = _installed_package(name)
-            if installed is not None:
-                self._found[name] = installed
-                return installed
+        if name and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name:
+            searched = self._candidates(name)
+            found = next((folder for folder in searched if folder.is_dir()), None)
+            found = found or self._crawled(name) or _installed_package(name)
+            if found is not None:
+                self._found[name] = found.resolve()
+                return self._found[name]
         places = ", ".join(shown_path(place) for place in searched)
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
@@ -105,11 +121,20 @@ class Packages:
             for ancestor in (self._folder, *list(self._folder.parents)[:LEVELS_ABOVE]):
                 if ancestor in (ancestor.parent, home):
                     break
-                places += [ancestor] if ancestor.name == name else []
+                places += [ancestor] if name in (ancestor.name, package_name(ancestor)) else []
                 places.append(ancestor / name)
         for variable, below in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
             places += [Path(part) / below / name for part in os.environ.get(variable, "").split(os.pathsep) if part]
         return list(dict.fromkeys(places))
+
+    def _crawled(self, name: str) -> Path | None:
+        """The package whose `package.xml` has this name, in a folder that is called otherwise."""
+        if self._below is None:
+            given = [Path(part) for part in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if part]
+            self._below = {}
+            for folder in (*self._package_path, *given):
+                self._below = packages_below(folder) | self._below
+        return self._below.get(name)
 
     def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
         """The regular file that `uri` names, links followed; relative paths start at the folder `relative_to`.
@@ -122,7 +147,7 @@ class Packages:
         if separator and scheme in {"package", "model"}:
             name, _, inside = unquote(rest).partition("/")
             root = self.root(name)
-            path, roots = root / inside, [root]
+            path, roots = root / inside.lstrip("/"), [root]
         elif separator and scheme == "file":
             path = Path("/" + unquote(rest.removeprefix("localhost")).lstrip("/"))
         elif separator:
@@ -132,7 +157,7 @@ class Packages:
             raise RemoteFile(f"'{uri[:20]}...': data in an address is not read", hint="write it into a file")
         else:
             path = Path(uri)
-        if "\0" in uri:
+        if "\0" in str(path):
             raise NotFound("a file name holds a NUL character")
         if not path.is_absolute():
             path = (relative_to or self._folder or Path.cwd()) / path
@@ -150,7 +175,9 @@ class Packages:
         if not inside(real):
             raise Outside(
                 f"'{uri}' lies outside of the description's folder and packages",
-                hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside",
+                hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
+                if self._own is not None or self._folder is None
+                else f"give the description a folder of its own: {shown_path(self._folder)} holds too much to be read",
             )
         if not real.is_file():
             raise NotFound(f"'{uri}' is not a regular file")

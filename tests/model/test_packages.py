@@ -55,11 +55,56 @@ def test_relative_and_file_uris_reach_the_description_s_own_tree(tree: Path) -> 
         "../meshes",
         "../meshes/none.stl",
         "a\0b",
+        "file:///a%00b.stl",
+        "package://arm/%00.stl",
+        "package://arm//../../secret.txt",
     ],
 )
 def test_what_lies_outside_or_is_no_regular_file_is_refused(tree: Path, uri: str) -> None:
     with pytest.raises(NotFound):
         Packages(tree / "arm" / "urdf" / "arm.urdf").resolve(uri)
+
+
+@pytest.mark.parametrize("folder", ["robot", "urdf", "description", "."])
+@pytest.mark.parametrize("mode", [0o755, 0o1777])
+def test_a_folder_of_everything_belongs_to_no_description(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, mode: int
+) -> None:
+    """The home folder, or one like /tmp, is not read because a description lies in it or below it."""
+    everything = tmp_path / "all"
+    (everything / ".config").mkdir(parents=True)
+    (everything / folder).mkdir(exist_ok=True)
+    for name in ("secret.yaml", ".config/token", "package.xml", f"{folder}/part.stl"):
+        (everything / name).write_text("<package><name>all</name></package>")
+    everything.chmod(mode)
+    monkeypatch.setenv("HOME", str(everything if mode == 0o755 else tmp_path / "other"))
+    packages = Packages(everything / folder / "r.urdf")
+    for uri in (str(everything / "secret.yaml"), str(everything / ".config/token"), "package://.config/token"):
+        with pytest.raises(NotFound):
+            packages.resolve(uri)
+    if folder == ".":
+        with pytest.raises(NotFound) as caught:
+            packages.resolve("part.stl")
+        assert "a folder of its own" in (caught.value.hint or "")
+    else:
+        assert packages.resolve("part.stl") == everything / folder / "part.stl"
+
+
+def test_a_package_is_known_by_its_package_xml_too(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tree / "arm" / "package.xml").write_text(
+        '<?xml version="1.0"?>\n<package>\n <name> arm_description </name></package>'
+    )
+    mesh = tree / "arm" / "meshes" / "a.stl"
+    assert Packages(tree / "arm" / "urdf" / "arm.urdf").resolve("package://arm_description//meshes/a.stl") == mesh
+    other = tmp_path / "elsewhere" / "r.urdf"
+    with pytest.raises(NotFound):
+        Packages(other).root("arm_description")
+    assert Packages(other, package_path=[tmp_path]).root("arm_description") == tree / "arm"
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    assert Packages(other).root("arm_description") == tree / "arm"
+    (tree / "COLCON_IGNORE").touch()
+    with pytest.raises(NotFound):
+        Packages(other).root("arm_description")
 
 
 def test_a_link_that_leaves_the_tree_is_refused_unless_allowed(tree: Path) -> None:
