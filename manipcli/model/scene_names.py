@@ -30,7 +30,12 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Finding]:
         if name in RESERVED or "/" in name or name in spec.scene:
             message = f"a frame cannot be called '{name}': the name is taken"
             yield Finding("TASK227", message, place(("frames", name)))
-        if frame.parent not in ("world", *bodies):
+        if frame.parent in spec.frames and frame.parent not in bodies:
+            message = f"'{frame.parent}' is a frame itself; the parent of a frame is `world` or a body"
+            its = spec.frames[frame.parent].parent
+            other = f"give it the parent '{its}', and its pose there" if its in ("world", *bodies) else None
+            yield Finding("TASK227", message, place(("frames", name, "parent")), hint=other)
+        elif frame.parent not in ("world", *bodies):
             yield _unknown("TASK227", frame.parent, ("world", *bodies), place(("frames", name, "parent")))
 
 

@@ -6,11 +6,13 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, TypeVar
 
-from pydantic import BeforeValidator
+from pydantic import AfterValidator, BeforeValidator
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.text import number_of
+from manipcli.core.units import readable
 from manipcli.plan.step import StepPlan
+from manipcli.spec.base import problem
 from manipcli.spec.quantity import Length
 
 C = TypeVar("C")
@@ -24,7 +26,18 @@ def _pair(value: object) -> object:
     return value if isinstance(value, list | tuple) else (value, value)
 
 
-Range = Annotated[tuple[Length, Length], BeforeValidator(_pair, json_schema_input_type=Length | tuple[Length, Length])]
+def _rising(bounds: tuple[float, float]) -> tuple[float, float]:
+    if bounds[0] > bounds[1]:
+        message = f"the least, {readable(bounds[0], 'm')}, is above the most, {readable(bounds[1], 'm')}"
+        raise problem("range", message, hint="write [least, most]")
+    return bounds
+
+
+Range = Annotated[
+    tuple[Length, Length],
+    BeforeValidator(_pair, json_schema_input_type=Length | tuple[Length, Length]),
+    AfterValidator(_rising),
+]
 """A range of lengths [least, most] [m], or one length."""
 
 

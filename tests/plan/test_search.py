@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import frozen
-from manipcli.plan.search import first_feasible, spread
+from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepPlan
 
 PLAN = StepPlan(motions=(), end=Situation(position=frozen([0.0]), bodies=()))
@@ -13,6 +14,14 @@ PLAN = StepPlan(motions=(), end=Situation(position=frozen([0.0]), bodies=()))
 def test_a_range_is_tried_from_its_middle() -> None:
     assert spread((0.1, 0.3)) == (0.2, 0.1, 0.3)
     assert spread((0.1, 0.1)) == (0.1,)
+
+
+def test_a_range_rises() -> None:
+    lengths: TypeAdapter[tuple[float, float]] = TypeAdapter(Range)
+    assert lengths.validate_python(["8 cm", "20 cm"]) == (0.08, 0.2)
+    assert lengths.validate_python("8 cm") == (0.08, 0.08)
+    with pytest.raises(ValidationError, match="the least, 200 mm, is above the most, 80 mm"):
+        lengths.validate_python(["20 cm", "8 cm"])
 
 
 def test_the_first_that_can_be_planned_is_taken_and_no_other_is_tried() -> None:

@@ -11,6 +11,8 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from manipcli.plan.steps import STEPS
+from manipcli.plan.steps.follow import FollowSpec
+from manipcli.plan.steps.move import MoveSpec
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
 Story = Any
@@ -225,6 +227,34 @@ def test_times_are_said_in_the_words_of_both_ros(bench: Make) -> None:
     for time in ({"secs": 1, "nsecs": 250000000}, {"sec": 1, "nanosec": 250000000}, 1.25, "1.25 s"):
         spec = follow({"positions": [0.1, 0.1], "velocities": [0, 0], "time_from_start": time})
         assert arm.plan("follow", spec).duration == pytest.approx(1.25)
+
+
+@pytest.mark.parametrize(
+    ("time", "told"),
+    [
+        ({"secs": 1, "sec": 2}, "'secs' is a word of ROS 1, 'sec' one of ROS 2"),
+        ({"secs": 1, "nanosec": 2}, "'secs' is a word of ROS 1, 'nanosec' one of ROS 2"),
+        ({"secs": 1, "nsecs": 1_000_000_000}, "less than 1000000000"),
+        ({"sec": 1, "nanosec": 3_000_000_000}, "less than 1000000000"),
+    ],
+)
+def test_a_time_that_has_two_meanings_is_refused(time: dict[str, int], told: str) -> None:
+    with pytest.raises(ValidationError, match=told):
+        FollowSpec.model_validate(follow({"positions": [0.1, 0.2], "time_from_start": time}))
+
+
+def test_what_is_written_out_with_all_defaults_reads_back() -> None:
+    point = {"positions": [0.1, 0.2], "time_from_start": {"sec": 1, "nanosec": 999_999_999}}
+    spec = FollowSpec.model_validate(follow(point))
+    assert FollowSpec.model_validate(spec.model_dump()).points[0].seconds == pytest.approx(2.0)
+    moved = MoveSpec(to="home")
+    assert MoveSpec.model_validate(moved.model_dump()) == moved
+
+
+@pytest.mark.parametrize("to", ["home", {"a": 0.1}])
+def test_what_is_said_of_joints_has_no_frame(to: str | dict[str, float]) -> None:
+    with pytest.raises(ValidationError, match="have no frame"):
+        MoveSpec(to=to, frame="desk")
 
 
 def test_a_time_between_two_ticks_ends_on_the_last_point(bench: Make) -> None:

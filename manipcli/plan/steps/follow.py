@@ -37,9 +37,18 @@ class DurationSpec(Model):
     """A duration in ROS 1's (`secs`, `nsecs`) or ROS 2's words (`sec`, `nanosec`)."""
 
     secs: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 1.")] = 0
-    nsecs: Annotated[int, Field(ge=0, description="Nanoseconds beside them, in ROS 1.")] = 0
+    nsecs: Annotated[int, Field(ge=0, lt=1_000_000_000, description="Nanoseconds beside them, in ROS 1.")] = 0
     sec: Annotated[int, Field(ge=0, description="Whole seconds, in ROS 2.")] = 0
-    nanosec: Annotated[int, Field(ge=0, description="Nanoseconds beside them, in ROS 2.")] = 0
+    nanosec: Annotated[int, Field(ge=0, lt=1_000_000_000, description="Nanoseconds beside them, in ROS 2.")] = 0
+
+    @model_validator(mode="after")
+    def _one_spelling(self) -> DurationSpec:
+        first, second = self.model_fields_set & {"secs", "nsecs"}, self.model_fields_set & {"sec", "nanosec"}
+        if any(getattr(self, word) for word in first) and any(getattr(self, word) for word in second):
+            word = min(second)
+            message = f"'{min(first)}' is a word of ROS 1, '{word}' one of ROS 2: say the time in one of them"
+            raise problem("conflict", message, at=(word,), key=True)
+        return self
 
     @property
     def seconds(self) -> float:

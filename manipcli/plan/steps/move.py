@@ -21,7 +21,7 @@ from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue
 from manipcli.spec.robot import PoseSpec
 
@@ -51,6 +51,9 @@ class MoveSpec(Model):
             raise ValueError("say either `to` (a named pose or joints) or `pose` (of the tool)")
         if self.to is not None and self.path == "linear":
             raise ValueError("`path: linear` needs a tool `pose`, not `to`")
+        if self.to is not None and self.frame != "world":
+            message = "a named pose and joint positions have no frame; it is that of a tool `pose`"
+            raise problem("conflict", message, at=("frame",), hint="leave it out", key=True)
         if self.to == {}:
             raise ValueError("`to` names no joint")
         return self
