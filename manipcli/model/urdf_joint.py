@@ -142,6 +142,10 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
         return JointLimits()
     lower = reader.number(limit, "lower", 0.0)
     upper = reader.number(limit, "upper", 0.0)
+    for side, other in (("lower", "upper"), ("upper", "lower")):
+        if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
+            message = f"joint '{name}': the {side} limit is missing; it counts as 0"
+            reader.report("URDF036", message, limit.place, hint=f'write {side}="0" if it is', severity="note")
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
     if kind == "continuous" or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)

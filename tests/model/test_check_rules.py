@@ -57,6 +57,11 @@ def control(inside: str, more: str = "") -> str:
     return one_joint(more=f'{more}<ros2_control name="c" type="system">{HARDWARE}{inside}</ros2_control>')
 
 
+def coloured(name: str, inside: str) -> str:
+    visual = f'<visual><geometry><box size="1 1 1"/></geometry><material {name}>{inside}</material></visual>'
+    return one_joint(tip=INERTIAL + CUBE + visual)
+
+
 def twice(inside: str, second: str = "d") -> str:
     """The same in a second component."""
     text = control(inside)
@@ -87,6 +92,9 @@ QUIET = {
     "mass on what is fixed to the link": one_joint(tip=CUBE, more=FIXED.format(INERTIAL)),
     "frame without a shape": one_joint(tip=INERTIAL + CUBE, more=FIXED.format("")),
     "collision on what is fixed to a link of mass": one_joint(tip=INERTIAL, more=FIXED.format(CUBE)),
+    "a gantry": one_joint(LIMIT.replace("-1", "-15").replace('upper="1"', 'upper="15"'), kind="prismatic"),
+    "a material with a name": coloured('name="m"', '<color rgba="1 0 0 1"/>'),
+    "a version": one_joint().replace('name="r"', 'name="r" version="1.0"'),
     "many turns": moved("", LIMIT.replace("-1", "-12").replace('upper="1"', 'upper="12"')),
     "soft limits inside": moved('<safety_controller soft_lower_limit="-1" soft_upper_limit="0.9" k_velocity="1"/>'),
     "soft limits unstated": moved('<safety_controller k_velocity="1"/>'),
@@ -148,6 +156,14 @@ LOUD = {
         "URDF107",
     ),
     "degrees": (moved("", LIMIT.replace("-1", "-180").replace('upper="1"', 'upper="180"')), "URDF109"),
+    "millimetres": (
+        one_joint(LIMIT.replace("-1", "-500").replace('upper="1"', 'upper="500"'), kind="prismatic"),
+        "URDF109",
+    ),
+    "a mimic that is fixed": (one_joint('<mimic joint="k"/>', kind="fixed"), "URDF104"),
+    "a texture that is not there": (coloured('name="m"', '<texture filename="none.png"/>'), "URDF033"),
+    "a material without a name": (coloured("", '<color rgba="1 0 0 1"/>'), "URDF063"),
+    "a version that is none": (one_joint().replace('name="r"', 'name="r" version="2.0"'), "URDF050"),
     "same role twice": (differential("joint1 joint1"), "URDF312"),
     "reduction of words": (
         one_joint(more=transmission().replace("<mechanicalReduction>1", "<mechanicalReduction>fifty")),
@@ -294,3 +310,15 @@ def test_a_joint_without_an_interface_is_told_that_of_its_actuator(tmp_path: Pat
         found = findings(tmp_path, one_joint(more=transmission('<joint name="j"/>' + motor)))
         (hint,) = [finding.hint for finding in found if finding.code == "URDF314"]
         assert hint == f"<hardwareInterface>hardware_interface/{meant}</hardwareInterface>"
+
+
+def test_what_is_taken_for_granted_or_refers_to_nothing_is_a_note(tmp_path: Path) -> None:
+    for text, code, said in (
+        (one_joint(LIMIT.replace(' lower="-1"', "")), "URDF036", "the lower limit is missing; it counts as 0"),
+        (one_joint(more='<gazebo reference="tipp"/>'), "URDF330", "'tipp', which is no link and no joint"),
+    ):
+        told = [found for found in findings(tmp_path, text) if said in found.message]
+        assert [(found.code, found.severity) for found in told] == [(code, "note")]
+    assert not any(
+        "no link" in found.message for found in findings(tmp_path, one_joint(more='<gazebo reference="j"/>'))
+    )

@@ -1,4 +1,4 @@
-"""Materials that are named and nowhere defined."""
+"""Materials without a definition or without a name."""
 
 from collections.abc import Iterator
 
@@ -13,6 +13,8 @@ def _find(subject: Subject) -> Iterator[Finding]:
     defined = {each.attributes.get("name", "") for each in materials if each.children}
     for material in materials:
         name = material.attributes.get("name", "")
+        if material.children and not name.strip():
+            yield Finding("URDF063", "a material has no name", material.place, 'name="..."', "warning")
         if material.children or name in defined:
             continue
         what = f"material '{name}' has no colour anywhere" if name else "a material has neither a name nor a colour"
@@ -25,7 +27,7 @@ CHECK = Check(
     name="undefined-material",
     tier="schema",
     severity="warning",
-    summary="A material is used and nowhere defined",
+    summary="A material is used and nowhere defined, or has no name",
     reason="The shape gets a colour that the program likes; some parsers refuse the file.",
     bad=(
         '<robot name="r">'
