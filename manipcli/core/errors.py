@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import ClassVar, Literal
+from typing import ClassVar, Final, Literal
 
 Severity = Literal["error", "warning", "note"]
+EXPANDED: Final = "expanded from"
+"""How the hint of a finding begins to say which call of a macro made what it is about."""
 
 
 class ExitCode(IntEnum):
@@ -26,14 +28,24 @@ class Place:
     """Where in a file the user wrote something. Lines and columns count from 1.
 
     Line 0: not in a file but in an argument, which `file` quotes (`--set scene.cup.mass=80`).
+
+    Attributes:
+        calls: where macros were called that made it, the outermost first; places are equal whoever called.
     """
 
     file: str
     line: int
     column: int
+    calls: tuple[Place, ...] = field(default=(), compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}" if self.line > 0 else self.file
+
+    @property
+    def expanded(self) -> str:
+        """`expanded from OUTERMOST, in it from INNERMOST`; "" for what no macro made."""
+        inner = f", in it from {self.calls[-1]}" if len(self.calls) > 1 else ""
+        return f"{EXPANDED} {self.calls[0]}{inner}" if self.calls else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +57,11 @@ class Finding:
     place: Place | None = None
     hint: str | None = None
     severity: Severity = "error"
+
+    def __post_init__(self) -> None:
+        told = self.place.expanded if self.place is not None else ""
+        if told and EXPANDED not in (self.hint or ""):
+            object.__setattr__(self, "hint", f"{self.hint}; {told}" if self.hint else told)
 
     def __str__(self) -> str:
         where = f"{self.place}: " if self.place is not None else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,6 +142,13 @@ class _CopyPlace:
 def place_of(node: DomElement) -> Place | None:
     place = node.getUserData(_PLACE)
     return place if isinstance(place, Place) else None
+
+
+def called_from(node: DomElement, calls: tuple[Place, ...]) -> None:
+    """Leaves with an element that macros made it, unless it is known already."""
+    place = place_of(node)
+    if place is not None and not place.calls:
+        node.setUserData(_PLACE, dataclasses.replace(place, calls=calls), _CopyPlace())
 
 
 def element_of(node: DomElement, _depth: int = 0) -> Element:

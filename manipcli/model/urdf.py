@@ -98,7 +98,9 @@ def _named(reader: Reader, root: Element, tag: str, places: dict[tuple[str, str]
         if name is None:
             continue
         if name in found:
-            message = f"{tag} '{name}' is written twice; the first is at {found[name].place}"
+            first = found[name].place
+            made = f" ({first.expanded})" if first is not None and first.expanded else ""
+            message = f"{tag} '{name}' is written twice; the first is at {first}{made}"
             reader.report("URDF005", message, element.place)
             continue
         found[name] = element

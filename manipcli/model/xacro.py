@@ -18,11 +18,11 @@ from typing import Any
 from xml.dom.minidom import Document
 from xml.dom.minidom import Element as DomElement
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import EXPANDED, Finding, InvalidInput, Place
 from manipcli.model.bounds import bounds
 from manipcli.model.expression import Evaluator
 from manipcli.model.expression_values import Beyond, Clock, Refused, math_symbols, python_symbols, size_of, too_large
-from manipcli.model.located_xml import invalid, place_of, read_document
+from manipcli.model.located_xml import called_from, invalid, place_of, read_document
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.xacro_names import UnknownArgument, names_of, near_macro, near_name
 from manipcli.model.xacro_yaml import Mistyped, load_yaml
@@ -171,7 +171,7 @@ class _Expansion:
             place = place_of(self._calls[-1])
         around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
         more = [f"{len(around) - 4} more"] if len(around) > 4 else []
-        hint = "expanded from " + ", from ".join([*around[:4], *more]) if around else None
+        hint = f"{EXPANDED} " + ", from ".join([*around[:4], *more]) if around else None
         if message.startswith("unknown macro") and self._calls:
             own_hint = near_macro(self._calls[-1].tagName, names_of(self._macros))
         elif "is not defined" in message:
@@ -212,7 +212,17 @@ class _Expansion:
         self._count()
         self._grow(_NODE * (len(node.childNodes) + len(node.attributes)))
         self._current = node if place_of(node) is not None else self._current
+        if self._calls:
+            self._mark(node)
         self._eval_all(node, macros, symbols)
+
+    def _mark(self, body: DomElement) -> None:
+        """Leaves with the elements of a macro's body who called it: first and last are enough to find the others."""
+        ends = self._calls[:1] + self._calls[1:][-1:]
+        calls = tuple(place for call in ends if (place := place_of(call)) is not None)
+        for child in body.childNodes:
+            if child.nodeType == child.ELEMENT_NODE:
+                called_from(child, calls)
 
     def _door_macro_call(self, node: DomElement, macros: object, symbols: object) -> bool:
         if not node.tagName.startswith("xacro:"):

@@ -13,6 +13,7 @@ import yaml
 from manipcli.core.errors import InvalidInput
 from manipcli.model import xacro
 from manipcli.model.description import Description, read_description
+from manipcli.model.examine import examine
 from manipcli.model.packages import Packages
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
@@ -81,6 +82,25 @@ def test_an_error_in_a_macro_names_its_place_and_the_call(tmp_path: Path) -> Non
     assert "missing" in finding.message
     assert "xacro:part" in (finding.hint or "")
     assert ":5:1" in (finding.hint or "")
+
+
+def test_a_finding_in_a_macro_names_the_outermost_and_the_innermost_call(tmp_path: Path) -> None:
+    path = tmp_path / "r.xacro"
+    path.write_text(
+        HEAD
+        + """<link name="a"/>
+<xacro:macro name="inner" params="name *b"><link name="${name}"><xacro:insert_block name="b"/></link></xacro:macro>
+<xacro:macro name="middle" params="name"><xacro:inner name="${name}"><visual/></xacro:inner></xacro:macro>
+<xacro:macro name="outer" params="name"><xacro:middle name="${name}"/></xacro:macro>
+<xacro:inner name="base"><visual/></xacro:inner>
+<xacro:outer name="base"/>
+</robot>""",
+        encoding="utf-8",
+    )
+    (finding,) = [each for each in examine(path, packages=Packages(path)).findings if "twice" in each.message]
+    assert (finding.hint or "").endswith(f"expanded from {path}:7:1, in it from {path}:4:42")
+    assert finding.place is not None
+    assert (finding.place.line, finding.place.column) == (3, 44)
 
 
 def test_packages_are_found_through_our_search(tmp_path: Path) -> None:
