@@ -284,9 +284,10 @@ class GripperController:
             elif time - moved[f] >= self._stall_time:
                 away = [abs(float(self._target[j]) - position[j]) for j in self._fingers[f]]
                 k = away.index(max(away))
-                self._stop(
-                    f, "stalled", f"stalled {away[k]:.3g} before the target of '{self.joints[self._fingers[f][k]]}'"
-                )
+                text = f"stalled {away[k]:.3g} before the target of '{self.joints[self._fingers[f][k]]}'"
+                if force is not None:
+                    text += f", where it felt {self._felt[f]:.3g} N of the {wanted:.3g} N asked"
+                self._stop(f, "stalled", text)
         if self._goal is not None and None not in self._stops:
             stops = tuple(stop for stop in self._stops if stop is not None)
             names = (self.joints[finger[0]] for finger in self._fingers)

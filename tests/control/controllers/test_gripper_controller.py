@@ -110,6 +110,19 @@ def test_a_finger_that_is_blocked_stalls_and_its_effort_is_clamped():
     assert "stalled" in handle.result.text
 
 
+def test_a_finger_that_cannot_press_as_hard_as_asked_says_what_it_felt():
+    """0.5 N m on a lever of 0.1 m are 5 N."""
+    controller, hand = make(max_effort=0.5), Hand([0.3, 9, 9, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1]), force=100.0))
+    hand.run(controller, 1.5)
+    assert handle.result.fingers == ("stalled", "reached")
+    stalled, reached = handle.result.text.split("; ")[:2]
+    felt, asked = stalled.rpartition(", where it felt ")[2].split(" N of the ")
+    assert float(felt) == pytest.approx(5.0, rel=0.02)
+    assert asked == "100 N asked"
+    assert "asked" not in reached
+
+
 def test_stall_takes_its_time():
     controller = make(stall_time=0.05)
     frozen = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
