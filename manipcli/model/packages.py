@@ -32,6 +32,10 @@ class NotFound(Exception):
         super().__init__(message)
 
 
+class Absent(NotFound):
+    """A file that is not there, where it could be read."""
+
+
 class Outside(NotFound):
     """A file that is there and must not be read: it lies outside of the folders that belong to the description."""
 
@@ -170,8 +174,10 @@ class Packages:
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            hint = _meant(path) if inside(Path(os.path.realpath(path))) else None
-            raise NotFound(f"'{uri}' is not found; searched {shown_path(path)}", hint=hint) from error
+            message = f"'{uri}' is not found; searched {shown_path(path)}"
+            if inside(Path(os.path.realpath(path))):
+                raise Absent(message, hint=_meant(path)) from error
+            raise NotFound(message) from error
         if not inside(real):
             raise Outside(
                 f"'{uri}' lies outside of the description's folder and packages",

@@ -23,7 +23,7 @@ from manipcli.model.bounds import bounds
 from manipcli.model.expression import Evaluator
 from manipcli.model.expression_values import Beyond, Clock, Refused, math_symbols, python_symbols, size_of, too_large
 from manipcli.model.located_xml import called_from, invalid, place_of, read_document
-from manipcli.model.packages import NotFound, Packages
+from manipcli.model.packages import Absent, NotFound, Packages
 from manipcli.model.xacro_names import UnknownArgument, names_of, near_macro, near_name
 from manipcli.model.xacro_yaml import Mistyped, load_yaml
 
@@ -34,6 +34,8 @@ _ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "I
 _MACRO_ARGUMENT = re.compile(
     r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
 )
+ALLOW_ENV = "MANIPCLI_ALLOW_ENV"
+"""Names the variables that descriptions may read, `A B`; every command that reads descriptions heeds it."""
 _NODE = 16
 """What an attribute, a text or an element counts besides its characters: they take memory when they are empty, too."""
 _DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
@@ -91,6 +93,7 @@ class _Expansion:
         self._calls: list[DomElement] = []
         self._expansions = 0
         self._near: str | None = None
+        self._optional = False
         self._macros: object = None
         self._known_arguments: set[str] = set()
         module = self._module
@@ -253,6 +256,8 @@ class _Expansion:
     def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
         self._current = tag
         found: list[str | None] = self._check(tag, required, optional)
+        if tag.tagName == "xacro:include":
+            self._optional = found[optional.index("optional") + len(required)] in ("true", "True", "1")
         if tag.tagName == "xacro:arg":
             self._known_arguments.add(str(found[0]))
         return found
@@ -274,6 +279,10 @@ class _Expansion:
         for name in names:
             try:
                 yield str(self._packages.resolve(name, relative_to=self._folder()))
+            except Absent as error:
+                if self._optional:
+                    continue
+                raise self._exception(error.message) from error
             except NotFound as error:
                 raise self._exception(error.message) from error
 
@@ -301,15 +310,18 @@ class _Expansion:
             return str(self._evaluate(rest, names))
         if command in {"env", "optenv"}:
             return self._environment(command, rest)
-        if command in {"command", "cwd", "anon"}:
+        if command == "cwd":
+            hint = "$(dirname) is the folder of this file; $(find NAME), of a package"
+            raise Refused("$(cwd): a description may not depend on the working folder", hint=hint)
+        if command in {"command", "anon"}:
             raise Refused(f"$({command} ...) is not allowed in a description; pass an argument ($(arg NAME)) instead")
         raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
 
     def _environment(self, command: str, rest: str) -> str:
         """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
         name, _, default = rest.partition(" ")
-        if name not in self._allow_env:
-            hint = f"allow it with --allow-env {name}, or take an argument, $(arg NAME), instead"
+        if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
+            hint = f"allow it: {ALLOW_ENV}={name} before any command, --allow-env {name} for check-urdf; or use $(arg NAME)"
             raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
         value = os.environ.get(name)
         if value is None and command == "env":

@@ -212,6 +212,29 @@ def test_the_expanded_document_has_a_bounded_size(tmp_path: Path, body: str, mon
     assert "characters=20000000" in (finding.hint or "")
 
 
+def test_an_optional_include_may_be_absent(tmp_path: Path) -> None:
+    link = '<link name="a"/>'
+    assert names(expand(tmp_path, '<xacro:include filename="none.xacro" optional="true"/>' + link)) == ["a"]
+    for optional in ("", ' optional="false"'):
+        assert "none.xacro" in str(refused(tmp_path, f'<xacro:include filename="none.xacro"{optional}/>' + link))
+    refused(tmp_path, '<xacro:include filename="/etc/none.xacro" optional="true"/>' + link)
+    (tmp_path / "part.xacro").write_text("<robot>")
+    refused(tmp_path, '<xacro:include filename="part.xacro" optional="true"/>' + link)
+
+
+def test_a_variable_is_read_when_the_user_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    body = '<link name="$(env SIDE)_$(optenv NONE x)"/>'
+    monkeypatch.setenv("SIDE", "left")
+    monkeypatch.delenv("NONE", raising=False)
+    assert "MANIPCLI_ALLOW_ENV=SIDE" in (refused(tmp_path, body).findings[0].hint or "")
+    monkeypatch.setenv("MANIPCLI_ALLOW_ENV", "SIDE,NONE")
+    assert names(expand(tmp_path, body)) == ["left_x"]
+
+
+def test_the_working_folder_is_refused_with_what_to_write_instead(tmp_path: Path) -> None:
+    assert "$(dirname)" in (refused(tmp_path, '<link name="$(cwd)"/>').findings[0].hint or "")
+
+
 def test_a_pipe_cannot_be_included(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.xacro")
     refused(tmp_path, '<xacro:include filename="pipe.xacro"/>')
