@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -234,24 +234,23 @@ def _syntax_hint(text: str) -> str:
     return "write a number, a space and a unit: '45 deg', '5 mm', '2 N m'"
 
 
-def to_si(text: str, *wanted: Dimension) -> float:
+def to_si(text: str, *wanted: Dimension, read: Callable[[str], Quantity] = parse_quantity) -> float:
     """The SI value of `text`, which must have one of the `wanted` dimensions.
 
     Raises:
-        UnitError: as `parse_quantity`; another dimension; or no unit where one is needed.
+        UnitError: as `read`; another dimension; or no unit where one is needed.
     """
     try:
-        quantity = parse_quantity(text)
+        quantity = read(text)
     except UnitError as error:
         raise UnitError(f"{error.cause}; expected {describe(*wanted)}", hint=error.hint) from None
     if quantity.dimension in wanted:
         return quantity.value
     if quantity.dimension == NUMBER and "%" not in text:
-        example = f"'{text.strip()} {wanted[0].symbol}'"
-        raise UnitError(
-            f"'{shorten(text)}' has no unit; expected {describe(*wanted)}",
-            hint=f"write {text.strip()} without quotes for SI, or {example}",
-        )
+        hint = f"write {text.strip()} without quotes for SI, or '{text.strip()} {wanted[0].symbol}'"
+        if _QUANTITY.fullmatch(text) is None:
+            hint = "give its numbers units"
+        raise UnitError(f"'{shorten(text)}' has no unit; expected {describe(*wanted)}", hint=hint)
     raise UnitError(f"'{shorten(text)}' is {quantity.dimension.name}; expected {describe(*wanted)}")
 
 

@@ -25,6 +25,7 @@ from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import bounds_of, children, unit_of
 from manipcli.spec.located import Area, Located
 from manipcli.spec.quantity import Unit
@@ -305,7 +306,7 @@ def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: tuple[str | int,
     if not isinstance(amount, str):
         return amount
     try:
-        return to_si(amount, *dimensions)
+        return to_si(amount, *dimensions, read=quantity_of)
     except UnitError as error:
         raise _Problem(error.cause, error.hint, loc) from None
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from manipcli.core.errors import Finding
-from manipcli.core.units import describe, parse_quantity
+from manipcli.core.units import describe
 from manipcli.model.robot import Group, Joint
 from manipcli.spec.base import Model
+from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import Held, children, unit_of
 from manipcli.spec.located import Source
 from manipcli.spec.tree import Node, Path, ScalarNode, SequenceNode, child, shown
@@ -42,7 +43,7 @@ class _Reading:
             known = [self._joints[name] for name in about if name in self._joints]
             if isinstance(value, float) and isinstance(node.value, str) and unit is not None and known:
                 wanted = [unit.dimensions[-1 if joint.type == "prismatic" else 0] for joint in known]
-                given = parse_quantity(node.value).dimension
+                given = quantity_of(node.value).dimension
                 if given not in wanted:
                     message = f"joint '{known[0].name}' is {known[0].type}: {shown(node)} is {given.name}; "
                     yield self._source.finding(207, path, f"{message}expected {describe(wanted[0])}")

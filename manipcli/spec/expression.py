@@ -7,7 +7,8 @@ The grammar, which has no names but parameters and can therefore run nothing:
     sign    = ("+" | "-")* value
     value   = number [unit] | "$" name | "(" sum ")"
 
-A unit belongs to the number before it: `6 rad/s / 2` is 3 rad/s. `$$` writes a dollar sign.
+A unit belongs to the number before it: `6 rad/s / 2` is 3 rad/s. `$$` writes a dollar sign. Where a quantity is wanted,
+arithmetic needs no parameter: `30 deg + 5 deg`.
 """
 
 from __future__ import annotations
@@ -45,11 +46,12 @@ Params = Mapping[str, Scalar]
 
 @dataclass(frozen=True, slots=True)
 class ExpressionError(Exception):
-    """An expression that has no value; `unknown`: because of a parameter's name."""
+    """An expression that has no value; `unknown`: because of a parameter's name; `uncut`: it is no expression."""
 
     cause: str
     hint: str | None = None
     unknown: bool = False
+    uncut: bool = False
 
 
 def is_expression(text: str) -> bool:
@@ -76,6 +78,29 @@ def evaluate(text: str, params: Params) -> Scalar:
     return format_quantity(value.value, value.dimension)
 
 
+def quantity_of(text: str) -> Quantity:
+    """A number with a unit, or what arithmetic with such gives: `30 deg + 5 deg`.
+
+    Raises:
+        UnitError: as `parse_quantity`; or the arithmetic has no value.
+    """
+    try:
+        return parse_quantity(text)
+    except UnitError as error:
+        plain = error
+    try:
+        parser = _Parser(text, {})
+        kinds = [kind for kind, _ in parser.tokens]
+        value = parser.whole() if kinds.count("quantity") > 1 and "name" not in kinds else None
+    except ExpressionError as error:
+        raise (plain if error.uncut else UnitError(error.cause, hint=error.hint)) from None
+    if value is None:
+        raise plain
+    if not math.isfinite(value.value):
+        raise UnitError(f"'{shorten(text)}' is too large to be a number")
+    return value
+
+
 class _Parser:
     """Recursive descent over one text."""
 
@@ -94,7 +119,7 @@ class _Parser:
             if match is None or match.lastgroup is None:
                 rest = shorten(self.text[position:].strip(), width=20)
                 hint = "write `$name`, or arithmetic: 2 * $tilt + 5 deg; `$$` is a plain dollar sign"
-                raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{rest}'", hint)
+                raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{rest}'", hint, uncut=True)
             tokens.append((match.lastgroup, match.group(match.lastgroup)))
             position = match.end()
         return tokens
@@ -164,7 +189,7 @@ class _Parser:
     def quantity(self, name: str) -> Quantity:
         value = self.params[name]
         if isinstance(value, str):
-            return parse_quantity(value)
+            return quantity_of(value)
         if value is None or isinstance(value, bool):
             raise ExpressionError(f"the parameter '${name}' is no number")
         return Quantity(float(value), NUMBER)

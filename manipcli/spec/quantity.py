@@ -15,6 +15,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from manipcli.core import units
 from manipcli.core.units import NUMBER_PATTERN, Dimension, UnitError, fitting_units, names_of, to_si
 from manipcli.spec.base import problem
+from manipcli.spec.expression import quantity_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Unit:
         """The SI value of a text; anything but a text, a number or truth value passes on to pydantic."""
         if isinstance(value, str):
             try:
-                return to_si(value, *self.dimensions)
+                return to_si(value, *self.dimensions, read=quantity_of)
             except UnitError as error:
                 raise problem("unit", error.cause, hint=error.hint) from None
         if value is None or isinstance(value, bool | list | tuple | dict):
@@ -53,7 +54,7 @@ class Unit:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
         json_schema = handler(schema)
         json_schema["type"] = ["number", "string"]
-        json_schema["pattern"] = rf"^\s*[-+]?\s*{NUMBER_PATTERN}\s*[A-Za-z°µ%]|\$"
+        json_schema["pattern"] = rf"^[-+(\s]*{NUMBER_PATTERN}\s*[-+*/A-Za-z°µ%]|\$"
         json_schema["description"] = self.expected
         return json_schema
 
