@@ -4,13 +4,15 @@ PATH is dotted. `robot.` and `controllers.` with something after the dot lead in
 (`controllers.arm_controller.gains.joint_1.p`, whatever form the file has: after ROS's own forms were rewritten);
 everything else is a path of the task. Items of a list go by their index from 0, steps also by their id
 (`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`). Keys that the user chose (bodies, joints, poses, parameters) must
-exist, unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`.
+exist, unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`; `null` leaves a key out that
+has a default.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import NoneType
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
@@ -47,7 +49,10 @@ def read_override(text: str) -> Override:
         hint = "write --set scene.cup.mass='80 g'"
         raise InvalidInput([Finding("TASK212", "an override is PATH=VALUE", place, hint=hint)])
     if not value_text.strip():
-        raise InvalidInput([Finding("TASK212", "the value is missing", place, hint="null unsets an optional value")])
+        hint = "null unsets a value that has a default"
+        raise InvalidInput(
+            [Finding("TASK212", "the value is missing", place, hint=hint)]
+        )
     try:
         value = parse(value_text, place.file)
     except InvalidInput as error:
@@ -118,8 +123,22 @@ def _set(node: Node, override: Override, done: Path, rest: tuple[str, ...], mode
         if further or done == ("params",):  # a new parameter would change nothing: nobody asks for it
             _may_be_added(node, override, done, part, model)
         entry = Entry(override.place, MappingNode({}, override.place))
+    if not further and _is_null(override.value) and _left_to_default(model, done, part):
+        return node.without(part)
     below = _set(entry.node, override, (*done, part), further, model)
     return node.with_entry(part, Entry(entry.key_place, below))
+
+
+def _is_null(value: Node) -> bool:
+    return isinstance(value, ScalarNode) and value.value is None
+
+
+def _left_to_default(model: type[Model], done: Path, part: str) -> bool:
+    """Whether the key may be left out, but not be nothing."""
+    known = [shape.keys_of([kind]).get(part) for kind in shape.at(model, done, {})]
+    fields = [field for field in known if field is not None]
+    kinds = [kind for field in fields for kind, _ in shape.alternatives(field.annotation)]
+    return any(not field.is_required() for field in fields) and NoneType not in kinds
 
 
 def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, model: type[Model]) -> None:

@@ -503,6 +503,43 @@ def test_what_is_no_expression_is_refused_at_its_place(expression: str) -> None:
     assert (finding.code, str(finding.place)) == ("TASK211", "t.yaml:10:31")
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("30 deg + 5 deg", 35.0),
+        ("2 * (30 deg - 5 deg)", 50.0),
+        ("90 deg / 1 s * 2 s", 180.0),
+        ("$sum", 50.0),
+        ("2 * $sum + 5 deg", 105.0),
+    ],
+)
+def test_arithmetic_needs_no_parameter(text: str, value: float) -> None:
+    params = "params: {sum: 30 deg + 20 deg, n: 2}"
+    spec = load(TASK.replace("params: {tilt: 120 deg, n: 2}", params).replace("$tilt", text)).spec
+    body = spec.steps[1].body
+    assert isinstance(body, Pour)
+    assert body.tilt == pytest.approx(value * 3.141592653589793 / 180, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "hint"),
+    [
+        ("30 deg + 5 mm", "cannot add an angle and a length; expected an angle", ""),
+        ("30 mm + 5 mm", "'30 mm + 5 mm' is a length; expected an angle", ""),
+        ("30 + 5", "'30 + 5' has no unit; expected an angle", "give its numbers units"),
+        ("30 deg / 0", "'30 deg / 0' divides by zero", ""),
+        ("30 deg + 5 dge", "unknown unit 'dge'", "did you mean 'deg'?"),
+        ("30 deg * 1e308 * 1e308", "too large", ""),
+        ("$$n + 5 deg", "'$n + 5 deg' is not a number with a unit", "write a number, a space and a unit"),
+    ],
+)
+def test_arithmetic_that_is_no_such_quantity_is_told(text: str, expected: str, hint: str) -> None:
+    finding = only(TASK.replace("$tilt", text))
+    assert (finding.code, str(finding.place)) == ("TASK207", "t.yaml:10:31")
+    assert expected in finding.message
+    assert hint in (finding.hint or "")
+
+
 def test_parameters_build_on_those_above_them_and_may_be_texts() -> None:
     text = TASK.replace("{tilt: 120 deg, n: 2}", "{half: 60 deg, tilt: 2 * $half, n: 2, what: cup}")
     spec = load(text.replace("pour: {object: cup", "pour: {object: $what")).spec
@@ -573,6 +610,8 @@ def test_a_doubled_dollar_is_a_dollar() -> None:
         ("params.tilt=1 rad", "steps.1.body.tilt", 1.0),
         ("steps.1.pour.tilt=$tilt * 0", "steps.1.body.tilt", 0.0),
         ("steps.1.timeout=null", "steps.1.timeout", None),
+        ("scene.desk.fixed=null", "scene.desk.fixed", False),
+        ("simulation.step=null", "simulation.step", 0.001),
         ("robot=other.yaml", "robot", "other.yaml"),
         ("robot.limits.j.velocity=3", "robot", "robot.yaml"),
         ("scene.new={sphere: {radius: 1 cm}}", "scene.new.sphere.radius", 0.01),
