@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import functools
+import re
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class TriangleMesh:
         faces: (m, 3) integers, each row the vertices of a triangle.
         parts: index of the first face of each part; an engine makes a hull of each part.
         format: what the file holds.
-        up_axis: what a Collada file states; it changes nothing here.
+        up_axis: what a Collada file states, "" where it states none; it changes nothing here.
         colours: which faces have which colour, as far as the file itself says.
     """
 
@@ -98,6 +99,25 @@ def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, st
         return "needs more memory than there is", None
 
 
+_BEGINS_AS_OBJ: Final = re.compile(rb"(\s*(#|o |g |s |mtllib |usemtl )[^\n]*\n)*\s*v\s+-?[0-9.]")
+_OTHERS: Final = {
+    b"\x89png": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"gltf": "a glTF file",
+    b"ply\n": "a PLY file",
+    b"ply\r": "a PLY file",
+    b"pk\x03\x04": "a ZIP archive",
+    b"\x1f\x8b": "a gzip archive",
+    b"iso-10303": "a STEP file",
+    b"%pdf": "a PDF document",
+}
+"""By the first bytes, in lower case."""
+
+
+def _other_format(head: bytes) -> str | None:
+    return next((name for begins, name in _OTHERS.items() if head.startswith(begins)), None)
+
+
 Parsed = tuple[Format, Array, Faces, tuple[int, ...], str, Colours]
 
 
@@ -113,6 +133,10 @@ def _parsed(data: bytes, suffix: str) -> Parsed:
         return ("stl-ascii", *read_ascii_stl(data), "Z_UP", ())
     if head.startswith((b"<?xml", b"<collada", b"<!doctype")):
         return ("collada", *read_collada(data))
+    if other := _other_format(head):
+        raise UnusableMesh(f"is {other}, as its first bytes say", hint=f"expected one of {', '.join(SUFFIXES)}")
+    if suffix == ".stl" and _BEGINS_AS_OBJ.match(data[:4096]):
+        raise UnusableMesh("looks like an OBJ file, by its first lines", hint="rename it to end with .obj")
     if suffix == ".stl":
         return ("stl", *read_binary_stl(data), "Z_UP", ())
     if suffix == ".dae":

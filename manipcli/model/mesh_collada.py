@@ -115,14 +115,16 @@ def _tree(data: bytes) -> _Node:
 
 
 def _asset(root: _Node) -> tuple[float, str]:
-    """Metres a unit, and the up axis."""
+    """Metres a unit, and the up axis; "" where none is stated."""
     asset = root.first("asset")
     unit = asset.first("unit") if asset is not None else None
     axis = asset.first("up_axis") if asset is not None else None
     (meter,) = _floats(unit.attributes.get("meter", "1") if unit is not None else "1", 1, "unit")
     if not 0.0 < meter < math.inf:
         raise UnusableMesh(f"states a unit of {meter:g} m")
-    name = axis.text.strip() if axis is not None else "Y_UP"
+    if axis is None:
+        return meter, ""
+    name = axis.text.strip()
     if name not in UP_AXES:
         raise UnusableMesh(f"states the up axis '{name[:20]}'; expected one of {', '.join(UP_AXES)}")
     return meter, name
@@ -226,7 +228,8 @@ class _Scene:
         offset = _whole(vertex.attributes.get("offset", "0"))
         faces = _faces(part, stride, offset)
         if len(faces) and (int(faces.min()) < 0 or int(faces.max()) >= len(points)):
-            raise UnusableMesh(f"is damaged: a triangle names vertex {int(faces.max())} of {len(points)}")
+            wrong = int(faces.min()) if int(faces.min()) < 0 else int(faces.max())
+            raise UnusableMesh(f"is damaged: a triangle names vertex {wrong} of {len(points)}")
         return points, faces
 
     def _points(self, source: _Node) -> Array:

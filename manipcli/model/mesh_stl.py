@@ -18,7 +18,7 @@ def is_binary_stl(data: bytes) -> bool:
 
 
 def is_ascii_stl(data: bytes) -> bool:
-    return data[:64].lstrip().startswith(b"solid") and b"facet" in data[:4096]
+    return data[:64].lstrip().lower().startswith(b"solid") and b"facet" in data[:4096].lower()
 
 
 def read_binary_stl(data: bytes) -> tuple[Array, Faces, tuple[int, ...]]:

@@ -93,6 +93,7 @@ QUIET = {
     "frame without a shape": one_joint(tip=INERTIAL + CUBE, more=FIXED.format("")),
     "collision on what is fixed to a link of mass": one_joint(tip=INERTIAL, more=FIXED.format(CUBE)),
     "a gantry": one_joint(LIMIT.replace("-1", "-15").replace('upper="1"', 'upper="15"'), kind="prismatic"),
+    "a material with an empty name": coloured('name=""', '<color rgba="1 0 0 1"/>'),
     "a material with a name": coloured('name="m"', '<color rgba="1 0 0 1"/>'),
     "a version": one_joint().replace('name="r"', 'name="r" version="1.0"'),
     "many turns": moved("", LIMIT.replace("-1", "-12").replace('upper="1"', 'upper="12"')),

@@ -94,9 +94,16 @@ def test_collada_places_its_nodes_and_counts_in_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(corners(write(tmp_path / "a.dae", text)), expected, atol=1e-15)
 
 
+def test_a_text_stl_in_capitals_is_one(tmp_path: Path) -> None:
+    mesh = read_mesh(write(tmp_path / "a.stl", ascii_tetrahedron().upper()))
+    np.testing.assert_allclose(mesh.vertices[mesh.faces], TETRAHEDRON)
+
+
 def test_collada_up_axis_is_told_and_turns_nothing(tmp_path: Path) -> None:
     mesh = read_mesh(write(tmp_path / "a.dae", collada_tetrahedron(up_axis="Y_UP")))
     assert mesh.up_axis == "Y_UP"
+    bare = read_mesh(write(tmp_path / "b.dae", DAE.replace(b"<up_axis>Z_UP</up_axis>", b"")))
+    assert bare.up_axis == ""
     np.testing.assert_allclose(mesh.vertices[mesh.faces], TETRAHEDRON)
 
 
@@ -126,6 +133,9 @@ DAMAGED = {
     "text.stl": (ascii_tetrahedron().replace(b"vertex 1.0 0.0 0.0", b"vertex 1.0 zero"), "is damaged"),
     "texts.stl": (ascii_tetrahedron().replace(b"vertex 1.0 0.0 0.0\n", b"", 1), "no whole number of triangles"),
     "textcut.stl": (ascii_tetrahedron()[:-40], "is cut off"),
+    "obj.stl": (b"# made by\no cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" * 4, "looks like an OBJ file"),
+    "picture.stl": (b"\x89PNG\r\n\x1a\n" + b"x" * 200, "is a PNG picture"),
+    "picture.obj": (b"\x89PNG\r\n\x1a\n" + b"x" * 200, "is a PNG picture"),
     "lfs.stl": (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1\n", "Git LFS pointer"),
     "page.stl": (b"<!DOCTYPE html><html>404</html>", "is a web page"),
     "far.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n", "triangle 1 names vertices 0, 1, 98 of 3"),
@@ -134,13 +144,14 @@ DAMAGED = {
     "word.obj": (b"v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "is damaged"),
     "garbage.obj": (b"\x00\x01garbage", "is no OBJ file"),
     "prose.obj": (b"nothing of it\n", "is no OBJ file"),
-    "a.ply": (b"ply\nformat ascii 1.0\n", "of a format that is not read ('.ply')"),
+    "a.ply": (b"ply\nformat ascii 1.0\n", "is a PLY file"),
+    "a.mesh": (b"x" * 90, "of a format that is not read"),
     "not.dae": (b"solid", "is no Collada file"),
     "other.dae": (b"<?xml version='1.0'?><svg/>", "its root element is <svg>"),
     "bare.dae": (b"<COLLADA/>", "holds no triangle"),
     "open.dae": (DAE[:-20], "is not well-formed XML"),
     "far.dae": (DAE.replace(b"<p>0 2", b"<p>0 77"), "names vertex 77 of 4"),
-    "minus.dae": (DAE.replace(b"<p>0 2", b"<p>0 -5"), "is damaged"),
+    "minus.dae": (DAE.replace(b"<p>0 2", b"<p>0 -5"), "names vertex -5 of 4"),
     "count.dae": (DAE.replace(b'triangles count="4"', b'triangles count="99999999"'), "is damaged: <triangles"),
     "numbers.dae": (DAE.replace(b'id="pa" count="12"', b'id="pa" count="99999999"'), "is damaged: <float_array>"),
     "stride.dae": (DAE.replace(b'count="4" stride="3"', b'count="400" stride="3"'), "400 positions of 3 numbers"),

@@ -13,7 +13,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
     defined = {each.attributes.get("name", "") for each in materials if each.children}
     for material in materials:
         name = material.attributes.get("name", "")
-        if material.children and not name.strip():
+        if material.children and "name" not in material.attributes:  # an empty one is common, and read
             yield Finding("URDF063", "a material has no name", material.place, 'name="..."', "warning")
         if material.children or name in defined:
             continue
