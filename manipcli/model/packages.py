@@ -179,12 +179,10 @@ class Packages:
                 raise Absent(message, hint=_meant(path)) from error
             raise NotFound(message) from error
         if not inside(real):
-            raise Outside(
-                f"'{uri}' lies outside of the description's folder and packages",
-                hint="move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
-                if self._own is not None or self._folder is None
-                else f"give the description a folder of its own: {shown_path(self._folder)} holds too much to be read",
-            )
+            hint = "move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
+            if self._own is None and self._folder is not None:
+                hint = f"{shown_path(self._folder)} holds too much: use a folder for the robot, or pass --allow-outside"
+            raise Outside(f"'{uri}' lies outside of the description's folder and packages", hint=hint)
         if not real.is_file():
             raise NotFound(f"'{uri}' is not a regular file")
         return real

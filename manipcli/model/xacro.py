@@ -321,7 +321,7 @@ class _Expansion:
         """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
         name, _, default = rest.partition(" ")
         if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
-            hint = f"allow it: {ALLOW_ENV}={name} before any command, --allow-env {name} for check-urdf; or use $(arg NAME)"
+            hint = f"allow it: {ALLOW_ENV}={name} before any command (check-urdf: --allow-env); or use $(arg NAME)"
             raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
         value = os.environ.get(name)
         if value is None and command == "env":

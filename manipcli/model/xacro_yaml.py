@@ -13,6 +13,7 @@ from manipcli.model.expression_values import Beyond, Clock, Refused, too_large
 from manipcli.model.located_xml import shown_path
 
 MAX_NUMBER: Final = 400
+_PLAIN: Final = "load_yaml reads plain data: numbers, text, lists and mappings"
 _NUMBERS: Final = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
 UNITS = {
@@ -59,7 +60,7 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
         def construct_object(self, node: yaml.Node, deep: bool = False) -> object:
             clock.look()
             if isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS and len(node.value) > MAX_NUMBER:
-                raise Refused(f"{path.name}: a number of {len(node.value)} characters is not allowed")
+                raise Refused(f"{path.name}: a number of {len(node.value)} characters is not allowed", hint=_PLAIN)
             return super().construct_object(node, deep)
 
         def flatten_mapping(self, node: yaml.MappingNode) -> None:
@@ -97,7 +98,7 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
     try:
         return yaml.load(data, Loader=Loader)
     except yaml.constructor.ConstructorError as error:
-        raise Refused(f"{path.name}: {error}") from error
+        raise Refused(f"{path.name}: {error}", hint=_PLAIN) from error
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         message = ", ".join(part for part in (error.context, error.problem) if part)
@@ -106,4 +107,4 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise Mistyped(f"not valid YAML: {error}", Place(shown_path(path), 1, 1)) from error
     except RecursionError as error:
-        raise Refused(f"{path.name}: nested too deep") from error
+        raise Refused(f"{path.name}: nested too deep", hint=_PLAIN) from error

@@ -85,7 +85,7 @@ def test_a_folder_of_everything_belongs_to_no_description(
     if folder == ".":
         with pytest.raises(NotFound) as caught:
             packages.resolve("part.stl")
-        assert "a folder of its own" in (caught.value.hint or "")
+        assert "a folder for the robot" in (caught.value.hint or "")
     else:
         assert packages.resolve("part.stl") == everything / folder / "part.stl"
 
