@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -16,17 +16,19 @@ if TYPE_CHECKING:
     from xml.dom.minidom import Element as DomElement
 
 _PLACE = "manipcli.place"
+_TEXT_PLACE = "manipcli.text_place"
 
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """An element of a description, after expansion. `place`: where the user wrote it."""
+    """An element of a description, after expansion. `place`: where the user wrote it; `text_place`: and its text."""
 
     tag: str
     attributes: Mapping[str, str]
     text: str
     children: tuple[Element, ...]
     place: Place | None
+    text_place: Place | None = None
 
     def all(self, tag: str) -> tuple[Element, ...]:
         return tuple(child for child in self.children if child.tag == tag)
@@ -101,6 +103,13 @@ def parse_document(data: bytes, file: str) -> Document:
             super().start_element_handler(name, attributes)
             self.curNode.setUserData(_PLACE, self.place(), copy_place)
 
+        def character_data_handler_cdata(self, data: str) -> None:
+            """Expat gathers text, and stands behind it when it hands it over."""
+            node = self.curNode
+            if node.nodeType == node.ELEMENT_NODE and node.getUserData(_TEXT_PLACE) is None and data.strip():
+                node.setUserData(_TEXT_PLACE, _begin(self.place(), data.lstrip(), lines), copy_place)
+            super().character_data_handler_cdata(data)
+
         def end_element_handler(self, name: str) -> None:
             self.depth -= 1
             super().end_element_handler(name)
@@ -110,6 +119,7 @@ def parse_document(data: bytes, file: str) -> Document:
 
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or data[:2] in (b"<\0", b"\0<"):
         raise invalid("URDF001", "the file is UTF-16, which few programs read", Place(file, 1, 1), "save it as UTF-8")
+    lines = data.split(b"\n")
     builder = Builder()
     try:
         document: Document = builder.parseString(data)
@@ -122,6 +132,16 @@ def parse_document(data: bytes, file: str) -> Document:
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
     return document
+
+
+def _begin(end: Place, text: str, lines: Sequence[bytes]) -> Place:
+    """Where a text that stops before `end` begins; an entity in its first line counts as the character that it is."""
+    first, newline, _ = text.partition("\n")
+    line = max(end.line - text.count("\n"), 1)
+    behind = end.column
+    if newline and line <= len(lines):
+        behind = len(lines[line - 1].removesuffix(b"\r").decode("utf-8", "replace")) + 1
+    return Place(end.file, line, max(behind - len(first), 1))
 
 
 def _open_element(node: Node | None) -> str | None:
@@ -139,8 +159,8 @@ class _CopyPlace:
         dst.setUserData(key, data, self)
 
 
-def place_of(node: DomElement) -> Place | None:
-    place = node.getUserData(_PLACE)
+def place_of(node: DomElement, key: str = _PLACE) -> Place | None:
+    place = node.getUserData(key)
     return place if isinstance(place, Place) else None
 
 
@@ -168,4 +188,11 @@ def element_of(node: DomElement, _depth: int = 0) -> Element:
         elif child.nodeType in (child.TEXT_NODE, child.CDATA_SECTION_NODE):
             text.append(child.data)
     attributes = {name: value for name, value in node.attributes.items() if not name.startswith("xmlns")}
-    return Element(node.tagName, attributes, "".join(text).strip(), tuple(children), place_of(node))
+    return Element(
+        tag=node.tagName,
+        attributes=attributes,
+        text="".join(text).strip(),
+        children=tuple(children),
+        place=place_of(node),
+        text_place=place_of(node, _TEXT_PLACE),
+    )

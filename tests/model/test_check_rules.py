@@ -323,3 +323,14 @@ def test_what_is_taken_for_granted_or_refers_to_nothing_is_a_note(tmp_path: Path
     assert not any(
         "no link" in found.message for found in findings(tmp_path, one_joint(more='<gazebo reference="j"/>'))
     )
+
+
+def test_stray_text_is_told_where_it_stands(tmp_path: Path) -> None:
+    text = (
+        '<robot name="r">\n  <link name="a">\n    <visual>  oh dear<geometry><box size="1 1 1"/></geometry></visual>\n'
+        "  </link>\n\n  <!-- a\n  comment -->\n  stray \u00e9 words\n  and more\n"
+        '  <link name="b"/>\n  <joint name="b" type="fixed"><parent link="a"/> b <child link="b"/></joint>\n</robot>\n'
+    )
+    for written in (text, text.replace("\n", "\r\n")):
+        found = [each for each in findings(tmp_path, written) if each.code == "URDF057"]
+        assert [(f.place.line, f.place.column) for f in found if f.place] == [(3, 15), (8, 3), (11, 51)]

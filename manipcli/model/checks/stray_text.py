@@ -13,7 +13,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
         if element.text:
             message = f"text in <{element.tag}>, which is ignored: '{shorten(' '.join(element.text[:200].split()))}'"
             hint = "URDF says everything with attributes; a remark is written <!-- like this -->"
-            yield Finding("URDF057", message, element.place, hint, "warning")
+            yield Finding("URDF057", message, element.text_place or element.place, hint, "warning")
 
 
 CHECK = Check(
