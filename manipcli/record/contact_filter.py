@@ -1,5 +1,5 @@
 """Which contacts are worth a message: a set of pairs that changed and a knock at once, other forces at most 100 times a
-simulated second."""
+simulated second, small changes at most ten times, so that a force that stays is known closely soon."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ FORCE_PERIOD = 0.01
 
 FORCE_SHARE, FORCE_LEAST = 0.1, 0.05
 """A force has changed when it differs by more than a tenth of what was recorded and by more than 0.05 N."""
+
+STEADY_PERIOD = 0.1
+"""[s] After so long smaller changes count, too:"""
+
+STEADY_SHARE, STEADY_LEAST = 0.01, 0.005
+"""more than a hundredth of what was recorded and more than 0.005 N."""
 
 KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
 """A force that grew by more than half of what was recorded and 1 N besides is written at once."""
@@ -44,11 +50,13 @@ class ContactFilter:
 
     def _differs(self, time: float, found: list[Contact]) -> bool:
         due = time - self._time >= FORCE_PERIOD - 1e-9
+        steady = time - self._time >= STEADY_PERIOD - 1e-9
+        share, least = (STEADY_SHARE, STEADY_LEAST) if steady else (FORCE_SHARE, FORCE_LEAST)
         for old, new in zip(self._last, found, strict=True):
             if new.distance < old.distance - DEPTH_LEAST:
                 return True
             if new.force - old.force > KNOCK_LEAST + KNOCK_SHARE * old.force:
                 return True
-            if due and abs(new.force - old.force) > FORCE_LEAST + FORCE_SHARE * old.force:
+            if due and abs(new.force - old.force) > least + share * old.force:
                 return True
         return False

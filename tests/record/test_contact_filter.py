@@ -1,0 +1,41 @@
+"""What is recorded of a force is never far from it for long."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manipcli.model.state import Contact
+from manipcli.record.contact_filter import ContactFilter
+
+TICK = 0.001
+
+
+def recorded(forces: list[float]) -> list[float]:
+    """What is known of a force at every tick from what was recorded until then."""
+    kept, known, filtered = 0.0, [], ContactFilter()
+    for k, force in enumerate(forces):
+        changed = filtered.changed(k * TICK, [Contact("cup", "desk", force, 0.0)])
+        if changed is not None:
+            kept = changed[0].force
+        known.append(kept)
+    return known
+
+
+@pytest.mark.parametrize("change", [0.05, -0.05, 0.09, -0.03])
+def test_a_force_that_changes_a_little_and_stays_is_known_within_a_tenth_of_a_second(change: float) -> None:
+    forces = [1.4715] * 40 + [1.4715 * (1 + change)] * 200
+    known = recorded(forces)
+    assert known[-1] == forces[-1]
+    late = [abs(a - b) for a, b in zip(known, forces, strict=True)][141:]
+    assert max(late) <= 0.01 * forces[-1] + 0.005
+
+
+def test_a_force_that_wanders_is_known_to_a_tenth_and_seldom_written() -> None:
+    generator = np.random.default_rng(1)
+    forces = (10.0 + np.cumsum(generator.normal(0.0, 0.01, 3000))).tolist()
+    known = recorded(forces)
+    # Beyond a tenth and 0.05 N it is written at the next hundredth of a second.
+    late = [abs(a - b) - 0.1 * a - 0.05 for a, b in zip(known, forces, strict=True)]
+    assert max(late) < 0.2
+    assert len(set(known)) <= 3000 / 10
