@@ -50,9 +50,7 @@ def read_override(text: str) -> Override:
         raise InvalidInput([Finding("TASK212", "an override is PATH=VALUE", place, hint=hint)])
     if not value_text.strip():
         hint = "null unsets a value that has a default"
-        raise InvalidInput(
-            [Finding("TASK212", "the value is missing", place, hint=hint)]
-        )
+        raise InvalidInput([Finding("TASK212", "the value is missing", place, hint=hint)])
     try:
         value = parse(value_text, place.file)
     except InvalidInput as error:
