@@ -169,7 +169,7 @@ class Packages:
 
     def _checked(self, path: Path, uri: str, roots: Sequence[Path]) -> Path:
         def inside(real: Path) -> bool:
-            return self._allow_outside or any(real.is_relative_to(root) for root in roots)
+            return self._allow_outside or any(real.is_relative_to(root) for root in roots) or self._beside(real)
 
         try:
             real = path.resolve(strict=True)
@@ -180,12 +180,16 @@ class Packages:
             raise NotFound(message) from error
         if not inside(real):
             hint = "move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
-            if self._own is None and self._folder is not None:
-                hint = f"{shown_path(self._folder)} holds too much: use a folder for the robot, or pass --allow-outside"
             raise Outside(f"'{uri}' lies outside of the description's folder and packages", hint=hint)
         if not real.is_file():
             raise NotFound(f"'{uri}' is not a regular file")
         return real
+
+    def _beside(self, real: Path) -> bool:
+        """In a folder of everything: whether a file lies below it without being hidden, as `~/meshes/arm.stl` does."""
+        if self._own is not None or self._folder is None or not real.is_relative_to(self._folder):
+            return False
+        return not any(part.startswith(".") for part in real.relative_to(self._folder).parts)
 
     def portable(self, path: Path) -> str:
         """A `package://NAME/...` URI of a resolved file that says nothing about this machine.
