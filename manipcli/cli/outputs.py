@@ -126,6 +126,20 @@ class Outputs:
         if self._report is not None:
             self._write(self._report, render_page(refused_page(task, verdict)).encode())
 
+    def of_invalid(self, findings: Sequence[Finding], file: Path) -> None:
+        """Writes what is asked for about a task that cannot be used: no page of an earlier run may stay for it."""
+        if not self.wanted:
+            return
+        from manipcli.flow.invalid import invalid_page, invalid_verdict
+        from manipcli.report.html import render_page
+        from manipcli.report.junit import render_junit
+
+        verdict = invalid_verdict(file, findings)
+        if self._junit is not None:
+            self._write(self._junit, render_junit(verdict, (), (), file=str(file)))
+        if self._report is not None:
+            self._write(self._report, render_page(invalid_page(verdict, findings)).encode())
+
     def _write(self, path: Path, data: bytes) -> None:
         from manipcli.core.whole_file import write_whole
 

@@ -11,7 +11,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed, TaskFile
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
-from manipcli.core.errors import ExitCode
+from manipcli.core.errors import ExitCode, InvalidInput
 
 
 def run(
@@ -56,18 +56,22 @@ def run(
 
         folders, words = tuple(package_path or ()), tuple(overrides or ())
         with StepProgress(verbose=verbose, quiet=quiet, interrupts=interrupts) as progress:
-            report = pipeline.run_task(
-                task,
-                overrides=words,
-                seed=seed,
-                sample=sample,
-                log=path,
-                force=force,
-                embed_meshes=embed_meshes,
-                package_path=folders,
-                allow_outside=allow_outside,
-                progress=progress,
-            )
+            try:
+                report = pipeline.run_task(
+                    task,
+                    overrides=words,
+                    seed=seed,
+                    sample=sample,
+                    log=path,
+                    force=force,
+                    embed_meshes=embed_meshes,
+                    package_path=folders,
+                    allow_outside=allow_outside,
+                    progress=progress,
+                )
+            except InvalidInput as invalid:
+                outputs.of_invalid(invalid.findings, task)
+                raise
         written = report.log
         if to_stdout:
             report = replace(report, log="stdout" if report.log is not None else None)

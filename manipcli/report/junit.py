@@ -50,7 +50,8 @@ def render_junit(
     suites = Element("testsuites", {"name": "manipcli", **totals})
     suite = SubElement(suites, "testsuite", {"name": _safe(verdict.task), **totals})
     properties = SubElement(suite, "properties")
-    told = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", str(verdict.seed)), ("log", log))
+    seed = str(verdict.seed) if verdict.engine else ""  # without an engine the task could not be read
+    told = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", seed), ("log", log))
     for name, value in told:
         if value:
             SubElement(properties, "property", {"name": name, "value": _safe(value)})
@@ -62,7 +63,9 @@ def render_junit(
 
 def _run(verdict: Verdict) -> Element:
     """Whether the run came to its end."""
-    case = _case(verdict, "run", "run", verdict.simulated_time, {})
+    place = verdict.errors[0].place if verdict.errors else None
+    where = {"file": _safe(place.file), "line": str(place.line)} if place is not None and place.line > 0 else {}
+    case = _case(verdict, "run", "run", verdict.simulated_time, where)
     if verdict.verdict == "error":
         lines = [str(finding) + (f"\nhint: {finding.hint}" if finding.hint else "") for finding in verdict.errors]
         _add(case, "error", verdict.text or "error", verdict.errors[0].code if verdict.errors else "error", lines)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Protocol
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -216,6 +217,30 @@ def test_a_task_that_was_refused_has_a_page_and_junit(run_cli: Callable[..., Ran
     assert "nothing: the task was refused" in shown.words
     assert any("marked" in (a.get("class") or "") for _, a in shown.found)
     assert "cannot be planned" in junit.read_text("utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "place"), [("task: [\n", "bad.yaml:2:1"), ("task: pour\nrobt: x.yaml\nsteps: []\n", "bad.yaml:2:1")]
+)
+def test_an_invalid_task_has_a_page_and_junit_in_place_of_those_of_an_earlier_run(
+    run_cli: Callable[..., Ran], tmp_path: Path, text: str, place: str
+) -> None:
+    (tmp_path / "bad.yaml").write_text(text)
+    for name in ("r.html", "j.xml"):
+        (tmp_path / name).write_text("passed")
+    ran = run_cli("run", "bad.yaml", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    assert ran.code == 4
+    shown = _Page((tmp_path / "r.html").read_text("utf-8"))
+    assert "✗ error" in shown.words and place in shown.words and text.split("\n")[0] in shown.words
+    ids = {a.get("id") for _, a in shown.found}
+    assert all((a.get("href") or "")[1:] in ids for tag, a in shown.found if tag == "a")
+    suite = ElementTree.parse(tmp_path / "j.xml").getroot()
+    assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
+    error = next(suite.iter("error"))
+    assert place in (error.text or "") and error.get("message", "").split(" (and")[0] in shown.words
+    (case,) = suite.iter("testcase")
+    assert f"bad.yaml:{case.get('line')}:" in ran.err and case.get("file") == "bad.yaml"
 
 
 @pytest.mark.slow
