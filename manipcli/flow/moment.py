@@ -16,6 +16,7 @@ from manipcli.model.located_xml import element_of, parse_document
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, TF
 from manipcli.record.contents import RECORD
+from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.inventory import Inventory, inventory
 from manipcli.record.messages import WORLD
 from manipcli.record.reading import open_recording
@@ -38,7 +39,12 @@ def moment(path: Path, time: float) -> Moment:
     if not 0.0 <= time <= found.duration + _ROUNDING:
         message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
         raise InvalidInput([Finding("LOG110", message)])
-    return _ours(path, time) if RECORD in found.metadata else _others(path, found, time)
+    if RECORD not in found.metadata:
+        return _others(path, found, time, why="manipcli did not write it")
+    try:
+        return _ours(path, time)
+    except Thinned:
+        return _others(path, found, time, why=f"{LEFT_OUT}; as it is")
 
 
 def _ours(path: Path, time: float) -> Moment:
@@ -127,11 +133,11 @@ def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, 
     return step, phase
 
 
-def _others(path: Path, found: Inventory, time: float) -> Moment:
+def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
     start = found.start or 0.0
     taken = snapshot(path, found, start + time)
     missing = [f"there is no {topic}" for topic in COMMON if topic not in {t.name for t in found.topics if t.messages}]
-    missing += ["manipcli did not write it: it tells of no steps, references and contacts", *taken.unread]
+    missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
     units = _units(taken.urdf.encode()) if taken.urdf else {}
     newest = [sample.time for sample in taken.joints.values()] + [sample.time for sample in taken.frames.values()]
     return Moment(

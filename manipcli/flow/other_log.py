@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -156,15 +157,20 @@ class _Log:
             samples.rows.append(row)
 
 
-def open_other(path: Path, *, rate: float, package_path: Sequence[Path] = (), allow_outside: bool = False) -> Playback:
-    """A log of another program, as it is shown; see `open_playback`.
+FOREIGN: Final = "manipcli did not write this log"
+
+
+def open_other(
+    path: Path, *, rate: float, why: str = FOREIGN, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> Playback:
+    """A log of another program, as it is shown; see `open_playback`. `why` it has to be taken for one.
 
     Raises:
         InvalidInput: it is no MCAP file, damaged, or holds neither joints nor frames that move.
     """
     topics = open_topics(path)
     log = _Log(topics)
-    notes = ["manipcli did not write this log: it has no steps, no contacts, no references and no verdict"]
+    notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
     notes += [f"it has no {name} ({TYPES[name]})" for name in log.lacks]
     if not np.isfinite(log.start):
         message = f"{path.name}: nothing to show: it has neither {channels.JOINT_STATES} nor {channels.TF}"

@@ -16,6 +16,7 @@ from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.other_log import is_own, open_other
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.record.channels import TF
+from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
@@ -36,8 +37,17 @@ def open_playback(
     Raises:
         InvalidInput: the file is no log, is damaged, or has nothing to show.
     """
-    if not is_own(path):
-        return open_other(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
+    if is_own(path):
+        try:
+            return _open_own(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
+        except Thinned:
+            return open_other(
+                path, rate=rate, why=f"{LEFT_OUT}; as it is", package_path=package_path, allow_outside=allow_outside
+            )
+    return open_other(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
+
+
+def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_outside: bool) -> Playback:
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
     if not len(samples.times):

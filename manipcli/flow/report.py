@@ -61,7 +61,7 @@ def log_page(
     )
     verdict = playback.verdict
     assert verdict is not None, "the log is one of ours"
-    places = log_places(recording, path)
+    places = log_places(recording, path, verdict.steps)
     causes = _causes(verdict, places, end=playback.end)
     worst = causes[0].at if causes else None
     with Shots(playback, size=PICTURE, captions=False) as shots:
@@ -110,15 +110,22 @@ def refused_page(task: Task, verdict: Verdict) -> RunPage:
     )
 
 
-def log_places(recording: Recording, path: Path) -> Places:
-    """Where the log says that steps and expectations were written, and their lines in the resolved task."""
+def log_places(recording: Recording, path: Path, outcomes: Sequence[StepOutcome]) -> Places:
+    """Where the log says that steps and expectations were written, and their lines in the resolved task.
+
+    The steps are those of `outcomes`: a log whose plan is lost tells of those alone that began.
+    """
     task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
     known, judged = _known_places(recording)
 
     def written(place: str, *key: str | int) -> Written:
         return Written(place.rpartition(":")[0], TASK, task.place(*key).line)
 
-    steps = tuple(written(known.get(str(step.id), ""), "steps", k) for k, step in enumerate(task.spec.steps))
+    numbers = {str(step.id): k for k, step in enumerate(task.spec.steps)}
+    steps = tuple(
+        written(known.get(one.id, ""), "steps", numbers[one.id]) if one.id in numbers else Written("")
+        for one in outcomes
+    )
     keys = task.spec.judged_at
     return steps, tuple(written(judged[k] if len(judged) == len(keys) else "", *key) for k, key in enumerate(keys))
 

@@ -19,7 +19,7 @@ class RecordingRefused(InvalidInput):
 
 
 class RecordingFailed(ManipcliError):
-    """The disk refused more. What was written until `time` [s] stays readable in the partial file.
+    """The disk refused more, for `cause`. What was written until `time` [s] stays readable in the partial file.
 
     `known`: of the run, by the keys of a report, where a run is what was recorded.
     """
@@ -29,11 +29,22 @@ class RecordingFailed(ManipcliError):
 
     def __init__(self, partial: Path, cause: str, *, time: float) -> None:
         self.partial = partial
+        self.cause = cause
         self.time = time
         self.known: Mapping[str, str | int] = {}
         super().__init__(
             f"the recording stopped after t = {time:.3f} s: {cause}; what was recorded until then is in {partial.name}"
         )
+
+
+class CopyFailed(ManipcliError):
+    """The disk refused a clean copy of a log. Nothing is left of the copy, and the log is as it was."""
+
+    exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
+    code: ClassVar[str] = "LOG202"
+
+    def __init__(self, output: Path, cause: str, *, source: Path) -> None:
+        super().__init__(f"cannot write {output}: {cause}; nothing of it is left, and {source} is as it was")
 
 
 PARTIAL = ".partial"
@@ -54,3 +65,17 @@ class BadRecording(InvalidInput):
         if hint is None and not path.exists() and left.is_file():
             hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
+
+
+LEFT_OUT = "messages of joints, bodies or controllers are missing: another program left them out"
+
+
+class Thinned(BadRecording):
+    """A recording of which another program left messages out: it can be read like a log of any program, no closer."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            path,
+            LEFT_OUT,
+            hint="manipcli replay, at and plot show what there is; all else needs the log as it was recorded",
+        )

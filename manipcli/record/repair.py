@@ -14,7 +14,7 @@ from manipcli.record.block import ChunkContent
 from manipcli.record.columns import PAYLOAD, Int, Places
 from manipcli.record.container import LIBRARY, Container
 from manipcli.record.contents import REPAIR
-from manipcli.record.faults import PARTIAL, BadRecording, RecordingRefused
+from manipcli.record.faults import PARTIAL, BadRecording, CopyFailed, RecordingFailed, RecordingRefused
 from manipcli.record.salvage import Damage, OpenChunk, Salvage
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def repair(path: Path, output: Path, *, overwrite: bool = False) -> Repaired:
     Raises:
         BadRecording: the file is no MCAP file, is being written, or holds nothing that could be kept.
         RecordingRefused: nothing can or may be written there.
-        RecordingFailed: the disk refused; nothing is left of the new file.
+        CopyFailed: the disk refused; nothing is left of the new file.
     """
     _refuse_living(path)
     if output.exists() and path.exists() and output.samefile(path):
@@ -102,6 +102,8 @@ def repair(path: Path, output: Path, *, overwrite: bool = False) -> Repaired:
             first = next(pieces, None)
         repaired = copy.finished(path, output)
         container.finish()
+    except RecordingFailed as failure:
+        raise CopyFailed(output, failure.cause, source=path) from failure
     finally:
         if not container.closed or container.partial.exists():
             container.close()

@@ -26,7 +26,7 @@ from manipcli.record.columns import (
 )
 from manipcli.record.contents import Contents
 from manipcli.record.differences import body_velocities
-from manipcli.record.faults import BadRecording
+from manipcli.record.faults import BadRecording, Thinned
 from manipcli.record.messages import WORLD
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
 from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, records_at
@@ -78,7 +78,7 @@ class FileSpans:
         except OSError as error:
             raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
         if reader.waiting and not self.cut:
-            raise BadRecording(self.path, "joints, bodies and controllers are not recorded at the same times")
+            raise Thinned(self.path)
         if empty:
             yield reader.span(0)
 
@@ -92,7 +92,14 @@ class FileSpans:
             reader.add(data, walked(data)[0] if found is None else found)
             return reader.span(reader.ready) if reader.ready else None
 
-        return guarded(self.path, chunk, read)
+        try:
+            return guarded(self.path, chunk, read)
+        except _Apart as error:
+            raise Thinned(self.path) from error
+
+
+class _Apart(Exception):
+    """Joints, bodies and controllers were not recorded at the same times."""
 
 
 class _SpanReader:
@@ -156,7 +163,7 @@ class _SpanReader:
         taken = [self._columns[controller.state_topic].take(ticks) for controller in self._controllers]
         for times in (body_ns, *(times for times, _ in taken)):
             if not np.array_equal(ns, times):
-                raise CdrError("joints, bodies and controllers are not recorded at the same times")
+                raise _Apart
         time = _settled(ns / 1e9)
         bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
         zeros = np.zeros_like(bodies[..., :3])

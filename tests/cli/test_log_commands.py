@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -185,6 +187,20 @@ def test_the_log_to_stdout_is_the_log_and_the_report_goes_to_stderr(
     assert "wave passed" in written.err.decode()
     assert main(["run", str(task), "--log", "-", "--format", "json"]) == 4
     assert b"both want stdout" in capfdbinary.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_log_whose_reader_goes_away_is_lost(task: Path) -> None:
+    words = [sys.executable, "-m", "manipcli", "run", str(task), "--log", "-", "--quiet"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout is not None and run.stderr is not None
+        assert len(run.stdout.read(1000)) == 1000
+        run.stdout.close()
+        told = run.stderr.read().decode()
+        assert run.wait(60) == 3
+    assert told.rstrip().endswith(
+        "error[LOG201]: standard output: the log is lost, its reader went away before the end"
+    )
 
 
 def test_a_log_with_its_meshes_holds_every_file(task: Path, tmp_path: Path, log: Path) -> None:

@@ -17,7 +17,7 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, IndexType, Writer
 
 from manipcli.record import recorder as recorder_module
-from manipcli.record.faults import BadRecording, RecordingFailed, RecordingRefused
+from manipcli.record.faults import BadRecording, CopyFailed, RecordingRefused
 from manipcli.record.inventory import inventory
 from manipcli.record.reading import open_recording, read_recording
 from manipcli.record.repair import default_output, repair
@@ -312,7 +312,9 @@ def test_a_full_disk_leaves_no_half_file(small: Path, tmp_path: Path, monkeypatc
             patch.setattr(os, "write", write)
             try:
                 repair(small, tmp_path / "good.mcap")
-            except RecordingFailed:
+            except CopyFailed as failure:
+                told = f"cannot write {tmp_path}/good.mcap: No space left on device; nothing of it is left"
+                assert told in str(failure)
                 assert [path.name for path in tmp_path.iterdir()] == ["small.mcap"]
             else:
                 break

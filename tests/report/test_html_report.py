@@ -290,6 +290,27 @@ def test_what_a_killed_run_left_has_a_page_that_says_so(
     assert "<error" in (tmp_path / "j.xml").read_text("utf-8")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", [b"", b'{"steps": [{"id": "pick_1", "ve', b'{"steps": [{"id": 1}]}', b"[]"])
+def test_a_log_whose_plan_is_spoilt_has_a_page_and_junit_of_the_steps_that_began(
+    run_cli: Callable[..., Ran], failed: Path, tmp_path: Path, rewrite_log: Callable[..., Path], plan: bytes
+) -> None:
+    rewrite_log(
+        failed / "run.mcap",
+        tmp_path / "run.mcap",
+        attachment=lambda name, data: plan if name == "plan.json" else data,
+    )
+    words = ["--report", "j.html", "--junit", "j.xml", "--package-path", ROOT / "robots", "--format", "json"]
+    ran = run_cli("judge", "run.mcap", *words, cwd=tmp_path)
+    assert ran.code == 1, ran.err
+    begun = [step["id"] for step in json.loads(ran.out)["steps"]]
+    whole = (failed / "r.html").read_text("utf-8")
+    shown = _Page((tmp_path / "j.html").read_text("utf-8"))
+    assert begun and all(one in shown.words and one in whole for one in begun)
+    cases = [one.get("name") for one in ElementTree.parse(tmp_path / "j.xml").getroot().iter("testcase")]
+    assert cases[1 : 1 + len(begun)] == begun
+
+
 def test_attempts_and_what_may_fail_are_told() -> None:
     page = _page()
     attempt = Attempt("failed", 0.0, 1.0)

@@ -1,0 +1,53 @@
+"""A log of which another program left messages out: what is left is shown, and what needs the rest says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from manipcli.flow.moment import moment
+from manipcli.flow.replay import open_playback
+from manipcli.pipeline import judge_log, run_task
+from manipcli.record.faults import Thinned
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("log")
+    task = folder / "still.yaml"
+    task.write_text(
+        f"task: still\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\n"
+        f"controllers: {ROOT}/controllers/arm7_hand3.yaml\nstart: home\nsteps: [{{wait: 0.2 s}}]\n"
+    )
+    run_task(task, log=folder / "still.mcap", force=True)
+    return folder / "still.mcap"
+
+
+@pytest.mark.parametrize("topic", ["/joint_states", "/tf", "/arm_controller/controller_state"])
+@pytest.mark.parametrize("every", [0, 10])
+def test_what_another_program_left_is_shown(
+    log: Path, rewrite_log: Any, tmp_path: Path, topic: str, every: int
+) -> None:
+    """`every`: which of the messages of the topic stay; 0: none."""
+    count = 0
+
+    def message(name: str, one: Any) -> bytes | None:
+        nonlocal count
+        if name != topic:
+            return bytes(one.data)
+        count += 1
+        return bytes(one.data) if every and count % every == 0 else None
+
+    thinned = tmp_path / "thinned.mcap"
+    rewrite_log(log, thinned, message=message)
+    with pytest.raises(Thinned, match="left them out"):
+        judge_log(thinned)
+    shown = open_playback(thinned)
+    assert shown.verdict is None
+    assert any("left them out" in note for note in shown.notes)
+    assert shown.times[-1] > 0.15
+    assert any("left them out" in one for one in moment(thinned, 0.1).missing)
