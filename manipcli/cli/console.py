@@ -2,7 +2,8 @@
 
 Text is made safe before it reaches a terminal (control characters escaped, what the encoding lacks written as `\\x..`),
 and coloured only on a terminal that wants it; colour never says what the words do not. A reader that goes away
-(`manipcli list | head`) ends nothing: the exit code stays that of the command.
+(`manipcli list | head`) ends nothing: the exit code stays that of the command. Only a file that goes to stdout must get
+there whole.
 """
 
 from __future__ import annotations
@@ -63,11 +64,15 @@ def result_is_terminal() -> bool:
 
 
 def result_bytes(path: Path) -> None:
-    """A file that the command was asked for, to stdout as it is."""
+    """A file that the command was asked for, to stdout as it is.
+
+    Raises:
+        OSError: it did not get there whole, also where the reader went away.
+    """
     stream = sys.stdout
     if stream is None or stream.closed:
         return
-    with path.open("rb") as file, _through(stream):
+    with path.open("rb") as file, _through(stream, whole=True):
         shutil.copyfileobj(file, stream.buffer)
 
 
@@ -126,17 +131,19 @@ def _write(stream: TextIO | None, text: str) -> None:
 
 
 @contextmanager
-def _through(stream: TextIO) -> Iterator[None]:
-    """What is written in the block goes through to the end: a full disk or a closed pipe is met here, not at exit."""
+def _through(stream: TextIO, *, whole: bool = False) -> Iterator[None]:
+    """What is written in the block goes through to the end: a full disk or a closed pipe is met here, not at exit.
+
+    `whole`: a reader that went away before is an error.
+    """
     try:
         yield
         stream.flush()
-    except BrokenPipeError:
-        _abandon(stream)
     except OSError as error:
         error.filename = STDOUT if stream is sys.stdout else "standard error"
         _abandon(stream)
-        raise
+        if whole or not isinstance(error, BrokenPipeError):
+            raise
 
 
 def _abandon(stream: TextIO) -> None:

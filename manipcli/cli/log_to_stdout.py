@@ -8,7 +8,16 @@ from pathlib import Path
 
 from manipcli.cli import console
 from manipcli.cli.options import OutputFormat
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Finding, InvalidInput, ManipcliError
+
+
+class LogCut(ManipcliError):
+    """Whoever read the log went away before its end."""
+
+    code = "LOG201"
+
+    def __init__(self) -> None:
+        super().__init__("standard output: the log is lost, its reader went away before the end")
 
 
 def refuse_stdout(format_: OutputFormat) -> None:
@@ -29,6 +38,10 @@ def stdout_or(log: Path | None) -> Iterator[Path | None]:
     """Where a run may write its log: `log` itself, or for `-` a file that goes to stdout at the end, however that is.
 
     The log is judged from its file before it is finished, so a pipe cannot take its place.
+
+    Raises:
+        LogCut: it did not get there whole. Typer would take the error of the pipe for an end without a word.
+        OSError: the disk is full.
     """
     if log is None or str(log) != "-":
         yield log
@@ -43,5 +56,8 @@ def stdout_or(log: Path | None) -> Iterator[Path | None]:
             # Finished or not: of a run that broke off, what there is.
             for written in (path, path.with_name(f"{path.name}.partial")):
                 if written.exists():
-                    console.result_bytes(written)
+                    try:
+                        console.result_bytes(written)
+                    except BrokenPipeError:
+                        raise LogCut from None
                     break
