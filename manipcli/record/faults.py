@@ -44,7 +44,7 @@ class CopyFailed(ManipcliError):
     code: ClassVar[str] = "LOG202"
 
     def __init__(self, output: Path, cause: str, *, source: Path) -> None:
-        super().__init__(f"cannot write {output}: {cause}; nothing of it is left, and {source} is as it was")
+        super().__init__(f"cannot write {output}: {cause}; nothing of the copy is left, and {source} is as it was")
 
 
 PARTIAL = ".partial"

@@ -313,7 +313,7 @@ def test_a_full_disk_leaves_no_half_file(small: Path, tmp_path: Path, monkeypatc
             try:
                 repair(small, tmp_path / "good.mcap")
             except CopyFailed as failure:
-                told = f"cannot write {tmp_path}/good.mcap: No space left on device; nothing of it is left"
+                told = f"cannot write {tmp_path}/good.mcap: No space left on device; nothing of the copy is left"
                 assert told in str(failure)
                 assert [path.name for path in tmp_path.iterdir()] == ["small.mcap"]
             else:
