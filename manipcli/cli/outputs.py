@@ -108,7 +108,10 @@ class Outputs:
         from manipcli.report.junit import render_junit
 
         if self._junit is not None:
-            places = file_places(task, overrides) if task is not None else log_places(open_recording(log), log)
+            if task is not None:
+                places = file_places(task, overrides)
+            else:
+                places = log_places(open_recording(log), log, verdict.steps)
             file = str(task) if task is not None else ""
             self._write(self._junit, render_junit(verdict, *places, log=log.name, file=file))
         if self._report is not None:
