@@ -140,7 +140,7 @@ def test_places_lead_through_macros_and_included_files(tmp_path: Path) -> None:
         ('<xacro:macro name="arm"><link name="a"/></xacro:macro>\n<xacro:amr/>', "XACRO001", 3, "<xacro:arm>"),
         ('<xacro:arg name="side" default=""/>\n<link name="$(arg sied)"/>', "XACRO003", 3, "did you mean 'side'?"),
         ('\n\n<xacro:include filename="$(find nowhere)/x"/>', "XACRO001", 4, "--package-path"),
-        ('\n<link name="$(env HOME)"/>', "XACRO002", 3, "--allow-env HOME"),
+        ('\n<link name="$(env HOME)"/>', "XACRO002", 3, "MANIPCLI_ALLOW_ENV=HOME"),
         ('<xacro:macro name="m"><xacro:m/></xacro:macro>\n<xacro:m/>', "XACRO004", 2, "MANIPCLI_BOUNDS=macro_depth="),
     ],
 )
