@@ -10,7 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, PackagePath
 from manipcli.cli.outputs import JunitFile, Outputs, ReportFile
-from manipcli.core.errors import ExitCode
+from manipcli.core.errors import ExitCode, InvalidInput
 
 
 def judge(
@@ -31,7 +31,11 @@ def judge(
     from manipcli.report import json, text
     from manipcli.report.run_report import exit_code
 
-    verdict = pipeline.judge_log(log)
+    try:
+        verdict = pipeline.judge_log(log)
+    except InvalidInput as invalid:
+        outputs.of_invalid(invalid.findings, log=log)
+        raise
     render = json.render_verdict if format_ == "json" else text.render_verdict
     console.result(render(verdict, str(log)))
     if outputs.wanted:

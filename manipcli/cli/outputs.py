@@ -129,19 +129,20 @@ class Outputs:
         if self._report is not None:
             self._write(self._report, render_page(refused_page(task, verdict)).encode())
 
-    def of_invalid(self, findings: Sequence[Finding], file: Path) -> None:
-        """Writes what is asked for about a task that cannot be used: no page of an earlier run may stay for it."""
-        if not self.wanted:
+    def of_invalid(self, findings: Sequence[Finding], *, task: Path | None = None, log: Path | None = None) -> None:
+        """Writes what is asked for about a task or a log that cannot be used: no page of an earlier run may stay."""
+        file = task or log
+        if file is None or not self.wanted:
             return
         from manipcli.flow.invalid import invalid_page, invalid_verdict
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 
-        verdict = invalid_verdict(file, findings)
+        verdict, name = invalid_verdict(file, findings), log.name if log is not None else ""
         if self._junit is not None:
-            self._write(self._junit, render_junit(verdict, (), (), file=str(file)))
+            self._write(self._junit, render_junit(verdict, (), (), log=name))
         if self._report is not None:
-            self._write(self._report, render_page(invalid_page(verdict, findings)).encode())
+            self._write(self._report, render_page(invalid_page(verdict, findings, log=name)).encode())
 
     def _write(self, path: Path, data: bytes) -> None:
         from manipcli.core.whole_file import write_whole

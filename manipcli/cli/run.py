@@ -70,7 +70,7 @@ def run(
                     progress=progress,
                 )
             except InvalidInput as invalid:
-                outputs.of_invalid(invalid.findings, task)
+                outputs.of_invalid(invalid.findings, task=task)
                 raise
         written = report.log
         if to_stdout:

@@ -1,4 +1,4 @@
-"""A task that cannot be used, to what a run would have been told by: a verdict, and the page about it."""
+"""A task or a log that cannot be used, to what a run would have been told by: a verdict, and the page about it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SHOWN = 8
 """Files that are shown."""
 
 
-def invalid_verdict(task: Path, findings: Sequence[Finding]) -> Verdict:
-    """What there is to say of a run that never was. The engine is "": nothing is known of the task."""
+def invalid_verdict(file: Path, findings: Sequence[Finding]) -> Verdict:
+    """What there is to say without a run. The engine is "": nothing is known of it."""
     errors = tuple(one for one in findings if one.severity == "error")
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     return Verdict(
-        task=task.name,
+        task=file.name,
         verdict="error",
         seed=0,
         engine="",
@@ -33,8 +33,8 @@ def invalid_verdict(task: Path, findings: Sequence[Finding]) -> Verdict:
     )
 
 
-def invalid_page(verdict: Verdict, findings: Sequence[Finding]) -> RunPage:
-    """The page: each error with its place, and the files that these are in, as written."""
+def invalid_page(verdict: Verdict, findings: Sequence[Finding], *, log: str = "") -> RunPage:
+    """The page: each error with its place, and the files that these are in, as written. `log`: the name of a log."""
     sources = tuple(_sources(one.place for one in verdict.errors))
     lines = {source.name: len(source.text.splitlines()) for source in sources}
     return RunPage(
@@ -42,8 +42,9 @@ def invalid_page(verdict: Verdict, findings: Sequence[Finding]) -> RunPage:
         causes=tuple(
             Cause(one.message, "", written=_written(one.place, lines), hint=one.hint or "") for one in verdict.errors
         ),
+        log=log,
         sources=sources,
-        provenance=(("manipcli", __version__), ("run", "nothing was run")),
+        provenance=(("manipcli", __version__), ("log", log) if log else ("run", "nothing was run")),
         notes=tuple(str(one) for one in findings if one.severity != "error"),
     )
 

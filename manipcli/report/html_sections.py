@@ -44,7 +44,7 @@ def head(page: RunPage) -> Markup:
     if page.facts is not None:
         told += _figures(page.facts)
     figures = (element("div", element("dt", name), element("dd", value)) for name, value in told)
-    if page.facts is None:
+    if page.facts is None and not page.log:
         told.append(("simulated", "nothing: the task was refused"))
     lost = element("p", f"The log is incomplete: {page.lost}", class_="warn") if page.lost is not None else None
     return element(

@@ -58,12 +58,12 @@ class RunPage:
 
     Attributes:
         verdict: of the log.
-        log: its name; "" where nothing was run.
+        log: its name, also where it cannot be read; "" where nothing was run.
         lost: why its end is missing, or None.
         causes: why it did not pass, the first cause first.
         steps, expectations: where each stands, parallel to those of the verdict.
         limits: of each expectation the most that its margin can be, in its unit; None where that is not stated.
-        facts: what was measured; None where nothing was run.
+        facts: what was measured; None where nothing was run or the log cannot be read.
         playback: what is replayed; None where nothing was run.
         pictures: of steps, by id.
         moment: what it looked like when the first cause was worst.

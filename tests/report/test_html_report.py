@@ -244,6 +244,21 @@ def test_an_invalid_task_has_a_page_and_junit_in_place_of_those_of_an_earlier_ru
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("data", [None, b"", b"no log"])
+def test_a_log_that_cannot_be_read_has_a_page_and_junit_in_place_of_those_of_an_earlier_one(
+    run_cli: Callable[..., Ran], tmp_path: Path, data: bytes | None
+) -> None:
+    if data is not None:
+        (tmp_path / "run.mcap").write_bytes(data)
+    (tmp_path / "r.html").write_text("passed")
+    ran = run_cli("judge", "run.mcap", "--report", "r.html", "--junit", "j.xml", cwd=tmp_path)
+    assert ran.code == 4
+    words = _Page((tmp_path / "r.html").read_text("utf-8")).words
+    (error,) = ElementTree.parse(tmp_path / "j.xml").getroot().iter("error")
+    assert "✗ error" in words and error.get("message", "-") in words and "task was refused" not in words
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("option", ["--report", "--junit"])
 def test_where_nothing_can_be_written_is_told_before_the_run(
     run_cli: Callable[..., Ran], tmp_path: Path, option: str
