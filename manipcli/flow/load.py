@@ -231,7 +231,9 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
     refused: list[tuple[Loc, Problem]] = []
     spec = task.spec
     ids = tuple(step.id for step in spec.steps if step.id is not None)
-    setting = Setting(robot, scene, intended_ids(task.source, STEPS.names) if task.source.kept else ids)
+    setting = Setting(robot, scene, ids)
+    if task.source.kept:
+        setting = Setting(robot, scene, intended_ids(task.source, STEPS.names), in_order=False)
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
         unknown = member.check(step.body, robot, scene)

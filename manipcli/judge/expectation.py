@@ -178,7 +178,7 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
         if setting.steps is not None and name not in setting.steps:
             known = (*setting.steps, END) if loc == ("at",) else setting.steps
             found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
-    if not found:
+    if not found and setting.in_order:
         found += _too_early(spec, named, setting.steps)
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:
         wanted = scopes(spec.condition, seam)
@@ -191,7 +191,7 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
 def until_problems(spec: ConditionSpec, step: str | None, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
     """Everything in the `until` of a step that robot, scene and steps do not know, or that cannot come true in it."""
     found = problems(spec, setting, seam)
-    if found or step is None or setting.steps is None:
+    if found or step is None or setting.steps is None or not setting.in_order:
         return found
     return tuple(
         Problem(

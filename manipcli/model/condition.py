@@ -67,11 +67,18 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What a spec may speak of, before anything runs. `steps`: the ids of the task's steps; None: not known."""
+    """What a spec may speak of, before anything runs.
+
+    Attributes:
+        robot, scene: of the task.
+        steps: the ids of its steps; None: not known.
+        in_order: whether these are all, as they follow each other; else any that the file could mean, in no order.
+    """
 
     robot: RobotModel
     scene: Scene
     steps: tuple[str, ...] | None = None
+    in_order: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -221,3 +221,21 @@ steps:
     told = [(f.place and f.place.line, f.message.partition(": ")[2]) for f in refused.value.findings]
     handless = "no gripper controller moves a hand of robot 'reacher'"
     assert told == [(7, handless), (7, "'cop' is not a movable body of the scene"), (8, handless)]
+
+
+def test_a_step_that_is_left_out_puts_no_other_out_of_order(tmp_path: Path) -> None:
+    """Without its faulty first step the second would be called move_1, for which it would wait itself."""
+    found = findings(
+        tmp_path,
+        """\
+steps:
+  - move: {to: home, speed: 7}
+  - move: {to: zero}
+    until: {step_done: {step: move_1}}
+  - wait: 1 s
+expect:
+  - step_done: {step: move_2}
+    at: wait_1
+""",
+    )
+    assert [line for line, _, _ in found] == [5]
