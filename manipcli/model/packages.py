@@ -59,7 +59,8 @@ def own_root(description: Path) -> Path | None:
 
 def _of_everything(folder: Path) -> bool:
     """A folder that holds more than one robot: the home folder or one above it, `/`, or one like /tmp."""
-    if Path(os.path.realpath(Path.home())).is_relative_to(folder) or folder == folder.parent:
+    home = _home()
+    if folder == folder.parent or (home is not None and home.is_relative_to(folder)):
         return True
     try:
         # Both: file systems without modes, as a mounted Windows disk, let everybody write everywhere.
@@ -67,6 +68,14 @@ def _of_everything(folder: Path) -> bool:
         return folder.stat().st_mode & both == both
     except OSError:
         return False
+
+
+def _home() -> Path | None:
+    """The user's folder; None where the system knows of none, as in some containers."""
+    try:
+        return Path(os.path.realpath(Path.home()))
+    except RuntimeError:
+        return None
 
 
 class Packages:
@@ -121,7 +130,7 @@ class Packages:
             places += [folder] if folder.name == name else []
             places.append(folder / name)
         if self._folder is not None:
-            home = Path.home()
+            home = _home()
             for ancestor in (self._folder, *list(self._folder.parents)[:LEVELS_ABOVE]):
                 if ancestor in (ancestor.parent, home):
                     break

@@ -173,3 +173,14 @@ def test_what_lies_outside_is_not_named_either(tree: Path) -> None:
         with pytest.raises(NotFound) as refused:
             Packages(description, allow_outside=allowed).resolve("../../../secrt.txt")
         assert refused.value.hint == hint
+
+
+def test_a_system_that_knows_no_home_reads_descriptions_all_the_same(
+    tree: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nobody() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", nobody)
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    assert packages.resolve("package://arm/meshes/a.stl") == tree / "arm" / "meshes" / "a.stl"
