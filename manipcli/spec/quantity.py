@@ -54,7 +54,7 @@ class Unit:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
         json_schema = handler(schema)
         json_schema["type"] = ["number", "string"]
-        json_schema["pattern"] = rf"^[-+(\s]*{NUMBER_PATTERN}\s*[-+*/A-Za-z°µ%]|\$"
+        json_schema["pattern"] = rf"^[-+(\s]*{NUMBER_PATTERN}\s*[-+*/)A-Za-z°µ%]|\$"
         json_schema["description"] = self.expected
         return json_schema
 
