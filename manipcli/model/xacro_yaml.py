@@ -81,7 +81,12 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
 
     def construct(factor: float) -> Callable[[Loader, yaml.ScalarNode], float]:
         def constructor(loader: Loader, node: yaml.ScalarNode) -> float:
-            value = evaluate(str(loader.construct_scalar(node)))
+            text, mark = str(loader.construct_scalar(node)), node.start_mark
+            try:
+                value = evaluate(text)
+            except (ValueError, ArithmeticError) as error:
+                place = Place(shown_path(path), mark.line + 1, mark.column + 1)
+                raise Mistyped(f"'{text}' has no value: {error}", place) from error
             if not isinstance(value, int | float):
                 raise Refused(f"{path.name}: a number is expected, not '{value}'")
             return float(value) * factor

@@ -172,6 +172,14 @@ def test_yaml_with_code_in_it_is_refused(tmp_path: Path) -> None:
         refused(tmp_path, "<link name=\"${xacro.load_yaml('d.yaml')}\"/>")
 
 
+def test_a_number_of_yaml_that_has_no_value_is_told_where_it_stands(tmp_path: Path) -> None:
+    (tmp_path / "d.yaml").write_text('a: 1\nb: !degrees "sqrt(-1)"\n')
+    (finding,) = refused(tmp_path, "<link name=\"${load_yaml('d.yaml')['b']}\"/>").findings
+    assert finding.place is not None
+    assert (Path(finding.place.file).name, finding.place.line, finding.place.column) == ("d.yaml", 2, 4)
+    assert "sqrt(-1)" in finding.message
+
+
 def test_yaml_that_grows_by_merging_is_refused_at_once(tmp_path: Path) -> None:
     (tmp_path / "d.yaml").write_text(
         "a0: &a0 {x: 1}\n" + "".join(f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 10)}]}}\n" for k in range(1, 12))
