@@ -12,6 +12,7 @@ from pathlib import Path
 from manipcli.batch.job import Job
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding
+from manipcli.core.lock import Taken
 from manipcli.report.suite import CaseReport, Trouble, troubles_of
 
 WATCH_PERIOD = 0.1
@@ -46,7 +47,7 @@ def run_jobs(
                     continue
                 try:
                     running.append(Process(job, command=command))
-                except BlockingIOError:
+                except Taken:
                     yield _taken(job)
                 except OSError as error:
                     yield _not_run(job, "it cannot be run", (Finding("USE106", f"it cannot be run: {error}"),))

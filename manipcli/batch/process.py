@@ -10,7 +10,6 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
-from fcntl import LOCK_EX, LOCK_NB, flock
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import BinaryIO
 
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core.errors import ExitCode
+from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
 from manipcli.report.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of
@@ -69,7 +69,7 @@ class Process:
             command: another program that speaks with its parent as `batch/child.py` does.
 
         Raises:
-            BlockingIOError: another process, of another batch, is doing it.
+            Taken: another process, of another batch, is doing it.
             OSError: its files cannot be written, or there is no process to be had.
         """
         self.job = job
@@ -245,18 +245,19 @@ def _locked(path: Path) -> BinaryIO:
     """The file, empty, for this process alone, as long as it or a child that writes into it has it open.
 
     Raises:
-        BlockingIOError: somebody else has it.
+        Taken: somebody else has it.
+        OSError: it cannot be written.
     """
     while True:
         file = path.open("ab")
         try:
-            flock(file, LOCK_EX | LOCK_NB)
+            lock(file.fileno())
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 file.truncate(0)
                 return file
         except FileNotFoundError:
             pass
-        except OSError:
+        except (Taken, OSError):
             file.close()
             raise
         file.close()  # who had it before has removed it meanwhile

@@ -7,7 +7,6 @@ summary (schemas, channels, statistics, indexes of chunks, attachments, metadata
 
 from __future__ import annotations
 
-import fcntl
 import os
 import struct
 import zlib
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from manipcli.core.lock import Taken, lock
 from manipcli.record.block import ChunkContent
 from manipcli.record.faults import PARTIAL, RecordingFailed, RecordingRefused
 
@@ -299,9 +299,9 @@ def _claim(path: Path, partial: Path, *, overwrite: bool) -> int:
     except OSError as error:
         raise RecordingRefused(path, error.strerror or str(error)) from error
     try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(fd)
         os.ftruncate(fd, 0)
-    except BlockingIOError:
+    except Taken:
         os.close(fd)
         raise RecordingRefused(path, f"another run is writing {partial.name}") from None
     except OSError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from manipcli.core.lock import Taken, lock
 from manipcli.record.block import ChunkContent
 from manipcli.record.columns import PAYLOAD, Int, Places
 from manipcli.record.container import LIBRARY, Container
@@ -121,8 +121,8 @@ def _refuse_living(path: Path) -> None:
     except OSError:
         return  # the reader says why
     try:
-        fcntl.flock(fd, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
+        lock(fd, shared=True)
+    except (Taken, OSError):
         raise BadRecording(path, "a run is still writing it", hint="repair it when the run is over") from None
     finally:
         os.close(fd)

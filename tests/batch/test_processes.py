@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import pickle
 import signal
@@ -311,6 +312,25 @@ def test_a_task_that_another_batch_is_running_is_an_error_and_leaves_its_files(t
     assert not job.output.exists()
     (report,) = run([replace(job, case=replace(job.case, task=END))])
     assert report.outcome == "invalid"  # it came to its end, and said that there was nothing to run
+
+
+def test_no_process_to_be_had_is_not_another_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise OSError(errno.EAGAIN, "Resource temporarily unavailable")  # a BlockingIOError
+
+    monkeypatch.setattr("manipcli.batch.process.subprocess.Popen", refused)
+    (report,) = run(jobs(tmp_path, END))
+    assert (report.outcome, report.text) == ("invalid", "it cannot be run")
+    assert "Resource temporarily unavailable" in report.findings[0].message
+
+
+def test_a_folder_without_locks_runs_its_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unsupported(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("manipcli.core.lock.flock", unsupported)
+    (report,) = run(jobs(tmp_path, END))
+    assert report.text == "the task cannot be run"  # it came to its end, and said that there was nothing to run
 
 
 def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path: Path) -> None:
