@@ -26,6 +26,8 @@ DIGITS: Final = 6
 FLOORS: Final[Mapping[str, float]] = {"s": 0.05, "J": 1.0, "m": 1e-3, "rad": math.radians(0.5), "N": 0.5}
 """Differences that never count, by unit."""
 
+TASK_SUFFIXES: Final = (".yaml", ".yml")
+"""In any case of letters."""
 ALWAYS: Final = ("duration", "margins", "steps")
 """Keys that every baseline has."""
 
@@ -95,8 +97,21 @@ _WORDS: Final[Mapping[str, tuple[str, str, str, str]]] = {
 
 
 def baseline_path(task: Path) -> Path:
-    """Where the baseline of a task file is, if it has one."""
+    """Where the baseline of a task file is written."""
     return task.with_name(f"{own_stem(task)}.baseline.json")
+
+
+def kept_baseline(task: Path) -> Path:
+    """Where the baseline of a task file is read, if it has one.
+
+    That is `baseline_path`, or else `a.baseline.json`, which earlier versions wrote for `a.yml`, too, where no other
+    task file beside it is meant by that.
+    """
+    own, plain = baseline_path(task), task.with_name(f"{task.stem}.baseline.json")
+    if own.exists() or not plain.exists():
+        return own
+    others = (file for file in task.parent.iterdir() if file.suffix.lower() in TASK_SUFFIXES and file.name != task.name)
+    return own if any(task.stem in (file.stem, own_stem(file)) for file in others) else plain
 
 
 def measured(verdict: Verdict, log: Path) -> Measures:

@@ -94,7 +94,7 @@ class _Beats:
 def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; its log, picture and page are written where they are wanted."""
     from manipcli import pipeline
-    from manipcli.batch.baseline import baseline_path
+    from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
 
     beats.doing("loading")
@@ -119,7 +119,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     findings: tuple[Finding, ...] = ()
     notes: list[str] = []
     compare = report.verdict.verdict == "passed" and job.nominal and settings.baseline
-    if compare and baseline_path(job.path).exists():
+    if compare and kept_baseline(job.path).exists():
         beats.doing("comparing with the baseline")
         try:
             found, better = against_baseline(job, report.verdict)

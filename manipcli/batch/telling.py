@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.batch.baseline import Key, baseline_path, compared, measured, read_baseline
+from manipcli.batch.baseline import Key, compared, kept_baseline, measured, read_baseline
 from manipcli.batch.job import Job
 from manipcli.core.errors import Place
 from manipcli.core.whole_file import write_whole
@@ -59,7 +59,7 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
     Raises:
         InvalidInput: its baseline cannot be read.
     """
-    old = read_baseline(baseline_path(job.path))
+    old = read_baseline(kept_baseline(job.path))
     if old is None:
         return (), []
     task = load.load_task(job.path, model=task_spec())

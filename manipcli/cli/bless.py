@@ -72,7 +72,15 @@ def _code(done: CaseReport) -> ExitCode:
 
 def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     """Writes the baseline; what to say about it."""
-    from manipcli.batch.baseline import FLOORS, baseline_path, compared, measured, read_baseline, write_baseline
+    from manipcli.batch.baseline import (
+        FLOORS,
+        baseline_path,
+        compared,
+        kept_baseline,
+        measured,
+        read_baseline,
+        write_baseline,
+    )
     from manipcli.batch.discovery import shown_path
     from manipcli.core.errors import InvalidInput
     from manipcli.report.quantity import quantity
@@ -84,7 +92,7 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     new = measured(done.run.verdict, job.log)
     job.log.unlink(missing_ok=True)
     try:
-        old = read_baseline(path)
+        old = read_baseline(kept_baseline(job.path))
     except InvalidInput:
         old = None  # it is replaced
     write_baseline(path, new)

@@ -126,11 +126,11 @@ def _jobs(
 
 def _notes(jobs: Sequence[Job], among: int, keyword: str) -> Iterator[str]:
     """What a user would miss."""
-    from manipcli.batch.baseline import baseline_path
+    from manipcli.batch.baseline import kept_baseline
 
     if keyword and among and not jobs:
         yield f"-k '{keyword}' matches none of {number_of(among, 'test')}"
-    uncompared = sum(not job.nominal and baseline_path(job.path).exists() for job in jobs)
+    uncompared = sum(not job.nominal and kept_baseline(job.path).exists() for job in jobs)
     if uncompared:
         why = "it is that of the task as it is written, without --set, --seed and --samples"
         yield f"{number_of(uncompared, 'test')} not compared with the baseline: {why}"

@@ -18,6 +18,7 @@ from manipcli.batch.baseline import (
     Measures,
     baseline_path,
     compared,
+    kept_baseline,
     measured,
     read_baseline,
     write_baseline,
@@ -65,6 +66,27 @@ def test_tasks_beside_each_other_share_no_baseline() -> None:
     assert baseline_path(tasks[0]) == Path("t/a.baseline.json")
     assert baseline_path(tasks[1]) == Path("t/a@yml.baseline.json")
     assert baseline_path(tasks[5]) == Path("t/index.baseline.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "beside", "read"),
+    [
+        ("a.yml", [], "a@yml"),
+        ("a.yml", ["a.baseline.json", "a.mcap"], "a"),
+        ("a.yml", ["a.baseline.json", "a@yml.baseline.json"], "a@yml"),
+        ("a.yml", ["a.baseline.json", "a.yaml"], "a@yml"),
+        ("a.yml", ["a.baseline.json", "a.YML"], "a@yml"),
+        ("a.yaml", ["a.yml"], "a"),
+        ("a@b.yaml", ["a@b.baseline.json"], "a@b"),
+        ("a@yml.yaml", ["a@yml.baseline.json", "a.yml"], "a@@yml"),
+    ],
+)
+def test_a_baseline_of_an_earlier_name_is_read_where_it_is_that_of_no_other_task(
+    tmp_path: Path, name: str, beside: list[str], read: str
+) -> None:
+    for one in (name, *beside):
+        (tmp_path / one).touch()
+    assert kept_baseline(tmp_path / name) == tmp_path / f"{read}.baseline.json"
 
 
 def test_the_tolerance_is_the_tasks() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
 
@@ -54,7 +55,17 @@ def test_a_broken_watch_is_told_at_its_line(tmp_path: Path) -> None:
 def test_a_watch_that_is_worse_than_it_was_is_told_at_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     one = job(tmp_path)
     old, new = ({("duration",): Measure(1.0, "s"), ("margins", "tracking"): Measure(at, "rad")} for at in (0.3, 0.1))
-    write_baseline(baseline_path(one.path), old)
     monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: new)
+    assert against_baseline(one, VERDICT) == ((), [])
+    write_baseline(baseline_path(one.path), old)
     ((trouble,), notes) = against_baseline(one, VERDICT)
     assert (str(trouble.place), notes) == ("t/nod.yaml:7:5", [])
+
+
+def test_a_yml_is_compared_with_a_baseline_of_the_earlier_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = job(tmp_path)
+    one = replace(one, path=one.path.rename(tmp_path / "nod.yml"))
+    write_baseline(tmp_path / "nod.baseline.json", {("duration",): Measure(1.0, "s")})
+    monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: {("duration",): Measure(2.0, "s")})
+    ((trouble,), _) = against_baseline(one, VERDICT)
+    assert "the task takes 2.00 s; its baseline is 1.00 s" in trouble.message
