@@ -51,6 +51,7 @@ def run(
     with Interrupts() as interrupts, stdout_or(log) as path:
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
+        from manipcli.record.faults import RecordingRefused
         from manipcli.report import json, text
         from manipcli.report.run_report import exit_code
 
@@ -69,6 +70,8 @@ def run(
                     allow_outside=allow_outside,
                     progress=progress,
                 )
+            except RecordingRefused:
+                raise  # nothing was run: what there is tells of the log that stays
             except InvalidInput as invalid:
                 outputs.of_invalid(invalid.findings, task=task)
                 raise

@@ -8,6 +8,8 @@ import pytest
 
 from manipcli.cli.app import main
 
+TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -52,3 +54,14 @@ def test_a_link_to_itself_is_no_file(command: str, capsys: pytest.CaptureFixture
     told = capsys.readouterr()
     assert "bug in manipcli" not in told.err
     assert "loop" in told.out + told.err
+
+
+@pytest.mark.slow
+def test_a_log_that_stays_keeps_its_page_and_its_junit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing was run the second time, so that what the first has written still tells of the log that is there."""
+    words = ["run", str(TASK), "--log", "x.mcap", "--junit", "j.xml", "--report", "p.html", "--quiet"]
+    assert main(words) == 0
+    before = {name: (folder / name).read_bytes() for name in ("x.mcap", "j.xml", "p.html")}
+    assert main(words) == 4
+    assert "the file exists" in capsys.readouterr().err
+    assert {name: (folder / name).read_bytes() for name in before} == before
