@@ -17,7 +17,7 @@ from manipcli.flow.live import Live, Probe
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
 from manipcli.flow.plan import Plan, PlannedStep, plan_step
-from manipcli.flow.replan import Measured, after, bounds
+from manipcli.flow.replan import Measured, after
 from manipcli.flow.watching import Watching
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
@@ -35,8 +35,6 @@ DEFAULT_UNTIL_TIME: Final = 30.0
 """How long [s] an `until` without `timeout` is waited for."""
 AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
-LEANS: Final = 1e-4
-"""A joint so near [rad or m] to its limit leans on it."""
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
 
@@ -305,25 +303,6 @@ def _missing(end: MotionEnd, probe: Probe | None) -> str:
 
 
 def _cut_since(before: Cuts, session: Session) -> str:
-    """What had nothing left to give since then; nothing where everything had. A joint that leans on its stop, and is
-    wanted there, is left out: pressing there costs nothing."""
-    since = cuts_of(session).since(before)
-    leaning = _leaning(session)
-    cut = str(replace(since, joints={name: count for name, count in since.joints.items() if name not in leaning}))
+    """What had nothing left to give since then; nothing where everything had."""
+    cut = str(cuts_of(session).since(before))
     return f"; {cut}" if cut else ""
-
-
-def _leaning(session: Session) -> frozenset[str]:
-    """Joints that are, and are wanted, at a limit of their position."""
-    robot, manager = session.robot, session.manager
-    lower, upper = bounds(robot)
-    found = []
-    for controller, wanted in zip(manager.controllers, manager.outputs, strict=True):
-        if wanted is None or not controller.interfaces:
-            continue
-        columns = robot.indices(controller.joints)
-        least, most = lower[columns] + LEANS, upper[columns] - LEANS
-        there = session.state.position[columns]
-        leans = (np.maximum(there, wanted.position) <= least) | (np.minimum(there, wanted.position) >= most)
-        found += [name for name, one in zip(controller.joints, leans, strict=True) if one]
-    return frozenset(found)

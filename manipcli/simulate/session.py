@@ -89,6 +89,7 @@ class Session:
         self.actuation = Actuation(robot, period)
         hands = {name for one in manager.controllers if is_hand(one) for name in one.joints}
         self._motors = MotorLimits(robot, pressing=hands)
+        self._counted = np.array([not engine.ideal and name not in hands for name in robot.joint_names])
         self._obeyed = -1
         self._asked = np.zeros(len(robot.joint_names))
         if engine.ideal:
@@ -111,8 +112,12 @@ class Session:
 
     @property
     def saturations(self) -> Array:
-        """(n) in how many ticks each joint's command was cut, or the engine's motor at it gave all it may."""
-        return self._limiter.saturations.astype(np.float64)
+        """(n) in how many ticks each joint's command was cut, or the engine's motor at it gave all it may.
+
+        0 of joints of hands, which press on what they hold, or on their stops, by intent; and of all in an engine where
+        references come true whatever the effort.
+        """
+        return np.where(self._counted, self._limiter.saturations, 0.0)
 
     @property
     def touching(self) -> tuple[Contact, ...]:

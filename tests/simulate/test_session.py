@@ -83,6 +83,22 @@ def test_commands_are_cut_at_the_limits_and_counted(session_of: SessionOf, scrip
     assert session.saturations[0] == 9
 
 
+@pytest.mark.parametrize(("ideal", "counted"), [(False, [9, 0, 0]), (True, [0, 0, 0])])
+def test_cuts_of_hands_and_of_engines_without_efforts_are_not_counted(
+    session_of: SessionOf, scripted: Any, ideal: bool, counted: list[int]
+) -> None:
+    """All are so far from where they are held that each command is cut; the finger presses by intent."""
+
+    def pull_away(engine: Any) -> None:
+        engine.state.position[:] = -150.0 if engine.tick > 0 else 0.0
+
+    engine = scripted(pull_away, ideal=ideal)
+    session = session_of(engine)
+    ticks(session, 10)
+    assert np.all(engine.written[-1] == 100.0)
+    assert session.saturations.tolist() == counted
+
+
 @pytest.mark.parametrize(
     ("joint", "name", "limit"), [(0, "slide", 6.0), (1, "knuckle", 9.0), (2, "tip", RUNAWAY_SPEED)]
 )
