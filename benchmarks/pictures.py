@@ -17,6 +17,7 @@ from manipcli.flow.chart import open_chart
 from manipcli.flow.replay import open_playback
 from manipcli.replay import figure
 from manipcli.replay.film import SIZE, cutting, write_film
+from manipcli.replay.player import player_page
 from manipcli.replay.sheet import sheet
 from manipcli.replay.shots import Shots
 
@@ -44,6 +45,7 @@ def main() -> None:
     rows = [
         ("open the log for pictures", f"{seconds(lambda: open_playback(log)):.2f} s"),
         ("read one joint at the full rate", f"{1000.0 * seconds(lambda: open_chart([log], [JOINT])):.0f} ms"),
+        ("page that plays offline", f"{seconds(lambda: player_page(playback)):.2f} s"),
         ("sheet of all steps", f"{seconds(lambda: sheet(playback)):.2f} s"),
     ]
     chart = open_chart([log], [])
