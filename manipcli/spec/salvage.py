@@ -94,33 +94,28 @@ def _without(root: MappingNode, faults: list[Path], kept: dict[str, tuple[int, .
             remaining = [k for k in range(len(block.items)) if (name, k) not in items and name not in heads]
             before = kept.get(name, tuple(range(len(block.items))))
             kept[name] = tuple(before[k] for k in remaining)
-            root = _with(root, name, SequenceNode(tuple(block.items[k] for k in remaining), block.place))
+            root = root.with_node(name, SequenceNode(tuple(block.items[k] for k in remaining), block.place))
     steps = root.get("steps")
     if not isinstance(steps, SequenceNode) or not steps.items:
-        root = _with(root, "steps", _nothing_to_do(root if steps is None else steps))
+        root = root.with_node("steps", _nothing_to_do(root if steps is None else steps))
         kept["steps"] = (0,)
     for name in NAMED:
         block = root.get(name)
         if isinstance(block, MappingNode):
             for key, old in block.entries.items():
                 if (name, key) in items:
-                    block = _with(block, key, _stand_in(name, old.node))
-            root = _with(root, name, block)
+                    block = block.with_node(key, _stand_in(name, old.node))
+            root = root.with_node(name, block)
     for fault in faults:
         head = "record" if not fault else str(fault[0])  # of the whole task only the rates are looked at
         block = root.get(head)
         if head in KEPT:
-            root = _with(root, head, ScalarNode("left out", root.place))
+            root = root.with_node(head, ScalarNode("left out", root.place))
         elif head == "simulation" and isinstance(block, MappingNode) and fault[1:2] in ((), *((w,) for w in CLOCK)):
-            root = _with(root, head, block.without(*CLOCK))
+            root = root.with_node(head, block.without(*CLOCK))
         elif not fault or head not in (*LISTS, *NAMED):
             root = without(root, (head, *fault[1:2]))
     return root.without(*(heads & {"frames", "scene", "expect", "watch"}))
-
-
-def _with(block: MappingNode, key: str, node: Node) -> MappingNode:
-    old = block.entries.get(key)
-    return block.with_entry(key, Entry(node.place if old is None else old.key_place, node))
 
 
 def _nothing_to_do(at: Node) -> Node:

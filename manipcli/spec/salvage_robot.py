@@ -48,13 +48,13 @@ def _without(root: MappingNode, faults: list[Path]) -> MappingNode:
     ignored = root.get("collision_ignore")
     if pairs and isinstance(ignored, SequenceNode):
         items = tuple(item for k, item in enumerate(ignored.items) if k not in pairs)
-        root = _with(root, "collision_ignore", SequenceNode(items, ignored.place))
+        root = root.with_node("collision_ignore", SequenceNode(items, ignored.place))
     for fault in faults:
         head, *below = fault
         if head == "robot":
-            root = _with(root, "robot", ScalarNode("left out", root.place))
+            root = root.with_node("robot", ScalarNode("left out", root.place))
         elif head == "poses" and below:
-            root = _with(root, "poses", _unposed(root, *map(str, below[:2])))
+            root = root.with_node("poses", _unposed(root, *map(str, below[:2])))
         elif head != "collision_ignore" or not below:
             root = without(root, fault[: 3 if head == "limits" else 2])
         if head == "groups":
@@ -71,10 +71,10 @@ def _unposed(root: MappingNode, pose: str, group: str | None = None) -> Node:
     old = poses.entries[pose].node
     empty = MappingNode({}, old.place)
     if isinstance(old, MappingNode) and group in old.entries:
-        return _with(poses, pose, _with(old, group, empty))
+        return poses.with_node(pose, old.with_node(group, empty))
     groups = root.get("groups")
     names = groups.entries if isinstance(groups, MappingNode) else ()
-    return _with(poses, pose, MappingNode({name: Entry(old.place, empty) for name in names}, old.place))
+    return poses.with_node(pose, MappingNode({name: Entry(old.place, empty) for name in names}, old.place))
 
 
 def _ungrouped(root: MappingNode, group: str | None = None) -> MappingNode:
@@ -84,10 +84,5 @@ def _ungrouped(root: MappingNode, group: str | None = None) -> MappingNode:
         return root.without("poses")
     for name, entry in poses.entries.items():
         if isinstance(entry.node, MappingNode):
-            poses = _with(poses, name, entry.node.without(group))
-    return _with(root, "poses", poses)
-
-
-def _with(block: MappingNode, key: str, node: Node) -> MappingNode:
-    old = block.entries.get(key)
-    return block.with_entry(key, Entry(node.place if old is None else old.key_place, node))
+            poses = poses.with_node(name, entry.node.without(group))
+    return root.with_node("poses", poses)

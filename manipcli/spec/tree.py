@@ -44,6 +44,11 @@ class MappingNode:
         """A copy in which `entry` stands under `key`."""
         return MappingNode({**self.entries, key: entry}, self.place)
 
+    def with_node(self, key: str, node: Node) -> MappingNode:
+        """A copy with `node` under a key, which keeps the place that it has."""
+        old = self.entries.get(key)
+        return self.with_entry(key, Entry(node.place if old is None else old.key_place, node))
+
     def without(self, *keys: str) -> MappingNode:
         """A copy without these keys."""
         return MappingNode({key: entry for key, entry in self.entries.items() if key not in keys}, self.place)
