@@ -39,7 +39,8 @@ class Interrupts:
 
     def __exit__(self, *raised: object) -> None:
         for one, before in self._before.items():
-            # `before` is what signal.signal returned; its declared type is wider than what it takes.
+            # `before` is what signal.signal returned; its declared type is wider than what it takes. None stands for a
+            # handler that was not set from Python and cannot be put back: the system's own follows.
             signal.signal(one, before if before is not None else signal.SIG_DFL)  # type: ignore[arg-type]
 
     def check(self) -> None:

@@ -274,6 +274,7 @@ class Evaluator:
 
     def _parts(self, values: Value = ()) -> Iterator[list[Value]]:
         """A few items at a time: numbers can be chosen so that a hash table of many takes for ever."""
+        # What has no items is Python's to refuse: its TypeError becomes a finding.
         items = list(values)  # type: ignore[call-overload]
         for start in range(0, len(items), 256):
             self._clock.look()

@@ -117,6 +117,7 @@ def python_symbols() -> dict[str, Value]:
         items = list(values)
         if size_of(start) * len(items) > bounds().value_size * 64:
             raise too_large("a sum of lists")
+        # What cannot be added is Python's to refuse, too.
         return sum(items, start)  # type: ignore[call-overload]
 
     def text(value: Value = "") -> str:
