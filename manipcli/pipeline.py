@@ -94,8 +94,8 @@ def run_task(
         took = time.perf_counter() - began
         timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
         return RunReport(refused(task, refusal), wall_time=took, real_time_factor=None, log=None, timing=timing)
-    planned = time.perf_counter()
     doubts = gain_findings(task, plan)
+    planned = time.perf_counter()
     if progress is not None and doubts:
         progress.warned(doubts)
 
