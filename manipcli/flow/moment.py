@@ -44,7 +44,7 @@ def moment(path: Path, time: float) -> Moment:
     try:
         return _ours(path, time)
     except Thinned:
-        return _others(path, found, time, why=f"{LEFT_OUT}; as it is")
+        return _others(path, found, time, why=LEFT_OUT)
 
 
 def _ours(path: Path, time: float) -> Moment:

@@ -41,9 +41,7 @@ def open_playback(
         try:
             return _open_own(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
         except Thinned:
-            return open_other(
-                path, rate=rate, why=f"{LEFT_OUT}; as it is", package_path=package_path, allow_outside=allow_outside
-            )
+            return open_other(path, rate=rate, why=LEFT_OUT, package_path=package_path, allow_outside=allow_outside)
     return open_other(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
 
 

@@ -158,7 +158,7 @@ def test_controllers_are_recorded_at_every_tick_or_the_file_is_refused(small: tu
             if channel.topic != "/arm/controller_state" or m.log_time != 7_000_000:
                 writer.add_message(ids[channel.id], m.log_time, m.data, m.publish_time, m.sequence)
         writer.finish()
-    with pytest.raises(BadRecording, match="left them out"):
+    with pytest.raises(BadRecording, match="left out messages"):
         read_recording(tmp_path / "copy.mcap")
 
 
