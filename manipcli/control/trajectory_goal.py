@@ -10,7 +10,7 @@ import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.core.geometry import Array
-from manipcli.core.text import apart, did_you_mean
+from manipcli.core.text import did_you_mean, told_apart
 from manipcli.model.robot import JointLimits, JointType
 from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
 
@@ -208,7 +208,7 @@ def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalReje
     """What a goal is refused with that asks joint `j` for a `velocity` beyond its limit."""
     unit = facts.units[j] + "/s"
     most = float(facts.velocity[j])
-    moves, limit = apart(velocity, most if velocity > 0.0 else -most, form=".6g")
+    moves, limit = told_apart(velocity, most if velocity > 0.0 else -most, form=".6g")
     return GoalRejected(
         "CTRL125",
         f"joint '{facts.joints[j]}' moves at {moves} {unit} {where}; its limit is {limit.removeprefix('-')} {unit}",
@@ -217,7 +217,10 @@ def too_fast(facts: JointFacts, j: int, velocity: float, where: str) -> GoalReje
 
 def _beyond(facts: JointFacts, j: int, value: float, where: str) -> str:
     unit = facts.units[j]
-    (low, there), (also, high) = (apart(facts.lower[j], value, form=".6g"), apart(value, facts.upper[j], form=".6g"))
+    (low, there), (also, high) = (
+        told_apart(facts.lower[j], value, form=".6g"),
+        told_apart(value, facts.upper[j], form=".6g"),
+    )
     return (
         f"joint '{facts.joints[j]}' is at {max(there, also, key=len)} {unit} at {where}; "
         f"its limits are {low} to {high} {unit}"

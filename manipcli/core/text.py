@@ -100,7 +100,7 @@ def digits(value: float) -> str:
     return f"{float(f'{value:.3g}'):.5g}"
 
 
-def apart(one: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
+def told_apart(one: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
     """Both as text, with as many digits more than `form` has as it takes that numbers that differ look different."""
     least, kind = int(form[1:-1]), form[-1]
     for many in range(least, least + 16):

@@ -15,7 +15,7 @@ from manipcli.control.reflected import Postures, load_of
 from manipcli.control.stability import largest_velocity_gain, velocity_loop_poles
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
-from manipcli.core.text import apart, digits, listed
+from manipcli.core.text import digits, listed, told_apart
 from manipcli.flow.load import Task
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.kinematics import Kinematics
@@ -88,11 +88,11 @@ def too_weak(
     """Too little effort for gravity or for the plan, all three in N m or N; None where there is enough."""
     unit = "N" if robot.joint(joint).type == "prismatic" else "N m"
     if weight > limit:
-        takes, most = apart(weight, limit, form=".3g")
+        takes, most = told_apart(weight, limit, form=".3g")
         message = f"{joint}: holding against gravity takes up to {takes} {unit}, its limit is {most} {unit}"
         return Finding("CTRL155", message, place, "it will sink; check the effort limit and the masses", "warning")
     if needed > limit:
-        takes, most = apart(needed, limit, form=".3g")
+        takes, most = told_apart(needed, limit, form=".3g")
         message = f"{joint}: the planned motions need up to {takes} {unit}, its limit is {most} {unit}"
         hint = f"it will lag behind; lower its acceleration limit (robot file, limits.{joint}.acceleration)"
         return Finding("CTRL155", message, place, hint, "warning")

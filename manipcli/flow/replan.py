@@ -92,7 +92,7 @@ class Measured:
             columns = robot.indices(controller.joints)
             near = np.abs(output.position - measured[columns]) <= self._limits.joints
             position[columns] = np.where(near, output.position, measured[columns])
-        lower, upper = bounds(robot)
+        lower, upper = _bounds(robot)
         return frozen(np.clip(position, lower, upper))
 
     def _joints(self, planned: Situation, now: Situation) -> Iterator[str]:
@@ -164,7 +164,7 @@ def after(planned: StepPlan, before: Situation, *, done: int) -> Situation:
     return replace(before, carried=carried, closed=closed)
 
 
-def bounds(robot: RobotModel) -> tuple[Array, Array]:
+def _bounds(robot: RobotModel) -> tuple[Array, Array]:
     """(n) the least and the greatest position [rad or m] of each joint, infinite where it has no limit."""
     limits = [joint.limits for joint in robot.moving_joints]
     lower = np.array([-math.inf if limit.lower is None else limit.lower for limit in limits])

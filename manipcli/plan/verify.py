@@ -8,7 +8,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
-from manipcli.core.text import apart
+from manipcli.core.text import told_apart
 from manipcli.model.robot import RobotModel
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.trajectory import JointTrajectory
@@ -80,7 +80,7 @@ def _beyond(
     name: str, value: float, lower: float, upper: float, when: str, loc: tuple[str | int, ...] = ()
 ) -> NotPlannable:
     word, limit = ("lower", lower) if value < lower else ("upper", upper)
-    there, most = apart(value, limit, form=".4f")
+    there, most = told_apart(value, limit, form=".4f")
     return NotPlannable(f"joint '{name}' goes to {there}{when}, beyond its {word} limit {most}", loc=loc)
 
 
@@ -99,7 +99,7 @@ def _bounded(word: str, values: Array, limit: Array, times: Array, names: tuple[
     ratio = np.abs(values) / limit
     k, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     if ratio[k, i] > 1.0 + tolerance:
-        needed, most = apart(abs(values[k, i]), limit[i])
+        needed, most = told_apart(abs(values[k, i]), limit[i])
         raise NotPlannable(
             f"joint '{names[i]}' would need {word} {needed} at t = {times[k]:.3f} s; its limit is {most}"
         )

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.text import any_of, apart, did_you_mean, digits, escape, listed, nearest, number_of, shorten
+from manipcli.core.text import any_of, did_you_mean, digits, escape, listed, nearest, number_of, shorten, told_apart
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
 
@@ -81,4 +81,4 @@ def test_three_digits_stand_without_an_exponent_while_people_would_write_none(va
     ],
 )
 def test_numbers_that_differ_look_different(one: float, other: float, form: str, told: tuple[str, str]) -> None:
-    assert apart(one, other, form=form) == told
+    assert told_apart(one, other, form=form) == told
