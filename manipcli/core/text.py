@@ -6,6 +6,7 @@ import difflib
 import re
 import unicodedata
 from collections.abc import Iterable
+from pathlib import PurePath
 
 _UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 """Categories of Unicode: control, format (direction marks, spaces of no width), surrogates, ends of lines."""
@@ -34,6 +35,14 @@ def nearest(name: str, known: Iterable[str], *, most: int = 1) -> tuple[str, ...
 
 def _begins(one: str, other: str) -> bool:
     return bool(one) and (one.startswith(other) or (len(one) >= 2 and other.startswith(one)))
+
+
+def nearest_file(name: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The one of the `known` files that looks like `name`, if one does: an ending in common is no likeness."""
+    names = list(known)
+    stems = {PurePath(one).stem: one for one in names if PurePath(one).suffix == PurePath(name).suffix}
+    alike = tuple(stems[stem] for stem in nearest(PurePath(name).stem, stems))
+    return alike or nearest(name, [one for one in names if one not in stems.values()])
 
 
 def did_you_mean(name: str, known: Iterable[str], *, kind: str = "known", most: int = 1) -> str | None:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
-from manipcli.core.text import any_of, nearest
+from manipcli.core.text import any_of, nearest_file
 from manipcli.model.located_xml import shown_path
 from manipcli.model.package_xml import package_name, packages_below
 
@@ -243,7 +243,7 @@ def _uri(root: Path, path: Path) -> str:
 def _meant(path: Path) -> str | None:
     """The file beside it with nearly this name."""
     try:
-        near = nearest(path.name, sorted(entry.name for entry in path.parent.iterdir()))
+        near = nearest_file(path.name, sorted(entry.name for entry in path.parent.iterdir()))
     except OSError:
         return None
     return f"did you mean {any_of(near)}?" if near else None

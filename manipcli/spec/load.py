@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.text import did_you_mean, escape
+from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import substitute
@@ -59,7 +59,8 @@ def sibling(path: Path) -> str | None:
         names = sorted(entry.name for entry in os.scandir(path.parent))
     except OSError:
         return f"the folder '{path.parent}' is not there either"
-    return did_you_mean(path.name, names, kind="beside it")
+    close = nearest_file(path.name, names)
+    return f"did you mean {any_of(close)}?" if close else f"beside it: {listed(names)}" if names else None
 
 
 def load(path: Path, model: type[M], area: Area) -> Located[M]:

@@ -8,7 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.text import any_of, did_you_mean, digits, escape, listed, nearest, number_of, shorten, told_apart
+from manipcli.core.text import (
+    any_of,
+    did_you_mean,
+    digits,
+    escape,
+    listed,
+    nearest,
+    nearest_file,
+    number_of,
+    shorten,
+    told_apart,
+)
 
 JOINTS = [f"joint_{k}" for k in range(1, 8)]
 
@@ -82,3 +93,20 @@ def test_three_digits_stand_without_an_exponent_while_people_would_write_none(va
 )
 def test_numbers_that_differ_look_different(one: float, other: float, form: str, told: tuple[str, str]) -> None:
     assert told_apart(one, other, form=form) == told
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "meant"),
+    [
+        ("none.yaml", ["w1.yaml", "w3.yaml"], ()),
+        ("robt.yaml", ["robot.yaml", "tasks.yaml", "robot.urdf"], ("robot.yaml",)),
+        ("robot.yaml", ["robot.yml", "other.yaml"], ("robot.yml",)),
+        ("arm.stl", ["Arm.STL", "base.stl"], ("Arm.STL",)),
+        ("folder", ["folders", "a.yaml"], ("folders",)),
+        ("x.yaml", [], ()),
+    ],
+)
+def test_an_ending_in_common_makes_no_file_look_like_another(
+    name: str, known: list[str], meant: tuple[str, ...]
+) -> None:
+    assert nearest_file(name, known) == meant
