@@ -25,6 +25,7 @@ Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -178,10 +179,22 @@ def _finding(
     node = node_at(root, path)
     what, hint = _told(first, branches, root, model)
     at_key = kind == "extra_forbidden" or bool(first.error.get("ctx", {}).get("key", False))
+    if not at_key and hint is None:
+        hint = _origin(node, root)
     place = key_place_at(root, path) if at_key else node.place
     where = dotted(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path)
     code = f"{area}{_MISTAKES.get(kind, 205)}"
     return Finding(code, f"{where}: {what}" if where else what, place, hint=hint)
+
+
+def _origin(node: Node, root: Node) -> str | None:
+    """Where the parameter stands that a value comes from."""
+    written = node.written if isinstance(node, ScalarNode) else None
+    for name in re.findall(r"\$\{?(\w+)", written or ""):
+        said = child(child(root, "params") or root, name)
+        if said is not None:
+            return f"it comes from '{written}'; params.{name} is at {said.place}"
+    return None
 
 
 def _told(

@@ -239,3 +239,10 @@ expect:
 """,
     )
     assert [line for line, _, _ in found] == [5]
+
+
+def test_a_value_that_a_parameter_says_is_told_with_the_place_of_the_parameter(tmp_path: Path) -> None:
+    ((line, column, told),) = findings(tmp_path, "params: {pause: 2 kg}\nsteps:\n  - wait: $pause\n")
+    assert (line, column) == (6, 11)
+    assert "a mass" in told
+    assert "bad.yaml:4:17" in told  # where `2 kg` stands
