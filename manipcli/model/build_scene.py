@@ -242,7 +242,10 @@ class _Builder:
         )
         if beside:
             at = f"[{spec.at[0]:g}, {spec.at[1]:g}]"
-            self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"))
+            middle = X_WB.apply(support.centre)
+            across = f"{support.size[0]:g} by {support.size[1]:g} m"
+            hint = f"the top of '{other}' is {across}, its middle at [{middle[0]:g}, {middle[1]:g}] m"
+            self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"), hint)
             return None
         return X_WO
 

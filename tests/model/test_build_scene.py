@@ -311,3 +311,9 @@ def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InvalidInput) as caught:
             build_scene(task({"x": {"urdf": {"file": name}, "pose": {}}}), resolve=lambda n: tmp_path / n)
         assert caught.value.findings[0].code.startswith(code)
+
+
+def test_a_body_beside_its_support_is_told_where_that_is() -> None:
+    desk = {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0.1, 0.2]}, "fixed": True}
+    told = only({"desk": desk, "x": CUBE | {"rests_on": "desk", "at": [2.75, 0]}})
+    assert told.hint == "the top of 'desk' is 0.6 by 1 m, its middle at [0.85, 0.1] m"
