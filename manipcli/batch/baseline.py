@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from manipcli.batch.first_look import SUFFIXES
 from manipcli.batch.job import own_stem
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import listed
@@ -26,8 +27,6 @@ DIGITS: Final = 6
 FLOORS: Final[Mapping[str, float]] = {"s": 0.05, "J": 1.0, "m": 1e-3, "rad": math.radians(0.5), "N": 0.5}
 """Differences that never count, by unit."""
 
-TASK_SUFFIXES: Final = (".yaml", ".yml")
-"""In any case of letters."""
 ALWAYS: Final = ("duration", "margins", "steps")
 """Keys that every baseline has."""
 
@@ -110,7 +109,7 @@ def kept_baseline(task: Path) -> Path:
     own, plain = baseline_path(task), task.with_name(f"{task.stem}.baseline.json")
     if own.exists() or not plain.exists():
         return own
-    others = (file for file in task.parent.iterdir() if file.suffix.lower() in TASK_SUFFIXES and file.name != task.name)
+    others = (file for file in task.parent.iterdir() if file.suffix.lower() in SUFFIXES and file.name != task.name)
     return own if any(task.stem in (file.stem, own_stem(file)) for file in others) else plain
 
 
