@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, TypeAlias
 
 from manipcli.batch.job import Beat, End, Job, Message
+from manipcli.core import collector
 from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
 from manipcli.judge.verdict import StepOutcome
 from manipcli.report.suite import troubles_of
@@ -26,6 +27,7 @@ Parent: TypeAlias = "Connection[Message, Job]"
 
 def main(descriptor: int) -> None:
     """One job, on the socket with this number."""
+    collector.spare()
     parent: Parent = Connection(descriptor)
     os.set_inheritable(descriptor, False)
     os.dup2(2, 1)  # what libraries print is no result

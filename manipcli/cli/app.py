@@ -36,6 +36,7 @@ from manipcli.cli import (
     view,
 )
 from manipcli.cli import list as list_
+from manipcli.core import collector
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 from manipcli.record.faults import RecordingFailed
 
@@ -124,6 +125,8 @@ def _root(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command line and returns its exit code; shows no traceback unless MANIPCLI_DEBUG is set."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None:  # this process is that of the command
+        collector.spare()
     console.prepare()
     try:
         code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)
