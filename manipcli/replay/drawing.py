@@ -13,9 +13,11 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Transform
+from manipcli.core.text import listed
 from manipcli.model.mesh_fault import Rgba
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
+from manipcli.replay.bones import bones
 from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 
@@ -89,16 +91,23 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
     """The drawing of a robot, a scene, or both.
 
     Collision meshes are drawn as their convex hulls, which is what planner and physics take them for. The collision
-    shapes of a link stand in for its visual ones where it has none that can be drawn.
+    shapes of a link stand in for its visual ones where it has none that can be drawn, and bones where it has neither.
     """
     missing: list[str] = []
     frames: list[str] = [WORLD]
     drawables: list[Drawable] = []
     marks: list[Mark] = []
     if robot is not None:
+        bare: list[str] = []
         for link in robot.links:
             frames.append(link_frame(link.name))
-            drawables += _link(link, missing)
+            shown = tuple(_link(link, missing))
+            drawables += shown
+            if (link.visuals or link.collisions) and not any(one.layer == "visual" for one in shown):
+                bare.append(link.name)
+        if bare:
+            drawables += (bone for name in bare for bone in _bones(robot, name))
+            missing.append(f"bones between joints stand in for {listed(bare)}")
         if robot.tool is not None:
             marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
     if scene is not None:
@@ -120,6 +129,12 @@ def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
     yield from touched
     if link.inertial is not None:
         yield from _inertia(frame, link.inertial)
+
+
+def _bones(robot: RobotModel, link: str) -> Iterator[Drawable]:
+    frame = link_frame(link)
+    for k, bone in enumerate(bones(robot, link)):
+        yield Drawable(f"{frame}/bone_{k}", "visual", frame, bone, PLAIN)
 
 
 def _body(body: Body, missing: list[str]) -> Iterator[Drawable]:
