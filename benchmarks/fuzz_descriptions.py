@@ -5,8 +5,8 @@ description of one link, in which a few things are changed. It is examined in a 
 built, written for Bullet, and stepped in another process. A worker that dies, takes too long or much memory, lets an
 exception out, runs a program, opens a connection or writes a file where it should not, fails the case.
 
-    python benchmarks/fuzz_descriptions.py --minutes 5
-    python benchmarks/fuzz_descriptions.py --only 1234 --keep cases
+    python -m benchmarks.fuzz_descriptions --minutes 5
+    python -m benchmarks.fuzz_descriptions --only 1234 --keep cases
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Each run is a process of its own that tells through shared memory which tick it has recorded. After SIGKILL the file it
 leaves is opened, judged and repaired; the repaired file must pass the mcap library's reader with all checksums.
 
-    python benchmarks/killed_runs.py
-    python benchmarks/killed_runs.py --runs 5 --seed 3 --task tasks/pick_place.yaml
+    python -m benchmarks.killed_runs
+    python -m benchmarks.killed_runs --runs 5 --seed 3 --task tasks/pick_place.yaml
 """
 
 from __future__ import annotations

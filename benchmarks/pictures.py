@@ -1,7 +1,7 @@
 """What it takes to look at a log: to open it, to draw pictures, films and figures of it.
 
 manipcli run tasks/pour.yaml
-python benchmarks/pictures.py [LOG]
+python -m benchmarks.pictures [LOG]
 """
 
 from __future__ import annotations

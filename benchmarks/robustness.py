@@ -3,9 +3,9 @@
 Each sample is one `manipcli run TASK --sample N` in a process of its own, so that a crash costs one. `--hard` widens
 what the pour varies, draws the gains of all controllers, and lets every motor answer a control tick late.
 
-    python benchmarks/robustness.py
-    python benchmarks/robustness.py --task tasks/pour_iiwa.yaml --hard --jobs 2
-    python benchmarks/robustness.py --only 17 --keep runs
+    python -m benchmarks.robustness
+    python -m benchmarks.robustness --task tasks/pour_iiwa.yaml --hard --jobs 2
+    python -m benchmarks.robustness --only 17 --keep runs
 """
 
 from __future__ import annotations
