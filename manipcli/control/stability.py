@@ -27,6 +27,9 @@ from manipcli.core.geometry import Array
 
 MARGINAL: Final = 1e-9
 """A pole this near to the unit circle counts as outside of it."""
+SLOW: Final = 1e-6
+"""An integral that does less than this share of its stiffness in a tick, i h < SLOW p, has its pole at 1 but for
+rounding."""
 MOST_GAIN: Final = 1e6
 """A margin that is larger is not looked for."""
 
@@ -142,9 +145,14 @@ def poles(loop: Loop) -> npt.NDArray[np.complex128]:
 
 
 def is_stable(loop: Loop) -> bool:
-    """Whether all poles lie inside of the unit circle. A joint without a p gain has one at 1, which is left out."""
+    """Whether all poles lie inside of the unit circle.
+
+    A joint without a p gain has one at 1, which is left out; and so is that of a slow integral, at 1 - i h / p: none
+    leaves the circle there while i and p are positive, as det(A - 1) goes with their product.
+    """
     found = poles(loop)
-    resting = int(np.count_nonzero(loop.p == 0.0))
+    slow = (loop.i > 0.0) & (loop.i * loop.period < SLOW * loop.p)
+    resting = int(np.count_nonzero((loop.p == 0.0) | slow))
     if resting:
         found = found[np.argsort(np.abs(found - 1.0))][resting:]
     return bool(np.all(np.abs(found) < 1.0 - MARGINAL))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -127,6 +128,38 @@ def test_the_largest_integral_is_where_the_loop_itself_stops_to_settle() -> None
     assert remains(loop(0.95 * bound), ticks=20000) < 1e-2
     assert remains(loop(1.05 * bound), ticks=20000) > 1.0
     assert largest_integral(Loop.of_joint(0.083, p=80.0, d=0.0, period=H)) == 0.0
+
+
+def routh(inertia: float, p: float, d: float, i: float) -> bool:
+    """Exactly, in one step of Euler: w^3 + (a + b) w^2 + (a + c) w + c with w = z - 1, a = p h^2 / I, b = d h / I and
+    c = i h^3 / I; with w = 2 s / (1 - s) the circle is the left half plane, and Routh's criterion decides."""
+    h, mass = Fraction(H), Fraction(inertia)
+    a, b, c = (Fraction(gain) * h**k / mass for gain, k in ((p, 2), (d, 1), (i, 3)))
+    third, second, first = 8 - 2 * a - 4 * b + c, 4 * b - c, 2 * a - c
+    return min(third, second, first) > 0 and second * first > c * third
+
+
+@pytest.mark.parametrize("i", [1e-14, 1e-10, 1e-6, 1e-4, 0.01, 0.1, 1.0, 100.0])
+@pytest.mark.parametrize(
+    ("inertia", "p", "d"),
+    [(4.0, 12000.0, 200.0), (0.2, 800.0, 50.0), (0.05, 12000.0, 30.0), (4.0, 12000.0, 0.0), (0.2, 800.0, 399.7)],
+)
+def test_a_slow_integral_makes_no_loop_unstable_that_is_not(inertia: float, p: float, d: float, i: float) -> None:
+    loop = Loop.of_joint(inertia, p=p, d=d, i=i, period=H)
+    assert is_stable(loop) == routh(inertia, p, d, i)
+    assert (gain_margin(loop) > 1.0) == routh(inertia, p, d, i)
+
+
+def test_neither_do_slow_integrals_of_joints_that_are_coupled() -> None:
+    mass = np.array([[4.0, 1.0], [1.0, 2.0]])
+    p, d, slow = np.array([12000.0, 800.0]), np.array([200.0, 50.0]), np.array([0.01, 1e-5])
+    still = np.zeros(2)
+    assert is_stable(Loop(mass, p, d, slow, still, H))
+    # What is left without the two slow poles are the poles of the loop without integrals.
+    both, without = poles(Loop(mass, p, d, slow, still, H)), poles(Loop(mass, p, d, still, still, H))
+    np.testing.assert_allclose(both[:2], 1.0 - H * slow[::-1] / p[::-1], atol=1e-12)
+    np.testing.assert_allclose(np.sort_complex(both[2:]), np.sort_complex(without), atol=1e-8)
+    assert not is_stable(Loop(mass, p, 100.0 * d, slow, still, H))
 
 
 def largest_eigenvalue(mass: np.ndarray, d: np.ndarray) -> float:
