@@ -170,7 +170,7 @@ class JointTrajectoryController:
     def _clear(self, *, time: float) -> None:
         self._activated = False
         self._waiting = True
-        self._time = time
+        self._time, self._period = time, 0.0
         self._goal: FollowedGoal | None = None
         self._next: FollowedGoal | None = None
         self._stop = False
@@ -218,14 +218,14 @@ class JointTrajectoryController:
 
         Raises:
             GoalRejected: unknown or missing joints, waypoints beyond position limits, velocities over the limits (on
-                the way to the first point, too, once it is active), points that differ in what they give or give what
-                is not allowed, a velocity at the end, an end in the past. The goal before then goes on.
+                the way to the first point to come, too, once it is active), points that differ in what they give or
+                give what is not allowed, a velocity at the end, an end in the past. The goal before then goes on.
         """
         goal = trajectory if isinstance(trajectory, TrajectoryGoal) else TrajectoryGoal(trajectory)
         ordered = check_goal(goal, self._facts, self._accepted, self._time)
         if self._activated:
             actual = self._desired - self._error
-            self._transitions.check_way(ordered, goal.start_time, self._reference, self._time, actual)
+            self._transitions.check_way(ordered, goal.start_time, self._reference, self._time, self._period, actual)
         tolerances = self._default_tolerances
         if constraints is not None:
             tolerances = Tolerances.of(self.joints, constraints, patient=self._compat == "ros2")
@@ -265,7 +265,7 @@ class JointTrajectoryController:
         """
         if not 0.0 < period < math.inf:
             raise InvalidArgument("CTRL105", f"controller '{self.name}': a period of {period} s; expected more than 0")
-        self._time = time
+        self._time, self._period = time, period
         reference = self._reference
         if reference.moving:
             reference.advance(time, period)

@@ -299,9 +299,14 @@ def lead_in(
     return whole.with_spline_velocities(start[1] if leads else None) if smooth else whole
 
 
+def first_to_come(times: Array, ago: float) -> int:
+    """Which of the points at `times` (K) is the first that comes later than `ago`; the last where none does."""
+    return min(int(np.searchsorted(times, ago, side="right")), len(times) - 1)
+
+
 def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
     """The points of a trajectory that come later than `ago` [s] of it, at the least the last, from then on."""
-    first = min(int(np.searchsorted(trajectory.times, ago, side="right")), len(trajectory.times) - 1)
+    first = first_to_come(trajectory.times, ago)
 
     def kept(values: Array | None) -> Array | None:
         return None if values is None else values[first:]

@@ -19,7 +19,15 @@ from manipcli.control.course import (
     stopping_in,
 )
 from manipcli.control.reference import Reference
-from manipcli.control.trajectory_goal import POSITION_SLACK, VELOCITY_SLACK, JointFacts, lead_in, shortest, too_fast
+from manipcli.control.trajectory_goal import (
+    POSITION_SLACK,
+    VELOCITY_SLACK,
+    JointFacts,
+    first_to_come,
+    lead_in,
+    shortest,
+    too_fast,
+)
 from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import Interpolation, JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec
@@ -90,39 +98,52 @@ class Transitions:
         return course.with_part(Part(columns, whole, begin))
 
     def check_way(
-        self, trajectory: JointTrajectory, start_time: float, reference: Reference, time: float, actual: Array
+        self,
+        trajectory: JointTrajectory,
+        start_time: float,
+        reference: Reference,
+        time: float,
+        period: float,
+        actual: Array,
     ) -> None:
-        """Whether the first point of a new goal can be reached from where it will begin: |p0 - q| <= v_max T.
+        """Whether the first point still to come of a new goal can be reached from where it begins: |p - q| <= v_max T.
 
-        Nobody knows exactly where that is. It counts what is nearest of the reference now, the reference one tick
-        later, and what is measured: who sends goals knows one of them.
+        Of a goal in the past, T is what is left of it at the next tick, at the least a period: where its end is over by
+        then, the reference steps there. Nobody knows exactly where the goal begins. It counts what is nearest of the
+        reference now, the reference one tick later, and what is measured: who sends goals knows one of them.
 
         Args:
             trajectory: its joints stand in the order of the controller.
             start_time: of the goal.
             reference, time: as for `to_goal`.
+            period: [s] to the next tick, at which the goal begins.
             actual: (n) what is measured now, continuous joints in the turn of the reference.
 
         Raises:
             GoalRejected: a joint would have to move faster than its limit, whatever the curve.
         """
-        begin = max(start_time, time) if self.replaces else time
-        duration = float(trajectory.times[0]) + max(start_time - begin, 0.0)
+        due = time + period
+        later = start_time - due if start_time > 0.0 else 0.0
+        k = first_to_come(trajectory.times, -later) if later < 0.0 else 0
+        ahead = later > 0.0 and self.replaces
+        duration = float(trajectory.times[k]) + (0.0 if ahead else later)
+        if later < 0.0:
+            duration = max(duration, period)
         stepping = "none" in (self.interpolation, trajectory.interpolation)
-        over = start_time > 0.0 and start_time + trajectory.times[0] <= time
-        if duration == 0.0 or stepping or over or trajectory.source is not None:
+        if duration == 0.0 or stepping or trajectory.source is not None:
             return
-        starts = [reference.row(begin)[POSITION], reference.row(begin + reference.period)[POSITION]]
-        if begin == time:
+        begin = start_time if ahead else time
+        starts = [reference.row(begin)[POSITION], reference.row(begin + period)[POSITION]]
+        if not ahead:
             starts.append(actual)
         facts = self.facts.some(trajectory.names)
-        ways = trajectory.positions[0] - np.array(starts)[:, self._columns(trajectory.names)]
+        ways = trajectory.positions[k] - np.array(starts)[:, self._columns(trajectory.names)]
         shortest(ways, facts)
         way = np.take_along_axis(ways, np.abs(ways).argmin(axis=0)[None], axis=0)[0]
         excess = np.abs(way) - facts.velocity * duration * (1.0 + VELOCITY_SLACK)
         if (excess > POSITION_SLACK).any():
             j = int(excess.argmax())
-            raise too_fast(facts, j, float(way[j]) / duration, "on the way to point 0")
+            raise too_fast(facts, j, float(way[j]) / duration, f"on the way to point {k}")
 
     def to_rest(self, reference: Reference, time: float) -> Course:
         """What is followed from `time` [s] on, until it rests; in seconds of real time.

@@ -445,5 +445,16 @@ def test_a_first_point_is_reached_from_where_the_reference_will_be():
                 controller.send_goal(goal)
 
 
+@pytest.mark.parametrize("points", [[at(0.9, 0.52)], [at(0.8, 0.4), at(0.9, 0.52)], [at(0.8, 0.4), at(0.9, 0.505)]])
+@pytest.mark.parametrize("replaces", [True, False])
+def test_of_a_goal_in_the_past_only_the_time_that_is_left_counts(points, replaces):
+    """At rest at 0 at 0.5 s: nothing brings a joint of 1 rad/s to 0.9 rad by 0.52 s, whenever the goal began."""
+    controller = quick(allow_trajectory_replacement=replaces)
+    run(controller, 50, first=1)
+    with pytest.raises(GoalRejected, match=rf"'j' moves at 90 rad/s on the way to point {len(points) - 1}"):
+        controller.send_goal(TrajectoryGoal(to(*points), start_time=1e-9))
+    assert controller.send_goal(TrajectoryGoal(to(at(0.8, 0.4), at(0.9, 1.5)), start_time=1e-9)).active
+
+
 def test_a_goal_before_the_controller_is_active_is_not_asked_for_its_way():
     assert made(limits=[JointLimits(velocity=1.0)]).send_goal(to(at(0.9, 0.1))).active
