@@ -270,6 +270,9 @@ def format_quantity(value: float, dimension: Dimension) -> str:
     return f"{value!r} {symbol}" if symbol else repr(value)
 
 
+NOTHING: Final = 1e-300
+"""What is less than this is 0, with a sign at most."""
+
 _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1.0, "m", 1.0), (1e-3, "mm", 1e3), (0.0, "um", 1e6)),
     "rad": ((0.0, "deg", 180.0 / math.pi),),
@@ -283,8 +286,10 @@ _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
 
 def readable(value: float, symbol: str, *, digits: int = 3) -> str:
     """`value` in the SI unit `symbol`, for people: `readable(0.0042, "m")` is `4.2 mm`; angles in degrees."""
-    if value == 0.0 or not math.isfinite(value):
-        return f"{value + 0.0:g} {symbol}".rstrip()  # never -0
+    if not math.isfinite(value):
+        return f"{value:g} {symbol}".rstrip()
+    if abs(value) < NOTHING:
+        return f"0 {symbol}".rstrip()  # never -0
     for least, shown, factor in _READABLE.get(symbol, ()):
         if abs(value) >= least:
             return f"{value * factor:.{digits}g} {shown}"

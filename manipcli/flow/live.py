@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.controller import Controller, ControllerOutput
-from manipcli.core.units import readable
+from manipcli.core.units import NOTHING, readable
 from manipcli.flow.log import recorded
 from manipcli.model.condition import World
 from manipcli.model.conditions import CONDITIONS
@@ -66,7 +66,7 @@ class Probe:
         if not self._last.applies[-1]:
             return self._word + self._last.idle
         found = self._last.found(len(self._last.margins) - 1)
-        by = f" by {readable(-found.margin, found.unit)}" if found.margin < 0.0 and found.unit else ""
+        by = f" by {readable(-found.margin, found.unit)}" if found.margin < -NOTHING and found.unit else ""
         return f"it fails{by}: {self._word}{found.text}"
 
     def look(self, moments: Moments, start: int) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.core.units import readable
+from manipcli.core.units import NOTHING, readable
 from manipcli.flow.live import Live, Probe
 from manipcli.judge.expectation import ROUNDING, labels
 from manipcli.model.moments import Moments
@@ -79,7 +79,7 @@ def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Read
         return None
     tick = int(np.argmax(bad))
     found, time = answer.found(tick), float(moments.times[tick])
-    by = f" by {readable(-found.margin, found.unit)}" if found.margin < 0.0 else ""
+    by = f" by {readable(-found.margin, found.unit)}" if found.margin < -NOTHING else ""
     return Broken(k, f"'{name}' is broken at t = {time:.3f} s{by}: {found.text}")
 
 

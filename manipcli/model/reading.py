@@ -3,6 +3,8 @@
     all: the least of the members,  any: the greatest,  not: the opposite;  always: the least over time,
     eventually: the greatest over time          (Donze and Maler, Robust satisfaction of temporal logic, 2010)
 
+A margin of 0 is met; its opposite is not, so that of a condition and its `not` exactly one holds.
+
 Margins in one unit compare as they are. Where units differ, as a tilt's and a distance's do, margins compare by
 themselves over the tolerance that each was compared to; signs come first in either order. What is told is the margin of
 the deciding member at the deciding moment, in its own unit.
@@ -10,9 +12,10 @@ the deciding member at the deciding moment, in its own unit.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +24,9 @@ from manipcli.core.geometry import Array
 
 Mask = npt.NDArray[np.bool_]
 Pick = Literal["least", "greatest"]
+
+EDGE: Final = sys.float_info.min
+"""Minus this, the least normal number, is the opposite of a margin of 0; readable text calls it 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +116,14 @@ def greatest(readings: Sequence[Reading]) -> Reading:
 
 
 def opposite(of: Reading, *, word: str = "not ") -> Reading:
-    """`not`: the same margin with the other sign; `word` is said before what was found."""
+    """`not`: the same margin with the other sign, 0 counting as above 0; `word` is said before what was found."""
 
     def found(k: int) -> Measured:
         one = of.found(k)
-        return replace(one, margin=0.0 - one.margin, text=f"{word}{one.text}")  # never -0
+        return replace(one, margin=-one.margin if one.margin else -EDGE, text=f"{word}{one.text}")
 
-    return replace(of, margins=0.0 - of.margins, relative=0.0 - of.relative, found=found)
+    margins, relative = (np.where(one == 0.0, -EDGE, -one) for one in (of.margins, of.relative))
+    return replace(of, margins=margins, relative=relative, found=found)
 
 
 def never(of: Reading) -> Reading:

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipcli.model.reading import (
+    EDGE,
     Extreme,
     Measured,
     NotEvaluated,
@@ -98,24 +99,26 @@ def by_hand(formula: Node | Leaf, k: int) -> tuple[float, str, bool]:
     members = [by_hand(one, k) for one in formula.members]
     applies = all(one[2] for one in members)
     if formula.word == "not":
-        return -members[0][0], members[0][1], applies
+        return -members[0][0] or -EDGE, members[0][1], applies
     mixed = len(units_of(formula)) > 1
     pick = min if formula.word == "all" else max
-    margin, unit, _ = pick(members, key=lambda one: one[0] / UNITS[one[1]] if mixed else one[0])
+    margin, unit, _ = pick(members, key=lambda one: order(one[0], one[1], mixed))
     return margin, unit, applies
 
 
-def holds(formula: Node | Leaf, k: int) -> bool | None:
-    """Plain logic; None on the edge, where a margin of zero means nothing."""
+def order(margin: float, unit: str, mixed: bool) -> float:
+    """By which margins compare."""
+    return margin / UNITS[unit] if mixed and abs(margin) > EDGE else margin
+
+
+def holds(formula: Node | Leaf, k: int) -> bool:
+    """Plain logic, in which a margin of zero is met."""
     if isinstance(formula, Leaf):
-        return None if formula.margins[k] == 0.0 else formula.margins[k] > 0.0
+        return formula.margins[k] >= 0.0
     members = [holds(one, k) for one in formula.members]
     if formula.word == "not":
-        return None if members[0] is None else not members[0]
-    decides = formula.word == "any"
-    if decides in members:
-        return decides
-    return None if None in members else not decides
+        return not members[0]
+    return any(members) if formula.word == "any" else all(members)
 
 
 @pytest.mark.slow
@@ -130,8 +133,7 @@ def test_every_tick_is_that_of_its_deciding_member(formula: Node | Leaf) -> None
         assert (found.margins[k], bool(found.applies[k])) == (margin, applies)
         assert (told.margin, told.unit, told.at) == (margin, unit, TIMES[k])
         assert told.text.endswith(f"{told.unit}")
-        truth = holds(formula, k)
-        assert truth is None or truth == (margin > 0.0)
+        assert holds(formula, k) == (margin >= 0.0)
 
 
 @pytest.mark.slow
@@ -143,20 +145,30 @@ def test_over_time_it_is_the_extreme_of_what_applies_wherever_it_is_cut(
     found = of(formula)
     ticks = [(*by_hand(formula, k), k) for k in range(T)]
     mixed = len(units_of(formula)) > 1
-    order = [(one[0] / UNITS[one[1]] if mixed else one[0], one[3]) for one in ticks if one[2]]
+    ranks = [(order(one[0], one[1], mixed), one[3]) for one in ticks if one[2]]
     pieces, whole = Extreme(pick), Extreme(pick)  # type: ignore[arg-type]
     whole.add(found, TIMES)
     for first, last in pairwise(sorted({0, T, *cuts})):
         pieces.add(found, TIMES, first, last)
     assert pieces.found == whole.found
-    if not order:
+    if not ranks:
         assert isinstance(whole.found, NotEvaluated)
         assert whole.found.reason.endswith("rests")
         return
-    value = (min if pick == "least" else max)(one[0] for one in order)
-    first = next(k for one, k in order if one == value)
+    value = (min if pick == "least" else max)(one[0] for one in ranks)
+    first = next(k for one, k in ranks if one == value)
     assert isinstance(whole.found, Measured)
     assert (whole.found.margin, whole.found.at) == (ticks[first][0], TIMES[first])
+
+
+def test_of_a_condition_without_room_and_its_not_exactly_one_is_met() -> None:
+    untouched = reading(np.array([0.0]), TIMES[:1], unit="N", scale=1.0, say=lambda k: "never touched")
+    against = opposite(untouched)
+    for one, met in ((untouched, True), (against, False), (never(untouched), False), (opposite(against), True)):
+        assert (one.order >= 0.0).tolist() == [met]
+        assert (one.relative >= 0.0).tolist() == [met]
+        assert (one.found(0).margin >= 0.0) is met
+        assert one.found(0).margin == pytest.approx(0.0, abs=1e-300)
 
 
 def test_signs_come_before_sizes_where_units_differ() -> None:

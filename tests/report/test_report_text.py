@@ -8,7 +8,9 @@ from dataclasses import replace
 import pytest
 
 from manipcli.core.errors import Finding, Place
+from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.reading import EDGE
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.table import table
@@ -60,6 +62,9 @@ def test_a_pass_says_how_much_there_was_to_spare() -> None:
 def test_a_pass_with_nothing_to_spare_is_a_pass() -> None:
     outcome = ExpectationOutcome("no_collision", "passed", 0.0, "N", None, "never touched")
     assert "passes: never touched" in render_verdict(replace(PASSED, expectations=(outcome,)), "x")
+    against = ExpectationOutcome("not", "failed", -EDGE, "N", None, "not never touched")
+    assert "fails: not never touched" in render_verdict(replace(PASSED, expectations=(against,)), "x")
+    assert quantity(-EDGE, "N") == readable(-EDGE, "N") == "0 N"
 
 
 def test_a_failure_begins_with_its_first_cause() -> None:
