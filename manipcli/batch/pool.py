@@ -13,7 +13,7 @@ from manipcli.batch.job import Job
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding
 from manipcli.core.lock import Taken
-from manipcli.report.suite import CaseReport, Trouble, troubles_of
+from manipcli.report.suite import CaseReport, Trouble, doubts_of, troubles_of
 
 WATCH_PERIOD = 0.1
 """[s] between two looks at what is being done, where nothing comes to an end."""
@@ -91,4 +91,5 @@ def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:
         text=why,
         findings=findings,
         troubles=troubles_of(findings),
+        warnings=doubts_of(findings),
     )

@@ -22,7 +22,7 @@ from manipcli.core.errors import ExitCode
 from manipcli.core.lock import Taken, lock
 from manipcli.core.whole_file import write_whole
 from manipcli.report.run_report import exit_code
-from manipcli.report.suite import CaseReport, CaseWord, Trouble, signal_name, troubles_of
+from manipcli.report.suite import CaseReport, CaseWord, Trouble, doubts_of, signal_name, troubles_of
 
 CHILD = """
 import json, sys
@@ -198,7 +198,7 @@ class Process:
             run=end.report,
             findings=end.findings,
             troubles=end.troubles or troubles_of(end.findings),
-            warnings=end.warnings,
+            warnings=end.warnings or doubts_of(end.findings),
             log=kept[job.log] or kept[job.partial],
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,

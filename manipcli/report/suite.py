@@ -144,8 +144,14 @@ def signal_name(number: int) -> str:
 
 
 def troubles_of(findings: Sequence[Finding]) -> tuple[Trouble, ...]:
-    """Why a file cannot be used, as troubles."""
+    """Why a file cannot be used, as troubles: its errors."""
     return tuple(
         Trouble(f"{one.severity}[{one.code}]: {one.message}{f' (hint: {one.hint})' if one.hint else ''}", one.place)
         for one in findings
+        if one.severity == "error"
     )
+
+
+def doubts_of(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """What there is to say of a file that keeps nobody from using it."""
+    return tuple(one for one in findings if one.severity != "error")

@@ -47,7 +47,8 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     name: str = report.case.file
     if report.page is not None:
         name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
-    more = [] if report.passed else [*beforehand(report, whole=True), element("code", report.command)]
+    others = [] if report.page is not None else [trouble.message for trouble in report.troubles[1:]]
+    more = [] if report.passed else [*others, *beforehand(report, whole=True), element("code", report.command)]
     return (
         mark(report.passed, report.outcome),
         joined(name, element("div", report.case.task)) if report.case.task else name,

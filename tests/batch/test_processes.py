@@ -358,11 +358,13 @@ def test_folders_that_hold_nothing_are_removed(tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:
     (job,) = jobs(tmp_path, "never")
     finding = Finding("YAML100", "quotes", Place("t0.yaml", 3, 4), hint="close them")
-    (report,) = run([replace(job, case=replace(job.case, findings=(finding,)))])
+    note = Finding("YAML105", "tabs", Place("t0.yaml", 1, 1), severity="note")
+    (report,) = run([replace(job, case=replace(job.case, findings=(note, finding)))])
     assert (report.outcome, report.troubles) == (
         "invalid",
         (Trouble("error[YAML100]: quotes (hint: close them)", finding.place),),
     )
+    assert report.warnings == (note,)
     assert not (tmp_path / "runs").exists()
 
 

@@ -19,7 +19,7 @@ from manipcli.report.github import render_annotations
 from manipcli.report.junit import render_junit as render_run_junit
 from manipcli.report.run_page import Written
 from manipcli.report.run_report import RunReport, Timing
-from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, signal_name, troubles_of
+from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, doubts_of, signal_name, troubles_of
 from manipcli.report.suite_junit import render_junit
 from manipcli.report.suite_page import render_page
 from manipcli.report.suite_text import gist, render_case, render_line, render_suite, render_summary
@@ -251,6 +251,19 @@ def test_findings_become_troubles_with_places_and_hints() -> None:
     assert troubles_of([Finding("TASK203", "no joint 'x'", place, hint="did you mean 'y'?")]) == (
         Trouble("error[TASK203]: no joint 'x' (hint: did you mean 'y'?)", place),
     )
+
+
+def test_what_ends_nothing_is_no_trouble() -> None:
+    note = Finding("URDF031", "link 'tip' has mass 0", Place("arm.urdf", 2, 3), severity="note")
+    wrong = Finding("ROBOT306", "no link 'x'", Place("robot.yaml", 6, 3))
+    assert [one.message for one in troubles_of([note, wrong])] == ["error[ROBOT306]: no link 'x'"]
+    assert doubts_of([note, wrong]) == (note,)
+
+
+def test_the_page_tells_all_that_is_wrong_with_what_has_no_page_of_its_own() -> None:
+    wrong = [Finding("TASK201", text, Place("a.yaml", k, 1)) for k, text in enumerate(("unknown key", "no number"), 1)]
+    page = render_page(Suite((report("invalid", troubles=troubles_of(wrong)),), 1, 1, 1.0), Path())
+    assert page.index("unknown key") < page.index("no number")
 
 
 def test_signals_have_names() -> None:
