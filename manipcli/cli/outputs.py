@@ -34,8 +34,8 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
         reads: what the same command reads, or writes under rules of its own.
 
     Raises:
-        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder; or it
-            is `-`, where stdout has the answer.
+        InvalidInput: the file of another option or one that is read is there, a folder is, or there is no folder, or
+            one that nothing can be written in; or it is `-`, where stdout has the answer.
     """
     taken = [os.path.realpath(path) for path in reads if path is not None]
     for option, path in outputs:
@@ -49,6 +49,9 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
         if path.is_dir() or not path.parent.is_dir():
             what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
             raise InvalidInput([Finding("USE082", f"{option} '{path}': {what}")])
+        whole = path if path.exists() and not path.is_file() else Path(os.path.realpath(path)).parent
+        if not os.access(whole, os.W_OK):
+            raise InvalidInput([Finding("USE082", f"{option} '{path}': nothing can be written in '{whole}'")])
         taken.append(os.path.realpath(path))
 
 

@@ -17,7 +17,7 @@ from manipcli.core.errors import ExitCode, Finding, InvalidInput
 from manipcli.core.text import number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from manipcli.batch.job import Job, Settings
     from manipcli.batch.process import Process
@@ -97,9 +97,9 @@ def test(
         suite = replace(suite, notes=(*suite.notes, *_notes(chosen, among, keyword)))
         remove_empty(settings.folder)
         lines.clear()
-        _write(suite, junit, report)
-        _tell(suite, format_, github=github)
-        return suite.exit_code
+        unwritten = _write(suite, junit, report)
+        _tell(replace(suite, notes=(*suite.notes, *unwritten)), format_, github=github)
+        return suite.exit_code or (ExitCode.INTERNAL if unwritten else ExitCode.PASSED)
 
 
 def _jobs(
@@ -212,20 +212,28 @@ def _tell(suite: Suite, format_: str, *, github: bool) -> None:
     console.result(suite_json.render_suite(suite) if format_ == "json" else suite_text.render_suite(suite))
 
 
-def _write(suite: Suite, junit: Path | None, report: Path | None) -> None:
+def _write(suite: Suite, junit: Path | None, report: Path | None) -> list[str]:
+    """The files that are asked for; why one is not written: that takes nothing from what is told."""
     from manipcli.core.whole_file import write_whole
+    from manipcli.report.suite_junit import render_junit
+    from manipcli.report.suite_page import render_page
 
+    files: list[tuple[Path, Callable[[], bytes]]] = []
     if junit is not None:
-        from manipcli.report.suite_junit import render_junit
-
-        write_whole(junit, render_junit(suite))
-        console.talk(f"written: {junit}")
+        files.append((junit, lambda: render_junit(suite)))
     if report is not None:
-        from manipcli.report.suite_page import render_page
-
-        report.mkdir(parents=True, exist_ok=True)
-        write_whole(report / "index.html", render_page(suite, report).encode())
-        console.talk(f"written: {report / 'index.html'}")
+        files.append((report / "index.html", lambda: render_page(suite, report).encode()))
+    unwritten = []
+    for path, render in files:
+        try:
+            if path != junit:
+                path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, render())
+        except OSError as error:
+            unwritten.append(f"not written: {path}: {error.strerror}")
+        else:
+            console.talk(f"written: {path}")
+    return unwritten
 
 
 def _time(option: str, word: str) -> float:
@@ -258,12 +266,16 @@ def _check_folder(report: Path | None) -> None:
     """Before anything is run.
 
     Raises:
-        InvalidInput: a file is where the folder should be, or it is `-`.
+        InvalidInput: a file is where the folder should be, nothing can be written there, or it is `-`.
     """
     if report is not None and str(report) == "-":
         raise InvalidInput([Finding("USE083", "--report '-': expected the name of a folder")])
     if report is not None and report.exists() and not report.is_dir():
         raise InvalidInput([Finding("USE086", f"--report '{report}': this is a file; a folder was expected")])
+    if report is not None:
+        there = next(place for place in (report.absolute(), *report.absolute().parents) if place.exists())
+        if not os.access(there, os.W_OK):
+            raise InvalidInput([Finding("USE086", f"--report '{report}': nothing can be written in '{there}'")])
 
 
 def _cores() -> int:

@@ -18,6 +18,7 @@ import pytest
 
 from manipcli.batch.job import Job
 from manipcli.cli.app import main
+from manipcli.report.suite import Case, CaseReport
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\
@@ -86,6 +87,33 @@ def test_only_earlier_results_are_replaced_by_results(
     assert main(["test", ".", "--junit", name]) == 4
     assert f"error[USE089]: --junit '{name}': there is a file that is no JUnit XML" in capsys.readouterr().err
     assert (folder / name).read_text() == "task: a\nrobot: r.yaml\nsteps: [\n"
+
+
+@pytest.mark.parametrize("option", ["--junit", "--report"])
+def test_where_nothing_can_be_written_is_told_before_anything_is_run(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    write(folder, "a")
+    (folder / "ro").mkdir()
+    monkeypatch.setattr(os, "access", lambda place, _: not str(place).endswith("ro"))  # root may write anywhere
+    assert main(["test", option, "ro/x"]) == 4
+    told = capsys.readouterr()
+    assert (told.out, "nothing can be written in '" in told.err) == ("", True)
+
+
+def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
+    assert main(["test", "--junit", "/dev/full", "--report", "pages", "--format", "json"]) == 4
+    answer = json.loads(capsys.readouterr().out)
+    assert [case["outcome"] for case in answer["cases"]] == ["invalid"]
+    assert answer["notes"] == ["not written: /dev/full: No space left on device"]
+    assert (folder / "pages" / "index.html").exists()
+    write(folder, "b")
+    done = CaseReport(Case("b.yaml", "b"), "passed", 1.0, "")
+    monkeypatch.setattr("manipcli.batch.pool.run_jobs", lambda _, **__: (one for one in [done]))
+    assert main(["test", "--junit", "/dev/full"]) == 3  # all passed, and who waits for the file does not know it
 
 
 def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
