@@ -19,6 +19,7 @@ from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros import rewrite
+from manipcli.spec.ros.substitutions import open_substitutions
 from manipcli.spec.salvage import salvage
 from manipcli.spec.salvage_robot import salvage_robot
 from manipcli.spec.task import TaskSpec
@@ -209,7 +210,8 @@ def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[s
     written, told = _source(text, name, "CTRL", "controllers")
     root, more = rewrite(written.root)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
-    return validate(source, ControllersSpec, findings=[*told, *more, *findings])
+    unfilled = open_substitutions(source.root)
+    return validate(source, ControllersSpec, findings=[*told, *more, *findings, *unfilled])
 
 
 def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Finding]]:

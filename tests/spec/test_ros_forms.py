@@ -549,3 +549,47 @@ def test_a_wrench_of_no_link_is_left_out() -> None:
     controllers, findings = loaded(text)
     assert list(controllers) == ["x"]
     assert [(f.severity, f.hint) for f in findings] == [("warning", "add `link: ...`")]
+
+
+@pytest.mark.parametrize("word", ["acceleration", "pid_gain", "kp"])
+def test_a_forward_controller_of_another_hardware_s_interface_is_left_out(word: str) -> None:
+    forward = f"y: {{type: forward_command_controller/ForwardCommandController, joints: [a], interface_name: {word}}}"
+    controllers, findings = loaded(f"x: {{{JTC}, joints: [a]}}\n{forward}\n")
+    assert list(controllers) == ["x"]
+    (line,) = told(findings)
+    assert line.partition("warning[CTRL214]: ")[2] == (
+        f"controller 'y': 'interface_name: {word}' is no interface that joints have here: left out"
+    )
+
+
+def test_a_slip_in_the_interface_of_a_forward_controller_is_an_error_under_its_own_key() -> None:
+    forward = "type: forward_command_controller/ForwardCommandController, joints: [a], interface_name: Velocty"
+    (line,) = refused(f"x: {{{forward}}}")
+    assert line.endswith(
+        "error[CTRL203]: controller 'x': interface_name: 'Velocty' is not known | did you mean 'velocity'?"
+    )
+
+
+def test_what_a_launch_file_would_fill_in_is_one_error_beside_all_else_that_is_told() -> None:
+    joint = '"$(var tf_prefix)a"'
+    text = f"""\
+io: {{type: ur_controllers/GPIOController, tf_prefix: "$(var tf_prefix)"}}
+"$(var tf_prefix)x": {{{JTC}, joints: [{joint}], constraints: {{{joint}: {{goal: 0.1}}}}}}
+"""
+    with pytest.raises(InvalidInput) as caught:
+        load_controllers_text(text, "c.yaml")
+    assert [(f.code, f.severity) for f in caught.value.findings] == [("CTRL214", "warning"), ("CTRL217", "error")]
+    (line,) = refused(text)
+    assert line.startswith("c.yaml:2:") and "'$(var tf_prefix)' is for a launch file to fill in" in line
+    assert "; it stands in 2 places" in line
+    controllers, _ = loaded(text.replace(joint, "a"))
+    assert list(controllers) == ["$(var tf_prefix)x"]
+
+
+def test_the_settings_of_a_simulated_hardware_are_no_controller() -> None:
+    """As the Setup Assistant of MoveIt 1 writes them."""
+    text = (
+        f"moveit_sim_hw_interface: {{joint_model_group: arm, joint_model_group_pose: home}}\nx: {{{JTC}, joints: [a]}}"
+    )
+    controllers, findings = loaded(text)
+    assert (list(controllers), [f.code for f in findings]) == (["x"], ["CTRL214"])

@@ -12,7 +12,7 @@ from manipcli.core.text import did_you_mean
 from manipcli.spec.controllers import Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
 from manipcli.spec.ros.table import Block, Table, model_below, models, value
-from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, OTHER_NODES, PACKAGES, UNSERVED_TYPES
+from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, INTERFACES, OTHER_NODES, PACKAGES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
 from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
@@ -166,6 +166,8 @@ class _Rewriting:
         if table is None or model is None:
             self.unknown_type(name, word.value, word.place)
             return None
+        if not self.has_interface(name, node, table):
+            return None
         own = ScalarNode(table.own, word.place, written=word.value)
         node = node.with_entry("type", Entry(entry.key_place, own))
         node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
@@ -178,6 +180,22 @@ class _Rewriting:
         served = self.served(name, node, table.parameters, model, ignored=ELSEWHERE)
         self.unclamped(name, mapping(mapping(served).get("gains")))
         return served
+
+    def has_interface(self, name: str, node: MappingNode, table: Table) -> bool:
+        """Whether it commands what joints have here; else that is told, as an error where it looks like a slip."""
+        key = table.interface
+        word = node.get(key) if key else None
+        if not isinstance(word, ScalarNode) or not isinstance(word.value, str) or word.value in INTERFACES:
+            return True
+        near = [one for one in INTERFACES if _slip(word.value, one)]
+        if near:
+            message = f"controller '{name}': {key}: '{word.value}' is not known"
+            self.tell("CTRL203", word.place, message, hint=did_you_mean(word.value, near))
+        else:
+            message = f"controller '{name}': '{key}: {word.value}' is no interface that joints have here: left out"
+            hint = f"interfaces: {', '.join(INTERFACES)}"
+            self.tell("CTRL214", word.place, message, hint=hint, severity="warning")
+        return False
 
     def effective(self, name: str, node: MappingNode, table: Table) -> MappingNode:
         """Without what does nothing on the interface that it commands, which is told."""

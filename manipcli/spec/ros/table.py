@@ -60,6 +60,8 @@ class Table:
         parameters: of all of them.
         reshape: controller after renaming -> what no table can say.
         idle: command interface -> keys of ours that do nothing on it.
+        interface: ROS's key whose value may be an interface of any hardware; with one that manipcli does not have, the
+            controller is left out with a warning.
         needs: a key without which ROS's block does not say enough; then it is left out with a warning.
     """
 
@@ -68,6 +70,7 @@ class Table:
     parameters: Block
     reshape: Callable[[MappingNode], MappingNode] = _same
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    interface: str = ""
     needs: str = ""
 
 

@@ -37,12 +37,12 @@ _GAINS: Final = Block(
     },
     unserved={"antiwindup_strategy": ("legacy",)},
 )  # fmt: skip
-_INTERFACES: Final = ("position", "velocity", "effort")
+INTERFACES: Final = ("position", "velocity", "effort")
 
 JOINT_TRAJECTORY: Final = Table(
     own="joint_trajectory",
     types={
-        **{f"{one}_controllers/JointTrajectoryController": {"command_interfaces": one} for one in _INTERFACES},
+        **{f"{one}_controllers/JointTrajectoryController": {"command_interfaces": one} for one in INTERFACES},
         "pos_vel_controllers/JointTrajectoryController": {"command_interfaces": "position velocity"},
         "pos_vel_acc_controllers/JointTrajectoryController": {"command_interfaces": "position velocity acceleration"},
         "joint_trajectory_controller/JointTrajectoryController": {},
@@ -110,6 +110,7 @@ FORWARD: Final = Table(
         neutral=_NEUTRAL,
     ),
     reshape=one_joint,
+    interface="interface_name",
 )
 
 PID: Final = Table(
@@ -145,7 +146,7 @@ JOINT_STATES: Final = Table(
         renamed={"interfaces": "state_interfaces"},
         neutral=_NEUTRAL | {
             "state_interfaces": ([],), "joints": ([],), "extra_joints": ([],),
-            "map_interface_to_joint_state": ({one: one for one in _INTERFACES},),
+            "map_interface_to_joint_state": ({one: one for one in INTERFACES},),
         },
     ),
 )  # fmt: skip
@@ -241,9 +242,9 @@ OTHER_NODES: Final = frozenset(
         "controller_list", "controller_manager", "controller_manager_ns", "controller_names", "controller_stopper",
         "gazebo_ros_control", "generic_hw_control_loop", "hardware_control_loop", "hardware_interface",
         "joint_group_limits", "joint_limits", "joint_state_publisher", "joint_state_publisher_gui", "move_group",
-        "moveit_controller_manager", "moveit_manage_controllers", "moveit_simple_controller_manager",
-        "robot_description", "robot_state_publisher", "ros2_control_node", "ros_control_namespace", "rviz2",
-        "servo_node", "sim_control_mode", "trajectory_execution", "use_sim_time",
+        "moveit_controller_manager", "moveit_manage_controllers", "moveit_sim_hw_interface",
+        "moveit_simple_controller_manager", "robot_description", "robot_state_publisher", "ros2_control_node",
+        "ros_control_namespace", "rviz2", "servo_node", "sim_control_mode", "trajectory_execution", "use_sim_time",
     }
 )  # fmt: skip
 """What else stands in files of ROS that hold controllers, and is none."""

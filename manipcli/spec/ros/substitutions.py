@@ -1,0 +1,48 @@
+"""What a launch file would have put in: `$(arg prefix)`, `$(var tf_prefix)`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from manipcli.core.errors import Finding, Place
+from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode
+
+_SUBSTITUTION = re.compile(r"\$\([a-z][^()]*\)")
+
+
+def open_substitutions(root: Node) -> list[Finding]:
+    """An error for each one that stands in a controller (its name may hold one), at the first place of it.
+
+    Args:
+        root: a tree in our form: what is left out of a file of ROS needs no filling in.
+    """
+    controllers = root.get("controllers") if isinstance(root, MappingNode) else None
+    named = controllers.entries.values() if isinstance(controllers, MappingNode) else ()
+    places: dict[str, dict[tuple[int, int], Place]] = {}
+    for text, place in (found for entry in named for found in _texts(entry.node)):
+        for word in _SUBSTITUTION.findall(text):
+            places.setdefault(word, {}).setdefault((place.line, place.column), place)
+    return [
+        Finding(
+            "CTRL217",
+            f"'{word}' is for a launch file to fill in, and none does here"
+            + (f"; it stands in {len(at)} places" if len(at) > 1 else ""),
+            at[min(at)],
+            hint="write what the launch file puts there; where that is nothing, take it out",
+        )
+        for word, at in places.items()
+    ]
+
+
+def _texts(node: Node) -> Iterator[tuple[str, Place]]:
+    """Every key and every text."""
+    if isinstance(node, MappingNode):
+        for key, entry in node.entries.items():
+            yield key, entry.key_place
+            yield from _texts(entry.node)
+    elif isinstance(node, SequenceNode):
+        for item in node.items:
+            yield from _texts(item)
+    elif isinstance(node, ScalarNode) and isinstance(node.value, str):
+        yield node.value, node.place
