@@ -103,6 +103,7 @@ def _world(task: Task, plan: Plan, session: Session) -> World:
         physics=ENGINES[task.spec.simulation.engine].physics == "full",
         referenced=frozenset(name for one in session.manager.controllers if one.interfaces for name in one.joints),
         steps=tuple(step.id for step in plan.steps),
+        period=task.spec.simulation.control_period,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, Seams, labels, outcome
 from manipcli.judge.moments import MomentsOfSpans, Order, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
@@ -59,6 +60,7 @@ def examine(
                 unrecorded=unrecorded(recording),
                 referenced=frozenset(name for trace in span.controllers for name in trace.joints),
                 steps=tuple(step.id for step in steps),
+                period=_period(span.states.time, recording.period),
             )
             asked = [Expected(one, world, steps, seam) for one in expect]
         moments = successive.next(span)
@@ -69,3 +71,8 @@ def examine(
         none = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording holds no state")
         return Examined(tuple(outcome(name, none) for name in names), end)
     return Examined(tuple(outcome(name, one.found(end)) for name, one in zip(names, asked, strict=True)), end)
+
+
+def _period(times: Array, control: float) -> float:
+    """[s] From one tick to the next that the log holds, which may hold fewer than there were, `control` [s] apart."""
+    return float(times[1] - times[0]) if len(times) > 1 else control

@@ -47,6 +47,7 @@ class World:
         unrecorded: why nothing is known of the motion of bodies, of contacts or of references.
         referenced: joints of which it is known what they should follow.
         steps: ids of the steps.
+        period: [s] from one tick to the next that is shown.
     """
 
     robot: RobotModel
@@ -56,6 +57,7 @@ class World:
     unrecorded: Mapping[Seen, str] = field(default_factory=dict)
     referenced: frozenset[str] = frozenset()
     steps: tuple[str, ...] = ()
+    period: float = 0.0
 
     @cached_property
     def kinematics(self) -> Kinematics:

@@ -167,7 +167,9 @@ def _margin(expectation: ExpectationOutcome) -> str:
         return f"was never evaluated{detail}"
     passed = expectation.outcome == "passed"
     when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
-    if abs(expectation.margin or 0.0) < NOTHING:  # none, or none to spare: 0 N between what never touched
+    if (
+        expectation.margin is None or abs(expectation.margin) < NOTHING
+    ):  # none, or none to spare: 0 N between what never touched
         return f"{'passes' if passed else 'fails'}{when}{detail}"
     size = quantity(abs(expectation.margin), expectation.unit)
     return f"{f'passes with {size} to spare' if passed else f'fails by {size}'}{when}{detail}"

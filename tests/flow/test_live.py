@@ -68,6 +68,8 @@ expect:
   - always: {{any: [{{tool_speed: {{below: 0.1 m/s}}}}, {{not: {{grasped: {{object: cup}}}}}}]}}
   - always: {{moved: {{object: cup, by: 1 cm}}}}
     during: lift_1
+  - always: {{duration: {{below: 9 s}}}}
+    during: lift_1
 """
 
 
@@ -93,7 +95,7 @@ class Watching(Live):
     """Opens a probe for everything that the task expects of the whole run, and one with the step."""
 
     opened: list[Answers]
-    of_step: Answers
+    of_step: list[Answers]
 
     def __init__(self, world: World, *rest: object) -> None:
         super().__init__(world, *rest)  # type: ignore[arg-type]
@@ -105,28 +107,30 @@ class Watching(Live):
     def step_started(self, step: str) -> None:
         super().step_started(step)
         if step == "lift_1":
-            type(self).of_step = Answers()
-            self.probe = self.open(OF_STEP, told=self.of_step.told)
+            type(self).of_step = [Answers() for _ in OF_STEP]
+            pairs = zip(OF_STEP, self.of_step, strict=True)
+            self.probes = [self.open(one, told=answers.told) for one, answers in pairs]
 
     def step_ended(self, step: str, outcome: str) -> None:
         super().step_ended(step, outcome)
         if step == "lift_1":
-            self.close(self.probe)
+            for probe in self.probes:
+                self.close(probe)
 
 
 EXPECT: list[ConditionSpec] = []
-OF_STEP: ConditionSpec
+OF_STEP: list[ConditionSpec] = []
 
 
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
     """A sample of the task, run with a live probe for each expectation, and what judging its log asks and answers."""
-    global OF_STEP
     folder = tmp_path_factory.mktemp("live")
     file = folder / "small.yaml"
     file.write_text(TASK)
-    *whole, last = load_task(file).spec.expect
-    EXPECT[:], OF_STEP = [one.condition for one in whole], last.condition
+    expect = load_task(file).spec.expect
+    EXPECT[:] = [one.condition for one in expect if not one.steps]
+    OF_STEP[:] = [one.condition for one in expect if one.steps]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(execute, "Live", Watching)
         report = pipeline.run_task(file, log=folder / "small.mcap", sample=0)
@@ -154,11 +158,11 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
 
 def test_every_condition_is_among_them(judged: list[Answers]) -> None:
     assert {leaf.name for one in EXPECT for leaf in leaves(one)} == set(CONDITIONS.names)
-    assert len(judged) == len(EXPECT) + 1
+    assert len(judged) == len(EXPECT) + len(OF_STEP)
 
 
 def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> None:
-    for spec, live, later in zip(EXPECT, Watching.opened, judged[:-1], strict=True):
+    for spec, live, later in zip(EXPECT, Watching.opened, judged[: len(EXPECT)], strict=True):
         count = len(live.times)  # the last block may not have been full
         assert 0 <= len(later.times) - count < 10, spec.name
         assert count > 3000
@@ -171,8 +175,11 @@ def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> N
 
 
 def test_what_counts_from_the_start_of_a_step_does_so_live_too(judged: list[Answers]) -> None:
-    live, later = Watching.of_step, judged[-1]
-    assert live.times == later.times
-    np.testing.assert_allclose(live.margins, later.margins, rtol=1e-12, atol=1e-12)
-    assert live.margins[0] == -0.01
-    assert live.margins[-1] >= 0.05
+    for live, later in zip(Watching.of_step, judged[len(EXPECT) :], strict=True):
+        assert live.times == later.times
+        np.testing.assert_allclose(live.margins, later.margins, rtol=1e-12, atol=1e-12)
+    moved, taken = Watching.of_step
+    assert moved.margins[0] == -0.01
+    assert moved.margins[-1] >= 0.05
+    assert taken.margins[0] == 9.0 - 0.001
+    assert taken.margins[-1] == pytest.approx(9.0 - 0.001 * len(taken.times), abs=1e-9)

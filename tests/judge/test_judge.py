@@ -96,6 +96,7 @@ def recording(**changes: Any) -> Recording:
         },
         attachments={"plan.json": json.dumps(plan).encode()},
         lost=None,
+        period=PERIOD,
     )
     return changed(made, **changes)
 

@@ -72,6 +72,7 @@ def recording(margins: Array = WALK, cuts: tuple[int, ...] = (), **changes: Any)
         metadata={"run": {"physics": "full", "status": "complete"}},
         attachments={"plan.json": json.dumps({"steps": planned}).encode()},
         lost=None,
+        period=PERIOD,
     )
     return replace(made, **changes)
 
@@ -163,11 +164,23 @@ def test_memory_does_not_grow_with_the_length_of_a_recording() -> None:
 
 def test_what_counts_from_a_start_counts_from_that_of_the_step() -> None:
     found = judged(recording(), {"duration": {"below": "1 s"}, "during": "b"})
-    assert found.margin == pytest.approx(1.0 - 0.49)
-    assert found.text == "during 'b': 0.490 s of 1 s"
+    assert found.margin == 0.5
+    assert found.text == "during 'b': 0.500 s of 1 s"
     ramp = np.minimum(0.5, 0.5 - (TIMES - 0.6))  # it leaves at 1 m/s when b begins
     moved = judged(recording(ramp), {"moved": {"object": "cube", "by": "20 cm"}, "at": "b"})
     assert moved.margin == pytest.approx(0.49 - 0.2)
+
+
+@pytest.mark.parametrize("every", [1, 2, 5, 7])
+def test_a_step_takes_as_long_as_its_events_say_however_few_ticks_the_log_holds(every: int) -> None:
+    few = recording(spans=[replace(one, states=one.states.map(lambda a: a[::every])) for one in recording().spans])
+    for name, started, ended in STEPS:
+        first = TIMES[::every][np.searchsorted(TIMES[::every], started - 1e-9)]
+        for scope in ("at", "during"):
+            found = judged(few, {"duration": {"below": "1 s"}, scope: name})
+            assert found.margin == pytest.approx(1.0 - (ended - first), abs=1e-12)
+    whole = judged(few, {"duration": {"below": "9 s"}})
+    assert whole.margin == pytest.approx(9.0 - TIMES[::every][-1], abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -206,8 +219,8 @@ def test_the_deciding_member_is_named_with_its_own_margin_and_moment() -> None:
         {"always": {"all": [{"upright": {"object": "cube", "within": "10 deg"}}, {"not": {"duration": {"below": 1}}}]}},
     )
     assert (found.name, found.outcome, found.unit, found.at) == ("all", "failed", "s", 0.0)
-    assert found.text == "not duration: 0.000 s of 1 s"
-    assert found.margin == -1.0
+    assert found.text == "not duration: 0.010 s of 1 s"
+    assert found.margin == -0.99
 
 
 def test_what_never_may_hold_and_what_never_came_true_say_how_close_it_was() -> None:

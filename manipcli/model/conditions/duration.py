@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from manipcli.model.condition import Condition, Gauge, World
@@ -20,13 +21,23 @@ class TimeTakenSpec(Model):
 
 
 def gauge(spec: TimeTakenSpec, world: World) -> Gauge:
-    """`below` minus the time [s] since the first tick."""
+    """`below` minus the time [s] since the first tick.
+
+    A tick of a step lasts until the next one, or until the step ended: with `at: STEP` and `during: STEP` it is the
+    time from the start of the step to its end.
+    """
     started: list[float] = []
 
     def look(moments: Moments) -> Reading:
         if not started:
             started.append(float(moments.times[0]))
-        passed = moments.times - started[0]
+        until = moments.times.copy()
+        for step in moments.steps:
+            if step.started is not None:
+                ended = np.inf if step.ended is None else step.ended
+                inside = (moments.times >= step.started - 0.5e-9) & (moments.times < ended - 0.5e-9)
+                until[inside] = np.minimum(moments.times[inside] + world.period, ended)
+        passed = np.round(until - started[0], 9)
 
         def say(k: int) -> str:
             return f"{passed[k]:.3f} s of {spec.below:g} s"
