@@ -24,6 +24,7 @@ from manipcli.model.packages import Packages
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.spec.located import Located
+from manipcli.spec.override import Override, read_overrides
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 
@@ -43,7 +44,8 @@ def load_task(
     """Read a task and everything it names; see `flow.load.load_task`.
 
     Args:
-        sample: which one of `vary:`; None for the task as it is written.
+        sample: which one of `vary:`; None for the task as it is written. What `overrides` set is not drawn; its
+            `offset` or `scale` is, about the value that they set.
 
     Raises:
         InvalidInput: also where nothing varies, or a drawn value cannot be.
@@ -57,7 +59,7 @@ def load_task(
     if not varied:
         message = f"there is no sample {sample}: task '{task.name}' has no `vary:`"
         raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
-    drawn = draw(varied, task.spec.simulation.seed, sample)
+    drawn = _but_for(draw(varied, task.spec.simulation.seed, sample), varied, read_overrides(overrides))
     return sampled(
         task,
         varied,
@@ -104,6 +106,19 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
     return replace(
         task, file=planned.task, robot_file=planned.robot, robot=robot, scene=scene, drawn=drawn, truth=truth
     )
+
+
+def _but_for(drawn: Drawn, varied: Sequence[Varied], overrides: Sequence[Override]) -> Drawn:
+    """Without the values that somebody set, alone or with what is around or in them."""
+
+    def is_set(one: Varied) -> bool:
+        return any(
+            override.area == one.area and all(a == b for a, b in zip(override.path, one.parts, strict=False))
+            for override in overrides
+        )
+
+    kept = {one.path for one in varied if one.how or not is_set(one)}
+    return replace(drawn, values=tuple((path, value) for path, value in drawn.values if path in kept))
 
 
 def _same(changes: Changes, seen: Changes, area: str) -> bool:

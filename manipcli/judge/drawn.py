@@ -31,6 +31,8 @@ class Drawn:
         """The same with `most` values; by default with all."""
         first = [f"{path}={value_text(value)}" for path, value in self.values[:most]]
         rest = len(self.values) - len(first)
+        if not first:
+            return f"sample {self.number}: nothing is drawn"
         return f"sample {self.number}: {', '.join(first)}" + (f", and {rest} more" if rest else "")
 
     def to_metadata(self) -> dict[str, str]:

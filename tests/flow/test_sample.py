@@ -43,6 +43,17 @@ def test_what_a_body_does_in_contact_is_known_to_the_world_alone(path: str) -> N
     assert getattr(task.scene.body("block"), path) == getattr(NOMINAL.scene.body("block"), path)
 
 
+def test_what_is_set_is_not_drawn_but_an_offset_or_scale_is_about_it() -> None:
+    vary = "{scene.block.mass: {choice: [1 kg]}, scene.block.friction: {scale: {choice: [0.5]}}, \
+        scene.block.at: {choice: [[1 m, 1 m]]}, simulation.settle: {choice: [0.3 s]}}"
+    words = (f"vary={vary}", "scene.block.mass=60 g", "scene.block.friction=0.8", "scene.block.at.0=0.55 m")
+    task = load_task(TASK, overrides=words, sample=0)
+    assert task.drawn is not None
+    assert dict(task.drawn.values) == {"scene.block.friction": 0.4, "simulation.settle": 0.3}
+    block = task.true.scene.body("block")
+    assert (block.mass, block.friction, block.X_WO.p[0]) == (0.06, 0.4, 0.55)
+
+
 def test_inertia_follows_a_varied_mass() -> None:
     task = _sample("{scene.block.mass: {scale: {choice: [3]}}}")
     heavy, light = (one.body("block").inertia for one in (task.true.scene, NOMINAL.scene))
@@ -62,7 +73,7 @@ def test_gains_and_gravity_and_actuators_are_known_to_the_world_alone() -> None:
         ROOT / "tasks" / "pour.yaml",
         overrides=(
             "robot.actuators={joint_1_motor: {latency: 0}}",
-            "vary={robot.actuators.*.latency: {choice: [1]}, robot.friction: {choice: [0.3]}, "
+            "vary={robot.actuators.*.latency: {offset: {choice: [1]}}, robot.friction: {choice: [0.3]}, "
             "simulation.gravity: {choice: [[0, 0, -5]]}, controllers.*.gains.*.p: {scale: {choice: [2]}}}",
         ),
         sample=0,
