@@ -5,7 +5,7 @@ Their loop is another one than that of efforts: no inertia is in it, and of an a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -41,16 +41,15 @@ class Driven:
     place: Place
 
 
-def driven_joints(task: Task) -> tuple[Driven, ...]:
-    """Those of controllers that are active at the start, and to which no effort is added; none where the engine makes
-    references come true."""
+def driven_joints(task: Task, active: Collection[str]) -> tuple[Driven, ...]:
+    """Those of these controllers to which no effort is added; none where the engine makes references come true."""
     if ENGINES[task.spec.simulation.engine].physics != "full":
         return ()
     period = task.spec.simulation.control_period
     found = []
     for name, spec in task.controllers.controllers.items():
         interface = next((one for one in spec.interfaces if one in ("position", "velocity")), None)
-        if not spec.active or interface is None or "effort" in spec.interfaces:
+        if name not in active or interface is None or "effort" in spec.interfaces:
             continue
         ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
         for joint in spec.joints:

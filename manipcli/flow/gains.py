@@ -1,4 +1,5 @@
-"""Can the gains of a task work? Asked before anything moves, over the postures in which the robot will be.
+"""Can the gains of a task work? Asked before anything moves, over the postures in which the robot will be while they
+are those of an active controller: from the start, or from a step on that switches.
 
 Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
 and whether there is effort enough for gravity, for the planned motions and grasps, and for standing near where it is
@@ -8,7 +9,7 @@ to stand. Joints on other interfaces: `drives.py`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -30,8 +31,10 @@ from manipcli.core.text import digits
 from manipcli.flow.drives import drive_findings, driven_joints, too_weak
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
+from manipcli.flow.switches import active_in
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
+from manipcli.plan.claims import Claims
 from manipcli.plan.hand import with_mimics
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 
@@ -64,27 +67,40 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         task: what is run.
         plan: of it; None: it is planned here; where that is not possible, that is told, and named poses are looked at.
     """
-    robot = task.robot
-    loops, drives = _loops(task), driven_joints(task)
-    if not (loops or drives):
+    robot, spec = task.robot, task.controllers
+    in_steps = tuple(active_in(task.spec.steps, Claims.of(spec), robot))
+    shifts = {active: (_loops(task, active), driven_joints(task, active)) for active in dict.fromkeys(in_steps)}
+    if not any(loops or drives for loops, drives in shifts.values()):
         return ()
     kinematics = Kinematics(robot, gravity=task.scene.gravity)
-    unplanned: tuple[Finding, ...] = ()
+    found: list[Finding] = []
     if plan is None:
         try:
             plan = plan_task(task)
         except NotPlannable as refusal:
-            unplanned = refusal.findings
-    postures = (
-        _planned(task, plan) if plan is not None else Postures.at_rest(named_postures(robot, start_position(task)))
-    )
-    found = [] if plan is None else list(_strained(task, plan))
-    if loops:
-        load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-        found += _findings(task, loops, load, planned=plan is not None)
-    if drives:
-        found += drive_findings(task, drives, kinematics, postures, planned=plan is not None)
-    return (*unplanned, *found)
+            found += refusal.findings
+    if plan is not None:
+        found += _strained(task, plan)
+    rows = None if plan is None else _planned(task, plan)
+    named = Postures.at_rest(named_postures(robot, start_position(task)))
+    told: set[tuple[str, Place | None, str]] = set()
+    for active, (loops, drives) in shifts.items():
+        postures = named if rows is None else _while(rows, [there == active for there in in_steps])
+        new: list[Finding] = []
+        if loops:
+            load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
+            new += _findings(task, loops, load, planned=plan is not None)
+        if drives:
+            new += drive_findings(task, drives, kinematics, postures, planned=plan is not None)
+        # Who stays while others change is looked at again: each doubt about each of its joints is told once.
+        found += [one for one in new if _about(one) not in told]
+        told.update(map(_about, new))
+    return tuple(found)
+
+
+def _about(finding: Finding) -> tuple[str, Place | None, str]:
+    """What is doubted, and of what; without the numbers."""
+    return finding.code, finding.place, finding.message.partition(":")[0]
 
 
 def named_postures(robot: RobotModel, start: Array) -> Array:
@@ -97,13 +113,16 @@ def named_postures(robot: RobotModel, start: Array) -> Array:
     return np.array(rows)
 
 
-def _planned(task: Task, plan: Plan) -> Postures:
-    """Samples of all motions, the other joints as they are then."""
+Row = tuple[int, Array, Array, Array]
+
+
+def _planned(task: Task, plan: Plan) -> tuple[Row, ...]:
+    """Samples of all motions, the other joints as they are then: 1 + the step's index, or 0 before the first of them;
+    positions, velocities and accelerations (n)."""
     robot = task.robot
-    rows: list[tuple[Array, Array, Array]] = []
     here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
-    rows.append((here, still, still))
-    for step in plan.steps:
+    rows: list[Row] = [(0, here, still, still)]
+    for k, step in enumerate(plan.steps, 1):
         for motion in step.plan.motions:
             if motion.trajectory is None:
                 continue
@@ -112,19 +131,27 @@ def _planned(task: Task, plan: Plan) -> Postures:
             for q, v, a in zip(*motion.trajectory.sample(times), strict=True):
                 row = (here.copy(), still.copy(), still.copy())
                 row[0][at], row[1][at], row[2][at] = q, v, a
-                rows.append((with_mimics(robot, row[0]), row[1], row[2]))
-            here = rows[-1][0]
+                rows.append((k, with_mimics(robot, row[0]), row[1], row[2]))
+            here = rows[-1][1]
         here = np.array(step.plan.end.position)
-        rows.append((here, still, still))
-    position, velocity, acceleration = (np.array(part) for part in zip(*rows, strict=True))
+        rows.append((k, here, still, still))
+    return tuple(rows)
+
+
+def _while(rows: tuple[Row, ...], there: list[bool]) -> Postures:
+    """Those of the steps in which they are `there`; as in the rows, the first is the time before all steps."""
+    chosen = [row for row in rows if there[row[0]]]
+    position, velocity, acceleration = (np.array([row[part] for row in chosen]) for part in (1, 2, 3))
     return Postures(position, velocity, acceleration)
 
 
-def _loops(task: Task) -> tuple[Held, ...]:
+def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
     period = task.spec.simulation.control_period
     found = []
     for name, spec in task.controllers.controllers.items():
-        if not spec.active or spec.interfaces != ("effort",) or not isinstance(spec, JointTrajectorySpec | GripperSpec):
+        if name not in active or not isinstance(spec, JointTrajectorySpec | GripperSpec):
+            continue
+        if spec.interfaces != ("effort",):
             continue
         ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
         weightless = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
