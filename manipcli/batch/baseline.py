@@ -199,6 +199,14 @@ def read_baseline(path: Path) -> Measures | None:
         raise InvalidInput([_no_baseline(path, "keys or numbers are not those of a baseline")]) from None
 
 
+def is_baseline(path: Path) -> bool:
+    """Whether `read_baseline` reads one there."""
+    try:
+        return read_baseline(path) is not None
+    except InvalidInput:
+        return False
+
+
 def _refuse(constant: str) -> float:
     raise ValueError(f"{constant} is no number")
 

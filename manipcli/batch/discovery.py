@@ -4,7 +4,7 @@ that are named."""
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,6 +40,19 @@ def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = No
     if refused:
         raise InvalidInput(refused)
     return tuple(found.values())
+
+
+def baselines_of_none(paths: Sequence[Path], files: Iterable[Path]) -> tuple[Path, ...]:
+    """Baselines below the folders among `paths` that belong to none of the task `files`: nothing is compared with them.
+
+    What else is called so is left alone.
+    """
+    from manipcli.batch.baseline import is_baseline, kept_baseline
+
+    owned = {os.path.realpath(kept_baseline(file)) for file in files}
+    below = [file for path in paths if path.is_dir() for file in _files(path)]
+    named = {os.path.realpath(file): file for file in below if file.name.endswith(".baseline.json")}
+    return tuple(file for real, file in named.items() if real not in owned and is_baseline(file))
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:

@@ -90,11 +90,12 @@ def test(
         check_outputs(("--junit", junit))
         _check_replaced(junit)
         _check_folder(report)
-        chosen, among = _jobs(paths or [Path()], settings, keyword=keyword, samples=samples, last_failed=last_failed)
+        places = paths or [Path()]
+        chosen, among = _jobs(places, settings, keyword=keyword, samples=samples, last_failed=last_failed)
         at_once = min(jobs or _cores(), max(1, len(chosen)))
         lines = _Lines(chosen, text=format_ == "text", quiet=quiet)
         suite = _run(chosen, at_once, lines, first=first)
-        suite = replace(suite, notes=(*suite.notes, *_notes(chosen, among, keyword)))
+        suite = replace(suite, notes=(*suite.notes, *_notes(chosen, among, keyword, places)))
         remove_empty(settings.folder)
         lines.clear()
         unwritten = _write(suite, junit, report)
@@ -104,8 +105,8 @@ def test(
 
 def _jobs(
     paths: Sequence[Path], settings: Settings, *, keyword: str, samples: int | None, last_failed: bool
-) -> tuple[tuple[Job, ...], int]:
-    """What is to be run, in order; and how many there were to choose from."""
+) -> tuple[tuple[Job, ...], tuple[Job, ...]]:
+    """What is to be run, in order; and what there was to choose from."""
     from manipcli.batch.discovery import failed_of, read_case, samples_of, shown_path, task_files
     from manipcli.batch.job import Job
     from manipcli.batch.last_failed import last_failed as known
@@ -121,15 +122,18 @@ def _jobs(
         found += (Job(one, file, settings) for one in cases)
         again += (Job(one, file, settings) for one in failed_of(case, failed) if samples is None or one in cases)
     matching = [[job for job in jobs if chosen(job.case)] for jobs in (again, found)]
-    return tuple(matching[0] or matching[1]), len(found)
+    return tuple(matching[0] or matching[1]), tuple(found)
 
 
-def _notes(jobs: Sequence[Job], among: int, keyword: str) -> Iterator[str]:
+def _notes(jobs: Sequence[Job], among: Sequence[Job], keyword: str, places: Sequence[Path]) -> Iterator[str]:
     """What a user would miss."""
     from manipcli.batch.baseline import kept_baseline
+    from manipcli.batch.discovery import baselines_of_none, shown_path
 
     if keyword and among and not jobs:
-        yield f"-k '{keyword}' matches none of {number_of(among, 'test')}"
+        yield f"-k '{keyword}' matches none of {number_of(len(among), 'test')}"
+    for file in baselines_of_none(places, [job.path for job in among]):
+        yield f"{shown_path(file)} is the baseline of no task here: rename it as its task, or remove it"
     uncompared = sum(not job.nominal and kept_baseline(job.path).exists() for job in jobs)
     if uncompared:
         why = "it is that of the task as it is written, without --set, --seed and --samples"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.batch.discovery import read_case, samples_of, task_files
+from manipcli.batch.discovery import baselines_of_none, read_case, samples_of, task_files
 from manipcli.batch.first_look import first_look
 from manipcli.core.errors import InvalidInput
 
@@ -154,6 +154,19 @@ def test_a_file_that_cannot_be_read_is_a_case_with_its_findings(folder: Path) ->
     (finding,) = case.findings
     assert finding.place is not None
     assert (finding.place.file, finding.place.line) == ("tasks/broken.yaml", 4)
+
+
+def test_a_baseline_whose_task_was_renamed_is_found(folder: Path) -> None:
+    text = '{"duration": 1.0, "margins": {}, "steps": {}}'
+    for name in ("a.baseline.json", "b.baseline.json", "c@yml.baseline.json", "runs/d.baseline.json"):
+        (folder / "own" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "own" / name).write_text(text)
+    (folder / "own" / "other.baseline.json").write_text("{}")  # that of another tool
+    files = [folder / "own" / "a.yaml", folder / "own" / "c.yml"]
+    for file in files:
+        file.write_text("task: t\nrobot: r.yaml\n")
+    assert baselines_of_none([folder / "own"], files) == (folder / "own" / "b.baseline.json",)
+    assert baselines_of_none(files, files[:1]) == ()
 
 
 def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:

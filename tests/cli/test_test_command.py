@@ -116,6 +116,12 @@ def test_a_result_that_cannot_be_written_takes_nothing_from_what_is_told(
     assert main(["test", "--junit", "/dev/full"]) == 3  # all passed, and who waits for the file does not know it
 
 
+def test_a_baseline_of_no_task_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "old.baseline.json").write_text('{"duration": 1.0, "margins": {}, "steps": {}}')
+    assert main(["test"]) == 5
+    assert capsys.readouterr().out.startswith("old.baseline.json is the baseline of no task here: ")
+
+
 def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
     (folder / "out.xml").touch()
     (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
