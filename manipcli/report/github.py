@@ -6,7 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from manipcli.report.suite import CaseReport
+from manipcli.core.errors import Place
+from manipcli.report.suite import CaseReport, Trouble
 from manipcli.report.suite_text import once_a_file
 
 
@@ -18,28 +19,25 @@ def render_annotations(reports: Sequence[CaseReport], *, workspace: Path | None 
         workspace: the checkout that GitHub shows, to which the names of files are made relative.
     """
     return "\n".join(
-        _command(
-            report,
-            file=trouble.place.file if trouble.place is not None else report.case.file,
-            at=(trouble.place.line, trouble.place.column) if trouble.place is not None else (1, 1),
-            message=trouble.message,
-            workspace=workspace,
-        )
+        _command(report, trouble, workspace)
         for report in once_a_file(reports)
         if not report.passed
         for trouble in report.troubles
     )
 
 
-def _command(report: CaseReport, *, file: str, at: tuple[int, int], message: str, workspace: Path | None) -> str:
-    if workspace is not None:
-        # A file outside of the checkout keeps a name that nothing there has.
-        file = os.path.relpath(file, workspace)
-    line, column = at
+def _command(report: CaseReport, trouble: Trouble, workspace: Path | None) -> str:
+    """At the line of the trouble; what has none, as a word of the command line, is told with the task."""
+    place, message = trouble.place, trouble.message
+    if place is None or place.line == 0:
+        message = message if place is None else f"{place}: {message}"
+        place = Place(report.case.file, 1, 1)
+    # A file outside of the checkout keeps a name that nothing there has.
+    file = place.file if workspace is None else os.path.relpath(place.file, workspace)
     words = {
         "file": file,
-        "line": str(max(line, 1)),
-        "col": str(max(column, 1)),
+        "line": str(place.line),
+        "col": str(max(place.column, 1)),
         "title": f"{report.case.name} {report.outcome}",
     }
     properties = ",".join(f"{key}={_property(value)}" for key, value in words.items())

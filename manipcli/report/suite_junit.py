@@ -79,8 +79,10 @@ def _without_verdict(report: CaseReport) -> Element:
     one = Element("testsuite", counts)
     place = report.troubles[0].place if report.troubles else None
     words = {"classname": _safe(f"{report.case.task}.run"), "name": "run", "time": "0.000"}
-    words |= {"file": _safe(place.file if place is not None else report.case.file)}
-    words |= {"line": str(place.line)} if place is not None and place.line > 0 else {}
+    if place is not None and place.line > 0:
+        words |= {"file": _safe(place.file), "line": str(place.line)}
+    else:  # a word of the command line is no file
+        words["file"] = _safe(report.case.file)
     error = SubElement(SubElement(one, "testcase", words), "error")
     error.set("type", report.outcome)
     error.set("message", _safe(report.text))

@@ -128,6 +128,18 @@ def test_annotations_are_what_github_reads(tmp_path: Path) -> None:
     assert "file=a%2Cb%3Ac.yaml," in render_annotations([odd])
 
 
+def test_what_a_word_of_the_command_line_does_is_told_with_the_task() -> None:
+    wrong = [Finding("TASK212", "there is no 'nope'", Place("--set scene.nope.x=1", 0, 0))]
+    odd = report("invalid", troubles=troubles_of(wrong))
+    assert render_annotations([odd]) == (
+        "::error file=tasks/pour.yaml,line=1,col=1,title=pour invalid::"
+        "--set scene.nope.x=1: error[TASK212]: there is no 'nope'"
+    )
+    (case,) = fromstring(render_junit(Suite((odd,), 1, 1, 1.0))).iter("testcase")
+    assert (case.get("file"), case.get("line")) == ("tasks/pour.yaml", None)
+    assert "--set scene.nope.x=1: error[TASK212]" in (case.findtext("error") or "")
+
+
 def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "project").mkdir()
     monkeypatch.chdir(tmp_path / "project")
