@@ -169,7 +169,9 @@ def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Su
             console.talk(f"what failed is not remembered: {error}")
     order = {job.case.id: k for k, job in enumerate(jobs)}
     reports.sort(key=lambda one: order[one.case.id])
-    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped, notes)
+    known = {one.case.id for one in reports}
+    undone = tuple(job.case for job in jobs if job.case.id not in known)
+    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped, notes, undone)
 
 
 class _Lines:

@@ -113,7 +113,13 @@ class CaseReport:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """All of it. `total`: how many there were to run; `stopped`: why some were not; `notes`: what else to know."""
+    """All of it.
+
+    Attributes:
+        total: how many there were to run.
+        stopped: why some were not; `undone`: which.
+        notes: what else to know.
+    """
 
     reports: tuple[CaseReport, ...]
     total: int
@@ -121,6 +127,7 @@ class Suite:
     duration: float
     stopped: Literal["", "interrupted", "first failure"] = ""
     notes: tuple[str, ...] = ()
+    undone: tuple[Case, ...] = ()
 
     @property
     def exit_code(self) -> ExitCode:

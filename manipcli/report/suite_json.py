@@ -21,6 +21,7 @@ def render_suite(suite: Suite) -> str:
             "passed": sum(report.passed for report in suite.reports),
             "jobs": suite.jobs,
             "wall_time": number(suite.duration),
+            "not_run": [case.id for case in suite.undone],
             "notes": list(suite.notes),
             "cases": [_case(report) for report in suite.reports],
         }

@@ -1,4 +1,4 @@
-"""Many runs as one JUnit file: the suites that each run has by itself, and one for each that has no verdict.
+"""Many runs as one JUnit file: the suites that each run has by itself, and one for each that has no verdict or no run.
 
 Times are those on the wall, and stand with the case `run` of each: the simulated time of a step is no time that a test
 took.
@@ -10,7 +10,7 @@ import re
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from manipcli.core.text import escape
-from manipcli.report.suite import CaseReport, Suite
+from manipcli.report.suite import Case, CaseReport, Suite
 from manipcli.report.suite_text import beforehand
 
 COUNTED = ("tests", "failures", "errors", "skipped")
@@ -37,6 +37,7 @@ def render_junit(suite: Suite) -> bytes:
             if not report.passed:
                 SubElement(one, "system-out").text = _safe(f"again: {report.command}")
             root.append(one)
+    root.extend(_undone(suite, case) for case in suite.undone)
     for count in COUNTED:
         root.set(count, str(sum(int(one.get(count, "0")) for one in root)))
     root.set("time", f"{suite.duration:.3f}")
@@ -89,6 +90,18 @@ def _without_verdict(report: CaseReport) -> Element:
     error.text = "\n".join(
         _safe(f"{one.place}: {one.message}" if one.place else one.message) for one in report.troubles
     )
+    return one
+
+
+def _undone(suite: Suite, case: Case) -> Element:
+    """A case that was not run, or not to its end: an error where somebody interrupted, else skipped."""
+    kind, count = ("error", "errors") if suite.stopped == "interrupted" else ("skipped", "skipped")
+    counts = dict.fromkeys(COUNTED, "0") | {"tests": "1", count: "1", "time": "0.000"}
+    one = Element("testsuite", {"name": _safe(case.id), **counts})
+    words = {"classname": _safe(f"{case.task}.run"), "name": "run", "time": "0.000", "file": _safe(case.file)}
+    told = SubElement(SubElement(one, "testcase", words), kind, {"message": f"not run to its end: {suite.stopped}"})
+    if kind == "error":
+        told.set("type", suite.stopped)
     return one
 
 

@@ -311,11 +311,12 @@ def test_a_run_that_takes_too_long_is_ended_and_named(folder: Path, run_cli: Any
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_ends_the_runs_and_still_sums_up(folder: Path, number: signal.Signals) -> None:
     write(folder, "a", wait="500 s")
-    started = Started(folder)
+    started = Started(folder, "--junit", "out.xml")
     child = started.child()
     started.process.send_signal(number)
     code, out = started.end()
     assert code == 2
+    assert parse(folder / "out.xml").getroot().get("errors") == "1"
     assert re.search(r"✗ 1 not run in \d+\.\d s, 1 process; interrupted", out)
     assert "interrupted: a.yaml::a: step 1 of 1, 'wait_1' at " in out
     assert not Path(f"/proc/{child}").exists()

@@ -166,6 +166,16 @@ def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
     assert "again: manipcli run tasks/pour.yaml" in [one.text for one in suites[2].findall("system-out")]
 
 
+@pytest.mark.parametrize(("stopped", "errors", "skipped"), [("interrupted", "2", "0"), ("first failure", "0", "2")])
+def test_what_was_not_run_is_in_the_file(stopped: str, errors: str, skipped: str) -> None:
+    undone = (Case("a.yaml", "a"), Case("b.yaml", "b", sample=3))
+    suite = Suite((), 2, 1, 1.0, stopped, undone=undone)  # type: ignore[arg-type]
+    root = fromstring(render_junit(suite))
+    assert [root.get(name) for name in ("tests", "failures", "errors", "skipped")] == ["2", "0", errors, skipped]
+    assert [one.get("name") for one in root] == ["a.yaml::a", "b.yaml::b[3]"]
+    assert json.loads(suite_json.render_suite(suite))["not_run"] == ["a.yaml::a", "b.yaml::b[3]"]
+
+
 def with_junit(one: CaseReport) -> CaseReport:
     assert one.run is not None
     verdict = one.run.verdict
