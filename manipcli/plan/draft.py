@@ -72,14 +72,14 @@ class Draft:
         """Straight in joint space; joints of the hand are moved by their own controller at the same time.
 
         Raises:
-            NotPlannable: joints of the hand are named while it is closed on something.
+            NotPlannable: joints of the hand are named after it was closed.
         """
         hand = self._planner.gripper_joints
         values = dict(zip(names, target, strict=True))
         arm = [name for name in names if name not in hand]
         if self._now.closed and len(arm) < len(names):
             carried = self._now.carried
-            what = "is closed on something" if carried is None else f"holds '{carried.body}'"
+            what = "an earlier step closed" if carried is None else f"holds '{carried.body}'"
             named = next(name for name in names if name in hand)
             raise NotPlannable(
                 f"joint '{named}' belongs to the hand, which {what}",

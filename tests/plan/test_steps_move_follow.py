@@ -333,7 +333,9 @@ def test_a_hand_closed_on_nothing_named_is_left_closed_by_moves(bench: Make) -> 
     arm.do("grasp", {"posture": "wrap"})
     assert arm.now.closed
     assert arm.plan("move", {"to": "zero"}).motions[0].grip is None
-    assert arm.refused("move", {"to": "open"}).hint == "`release` opens the hand"
+    refusal = arm.refused("move", {"to": "open"})
+    assert refusal.cause.endswith("belongs to the hand, which an earlier step closed")
+    assert refusal.hint == "`release` opens the hand"
     assert arm.refused("lift", {"object": "cup"}).cause == "'cup' is not held: the hand is closed, but not on it"
     arm.do("release", {})
     assert not arm.now.closed

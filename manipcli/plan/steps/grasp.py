@@ -24,7 +24,10 @@ DEFAULT_FORCE = 8.0
 
 
 class GraspSpec(Model):
-    """The hand closes until each finger meets `force`; what it holds, it holds by friction alone."""
+    """The hand closes until each finger meets `force`; what it holds, it holds by friction alone.
+
+    It stays closed, also where it met nothing, until `release` or `place` opens it.
+    """
 
     object: str | None = Field(None, description="What is grasped; carried from then on. Default: not said.")
     posture: str = Field("closed", description="The named pose that the hand closes towards.")

@@ -31,8 +31,8 @@ Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity
 class MoveSpec(Model):
     """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` in a `frame`.
 
-    While the hand is closed on something, it stays closed: of a named pose only the joints of the arm count then, and
-    joints of the hand named one by one are refused. `release` and `place` open it.
+    After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it: of
+    a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
@@ -60,7 +60,7 @@ class MoveSpec(Model):
 
 
 def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """One motion; a named pose that includes the hand moves the hand at the same time, unless it holds something."""
+    """One motion; a named pose that includes the hand moves the hand at the same time, unless it was closed."""
     draft = Draft(planner, situation, verb="move")
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
