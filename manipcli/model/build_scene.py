@@ -26,6 +26,8 @@ Resolve = Callable[[str], Path]
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
+UPRIGHT = 1.0 - 1e-6
+"""Least cosine of the tilt of what carries or contains something: none, but for rounding."""
 
 
 def build_scene(spec: TaskSpec, *, place: Locate | None = None, resolve: Resolve | None = None) -> Scene:
@@ -224,13 +226,13 @@ class _Builder:
         loc: Loc = ("scene", name, "rests_on")
         support, shape = self.shapes[other], self.shapes[name]
         assert spec.at is not None
+        if X_WB.R[2, 2] < UPRIGHT:
+            self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
+            return None
         if not support.flat_top:
             flat = "rest it on a box, a cylinder or the floor"
             hint = f"say `inside: {other}`" if support.interior is not None else flat
             self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
-            return None
-        if X_WB.R[2, 2] < 1.0 - 1e-6:
-            self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
             return None
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
         X_WO = Transform.of(xyz=(*spec.at, top - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
@@ -257,6 +259,9 @@ class _Builder:
             containers = [known for known, made in self.shapes.items() if made.interior is not None]
             hint = f"containers here: {', '.join(containers)}" if containers else "a cup or a tray is a container"
             self._error("TASK224", f"'{other}' is a {self.kinds[other]} and has no inside", loc, hint)
+            return None
+        if X_WB.R[2, 2] < UPRIGHT:
+            self._error("TASK224", f"nothing stays inside '{other}': it is tilted", loc, "give a `pose` instead")
             return None
         lack = _too_big(shape, spec.yaw, interior)
         if lack > 0.0:

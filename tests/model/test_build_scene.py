@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import Transform
 from manipcli.model.build_scene import build_scene
 from manipcli.model.robot import Box, Cylinder
 from manipcli.model.scene import Scene
@@ -90,11 +91,20 @@ def test_what_is_inside_a_cup_lies_on_its_floor() -> None:
     np.testing.assert_allclose(scene.body("ball").X_WO.p, [0.75, 0.0, 0.4 + 0.004 + 0.014], atol=1e-15)
 
 
-def test_what_is_inside_a_tilted_tray_lies_on_its_floor() -> None:
-    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [1, 2, 3], "rpy": [0.5, 0, 0]}, "mass": 1}
-    scene = built({"tray": tray, "ball": BALL | {"inside": "tray"}})
-    up = np.array([0.0, -np.sin(0.5), np.cos(0.5)])
-    np.testing.assert_allclose(scene.body("ball").X_WO.p, [1, 2, 3] + (0.01 + 0.014) * up, atol=1e-12)
+def test_what_is_inside_a_turned_tray_lies_on_its_floor() -> None:
+    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [1, 2, 3], "rpy": [0, 0, 0.5]}, "mass": 1}
+    scene = built({"tray": tray, "box": CUBE | {"inside": "tray", "yaw": 0.25}})
+    np.testing.assert_allclose(scene.body("box").X_WO.p, [1, 2, 3 + 0.01 + 0.05], atol=1e-12)
+    np.testing.assert_allclose(scene.body("box").X_WO.R, Transform.of(rpy=(0, 0, 0.75)).R, atol=1e-12)
+
+
+@pytest.mark.parametrize("rpy", [[np.pi, 0, 0], [0, np.pi / 2, 0], [0.1, 0, 0]])
+def test_nothing_is_put_inside_or_on_what_is_tilted(rpy: list[float]) -> None:
+    cup = CUP | {"pose": {"xyz": [0, 0, 1], "rpy": rpy}}
+    for placed in ({"inside": "cup"}, {"rests_on": "cup", "at": [0, 0]}):
+        found = only({"cup": cup, "ball": BALL | placed})
+        assert (found.code, found.hint) == ("TASK224", "give a `pose` instead")
+        assert found.message.endswith("'cup': it is tilted")
 
 
 def test_hollow_of_cup_and_tray_end_at_walls_floor_and_rim() -> None:
