@@ -38,7 +38,7 @@ class SimulationSpec(Model):
     engine: str = Field("pybullet", description="Which engine: `pybullet` (physics), `kinematic` (commands come true).")
     step: Annotated[Time, Field(gt=0, le=0.02, description="Physics step, above 0 to 20 ms. Default 1 ms.")] = 0.001
     control_period: Annotated[
-        Time, Field(gt=0, le=0.1, description="Control tick, a whole multiple of `step`, to 100 ms. Default 1 ms.")
+        Time, Field(gt=0, le=0.05, description="Control tick, a whole multiple of `step`, to 50 ms. Default 1 ms.")
     ] = 0.001
     seed: Annotated[int, Field(ge=0, description="Of the planner and of noise, 0 or more. Default 0.")] = 0
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
@@ -125,18 +125,23 @@ class BodySpec(Model):
     mesh: MeshSpec | None = Field(None, description="Shape: the convex hull of a mesh file.")
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
     pose: PoseSpec | None = Field(None, description="Where its frame starts, in the world.")
-    rests_on: str | None = Field(None, description="The body that it stands on; `at` says where.")
+    rests_on: str | None = Field(None, description="The body that it stands on, which is not tilted; `at` says where.")
     at: tuple[Length, Length] | None = Field(None, description="x, y in the world [m], with `rests_on`.")
     yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
-    inside: str | None = Field(None, description="The container on whose floor it lies.")
+    inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
     fixed: bool = Field(False, description="Never moves. Default false.")
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
         None, description="[kg], above 0 to 100 t; needed unless `fixed`, `urdf`."
     )
-    friction: Annotated[float, Field(ge=0, description="Coefficient of sliding, 0 or more. Default 0.8.")] = 0.8
+    friction: Annotated[float, Field(ge=0)] = Field(
+        0.8,
+        description="Coefficient of sliding, 0 or more; the engine multiplies it by the other body's. Default 0.8.",
+    )
     rolling_friction: Annotated[float, Field(ge=0, description="Coefficient of rolling, 0 or more. Default 0.")] = 0.0
     spinning_friction: Annotated[float, Field(ge=0, description="Coefficient of turning on the spot. Default 0.")] = 0.0
-    restitution: Fraction = Field(0.0, description="Bounce, 0 to 1. Default 0.")
+    restitution: Fraction = Field(
+        0.0, description="Bounce, 0 to 1; the engine multiplies it by the other body's. Default 0."
+    )
     color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
         None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
     )
