@@ -1,8 +1,8 @@
 """Whether sampled loops are stable: the poles of a robot's joints, held by gains, from one control tick to the next.
 
 Between two ticks the effort is held, and the joints move as M a = u - B v (gravity and what depends on the velocity
-squared left out), in `substeps` steps of semi-implicit Euler as engines take them, v += s a, q += s v, or exactly where
-`substeps` is None. At each tick
+squared left out), in `substeps` steps of semi-implicit Euler as engines take them, v' = v + s a, q' = q + s v', where
+stiff damping acts on v' so that none runs away, or exactly where `substeps` is None. At each tick
 
     u = -P q - D v - I z,    z the integral of q, a sum over the ticks
 
@@ -30,6 +30,8 @@ MARGINAL: Final = 1e-9
 SLOW: Final = 1e-6
 """An integral that does less than this share of its stiffness in a tick, i h < SLOW p, has its pole at 1 but for
 rounding."""
+STIFF: Final = 0.5
+"""Damping of a joint is stiff where its share in a step is above this; explicit Euler runs away from 2 on."""
 MOST_GAIN: Final = 1e6
 """A margin that is larger is not looked for."""
 
@@ -86,6 +88,15 @@ class Loop:
         return replace(self, p=self.p * gains, d=self.d * gains, i=self.i * gains)
 
 
+def damping_share(mass: Array, damping: Array, step: float) -> Array:
+    """(n) bounds of the share of velocities that viscous `damping` (n) takes away in a step [s] of explicit Euler.
+
+    The row sums of |s B^1/2 M^-1 B^1/2|, none of whose eigenvalues is above the largest (Gershgorin).
+    """
+    root = np.sqrt(damping)
+    return np.asarray(step * np.abs(root[:, None] * np.linalg.inv(mass) * root).sum(axis=1))
+
+
 def transition(loop: Loop) -> Array:
     """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z of joints with an integral gain."""
     n = len(loop.p)
@@ -117,19 +128,21 @@ def transition(loop: Loop) -> Array:
 def _held(loop: Loop) -> tuple[Array, Array]:
     """(F, G): (q, v)' = F (q, v) + G u while u is held for a period."""
     n = len(loop.p)
-    inverse = np.linalg.inv(loop.mass)
-    drag = inverse * loop.damping  # M^-1 B
     eye = np.eye(n)
     if loop.substeps is None:
         from scipy.linalg import expm
 
+        inverse = np.linalg.inv(loop.mass)
+        drag = inverse * loop.damping  # M^-1 B
         flow = np.zeros((3 * n, 3 * n))
         flow[:n, n : 2 * n] = eye
         flow[n : 2 * n, n : 2 * n], flow[n : 2 * n, 2 * n :] = -drag, inverse
         whole = expm(flow * loop.period)
         return whole[: 2 * n, : 2 * n], whole[: 2 * n, 2 * n :]
     s = loop.period / loop.substeps
-    v_v, v_u = eye - s * drag, s * inverse
+    late = np.where(damping_share(loop.mass, loop.damping, s) > STIFF, s * loop.damping, 0.0)
+    damped = np.linalg.inv(loop.mass + np.diag(late))
+    v_v, v_u = eye - s * damped * loop.damping, s * damped
     step = np.block([[eye, s * v_v], [np.zeros((n, n)), v_v]])
     push = np.vstack([s * v_u, v_u])
     F, G = np.eye(2 * n), np.zeros((2 * n, n))

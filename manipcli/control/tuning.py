@@ -2,8 +2,8 @@
 
 A joint of inertia I and viscous friction b under u = p e + d de/dt swings, continuously, with p = I w^2 and
 d = 2 zeta I w - b; I is the largest inertia that the joint meets while the others stand, so that nowhere it is damped
-less. On a velocity interface the
-reference is followed with u = v + p e, p = w. Where it must be,
+less. A joint that its friction slows down more than that, b > 2 I w, creeps after the reference at p / b: p = b w / 2.
+On a velocity interface the reference is followed with u = v + p e, p = w. Where it must be,
 
 - w is lowered until the step asks for no more than what gravity leaves of the effort (or for no more than the
   velocity);
@@ -139,7 +139,7 @@ class _Draft:
     @property
     def gains(self) -> tuple[float, float, float]:
         """p, i, d."""
-        p = self.inertia * self.w**2
+        p = max(self.inertia * self.w, 0.5 * self.friction) * self.w
         i = 0.0 if self.carried else p * self.w * SLOW_INTEGRAL
         return _short(p), _short(i), _short(max(0.0, 2.0 * self.damping * self.inertia * self.w - self.friction))
 
@@ -162,7 +162,10 @@ def tune_efforts(
     drafts = []
     for k in range(len(load.joints)):
         draft = _Draft(float(inertia[k]), float(load.damping[k]), w, wish.damping, bool(carried[k]))
-        enough = math.sqrt(float(left[k] / steps[k] / inertia[k]))
+        most = float(left[k] / steps[k])  # of p
+        enough = math.sqrt(most / draft.inertia)
+        if draft.friction:
+            enough = min(enough, 2.0 * most / draft.friction)
         if enough < w:
             draft = replace(draft, w=enough, limit="effort")
         drafts.append(_calmed(load, k, draft, wish))
@@ -212,7 +215,7 @@ def _calm_together(load: Load, drafts: list[_Draft], wish: Wish) -> None:
         for _ in range(400):
             p, i, d = (np.array(column) for column in zip(*(draft.gains for draft in drafts), strict=True))
             whole = Loop(mass, p, d, i, load.damping, wish.period, wish.substeps, np.array(load.latency))
-            if is_stable(whole.scaled(MARGIN)):
+            if min(draft.w for draft in drafts) < LEAST_FREQUENCY or is_stable(whole.scaled(MARGIN)):
                 break
             _, share = unstable_share(whole.scaled(MARGIN))
             for k in np.flatnonzero(share > 0.25):
@@ -238,7 +241,7 @@ def _tuned(load: Load, k: int, controller: str, draft: _Draft, wish: Wish, step:
         d=d,
         i_clamp=clamp,
         frequency=draft.w / math.tau,
-        damping=draft.damping,
+        damping=max(draft.damping, draft.friction / (2.0 * math.sqrt(p * draft.inertia)) if p else 0.0),
         bandwidth=bandwidth(loop),
         margin=gain_margin(_loop(load, k, least, draft.gains, wish)),
         limited_by=draft.limit,
@@ -334,7 +337,7 @@ def step_answer(loop: Loop, step: float, *, effort: float, i_clamp: float | None
         z = min(max(z + i * loop.period * error, -clamp), clamp)
         u = min(max(waiting.pop(0), -effort), effort)
         for _ in range(substeps):
-            v += s * (u - damping * v) / inertia
+            v += s * (u - damping * v) / (inertia + s * damping)  # as in `stability.py`
             q += s * v
     return StepAnswer(step, np.asarray(np.arange(count) * loop.period, dtype=np.float64), share)
 

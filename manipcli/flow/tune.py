@@ -42,6 +42,8 @@ RANDOM_POSTURES: Final = 60
 """Postures within the limits, beside the named ones; always the same."""
 WIDE: Final = 2.0
 """[rad or m] how far from the start a joint without limits is put."""
+HOPELESS: Final = 0.01
+"""Of the bandwidth that is asked for: where less is stable, gains are of no use."""
 RETURN: Final = 0.5
 """[s] at least that a joint has to come back before the next one steps."""
 
@@ -166,7 +168,31 @@ class _Tuner:
         carried = np.array([each for _, _, each in loops])
         found = load_of(self._robot, self._kinematics, joints, self._postures())
         steps = np.array([self._step_of(joint) for joint in joints])
-        return tune_efforts([name for name, _, _ in loops], found, self._wish, steps=steps, carried=carried)
+        tuned = tune_efforts([name for name, _, _ in loops], found, self._wish, steps=steps, carried=carried)
+        self._refuse_hopeless(tuned)
+        return tuned
+
+    def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
+        """Raises InvalidInput where what is stable is next to nothing."""
+        period = f"{1e3 * self._wish.period:g} ms"
+        hint = (
+            "a shorter `--period`, less latency of the actuators, or masses and moments that are nearer to each other"
+        )
+        hopeless = [
+            Finding(
+                "TUNE003",
+                f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
+                f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "
+                f"{one.least:.2g} {unit} at least",
+                self._file.place("controllers", one.controller, "gains", one.joint),
+                hint,
+            )
+            for one in tuned
+            for unit in ("kg" if self._robot.joint(one.joint).type == "prismatic" else "kg m2",)
+            if one.limited_by in ("control step", "other joints") and one.frequency < HOPELESS * self._wish.bandwidth
+        ]
+        if hopeless:
+            raise InvalidInput(hopeless)
 
     def _of_velocities(self, loops: list[tuple[str, str]]) -> tuple[Tuned, ...]:
         if not loops:

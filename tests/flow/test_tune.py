@@ -101,7 +101,8 @@ def test_what_limits_the_gains_is_named_and_kept(tmp_path: Path, wish: Wish, of:
 
 
 @pytest.mark.parametrize(
-    ("damping", "axis", "friction"), [(0.3, "0 0 1", 0.0), (0.7, "0 1 0", 0.05), (1.0, "0 0 1", 0.1)]
+    ("damping", "axis", "friction"),
+    [(0.3, "0 0 1", 0.0), (0.7, "0 1 0", 0.05), (1.0, "0 0 1", 0.1), (1.0, "0 0 1", 80.0)],
 )
 def test_the_engine_answers_as_predicted(tmp_path: Path, damping: float, axis: str, friction: float) -> None:
     """Overshoot to one percent of the step, settling to two ticks; upright and under gravity, which is carried."""
@@ -141,7 +142,7 @@ def test_the_velocity_interface_too(tmp_path: Path) -> None:
     assert fast.margin == pytest.approx(MARGIN, rel=0.01)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("friction", [0.0, 0.5, 40.0])
 @pytest.mark.parametrize("substeps", [1, 4])
 def test_the_bound_of_damping_is_that_of_the_engine(tmp_path: Path, friction: float, substeps: int) -> None:
     """A pendulum without gravity, its damping 3 % below and above the bound, for 300 ticks."""
@@ -232,3 +233,21 @@ def test_the_pour_is_tracked_with_tuned_gains(tmp_path: Path, carries: str, band
     moving = np.abs(np.gradient(trace.reference_position, axis=0)).max(axis=1) > 1e-7
     error = (trace.reference_position - trace.position)[moving]
     assert float(np.sqrt(np.mean(error**2))) < 0.010
+
+
+def test_no_gains_are_proposed_where_next_to_none_are_stable(tmp_path: Path) -> None:
+    """Two hinges on one axis, and next to nothing between them: the first one's own effort moves 0.01 g cm2."""
+    link = "<link name='{}'><inertial><mass value='{}'/><inertia ixx='{}' iyy='{}' izz='{}' ixy='0' ixz='0' iyz='0'/>"
+    hinge = "<joint name='{}' type='revolute'><parent link='{}'/><child link='{}'/><axis xyz='0 0 1'/>"
+    ends = "<limit lower='-2' upper='2' velocity='20' effort='40'/></joint>"
+    links = [link.format(n, *[x] * 4) + "</inertial></link>" for n, x in (("speck", 1e-9), ("arm", 0.02))]
+    joints = [hinge.format(*names) + ends for names in (("first", "base", "speck"), ("second", "speck", "arm"))]
+    text = "".join(["<robot name='two'><link name='base'/>", *links, *joints, "</robot>"])
+    (tmp_path / "two.urdf").write_text(text)
+    robot, controllers = tmp_path / "two.yaml", tmp_path / "controllers.yaml"
+    robot.write_text("robot: two\ndescription: two.urdf\n")
+    controllers.write_text(
+        "controllers:\n  c: {type: joint_trajectory, joints: [first, second], command_interface: effort}\n"
+    )
+    with pytest.raises(InvalidInput, match="first: no useful gains are stable at 1 ms"):
+        tune(robot, controllers, Wish(5.0, 1.0, 1e-3))

@@ -1,7 +1,8 @@
-"""The inertia of rotors behind their gears, in Bullet and in the feed-forward alike."""
+"""The inertia of rotors behind their gears, in Bullet and in the feed-forward alike; and damping that is stiff."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +15,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.normalise import engine_urdf
 from manipcli.model.robot import Actuator, Inertial, Joint, JointLimits, Link, RobotModel, TransmissionTag
 from manipcli.simulate.engines.pybullet import _library
-from manipcli.simulate.engines.pybullet_rotors import add_rotors
+from manipcli.simulate.engines.pybullet_rotors import add_rotors, stiff_damping
 
 DT = 1e-3
 TORQUE = np.array([3.0, 1.0])
@@ -43,7 +44,14 @@ def pendulum(kind: Literal["revolute", "prismatic"], *rotors: float, reduction: 
     return RobotModel("r", "base", links, joints, (), (), tags, Transform.identity(), "", actuators=actuators)
 
 
-def simulated(robot: RobotModel, folder: Path, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def damped(robot: RobotModel, *damping: float) -> RobotModel:
+    joints = (replace(joint, damping=b) for joint, b in zip(robot.joints, damping, strict=True))
+    return replace(robot, joints=tuple(joints))
+
+
+def simulated(
+    robot: RobotModel, folder: Path, seconds: float, torque: np.ndarray = TORQUE
+) -> tuple[np.ndarray, np.ndarray]:
     """Position and velocity after constant torques, from rest at 0, in Bullet."""
     p = _library()
     client = p.connect(p.DIRECT)
@@ -56,9 +64,9 @@ def simulated(robot: RobotModel, folder: Path, seconds: float) -> tuple[np.ndarr
         for k in (0, 1):
             p.changeDynamics(body, k, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
             p.setJointMotorControl2(body, k, p.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
-        add_rotors(p, client, robot, body, [0, 1])
+        add_rotors(p, client, robot, body, [0, 1], step=DT)
         for _ in range(round(seconds / DT)):
-            p.setJointMotorControlArray(body, [0, 1], p.TORQUE_CONTROL, forces=list(TORQUE), physicsClientId=client)
+            p.setJointMotorControlArray(body, [0, 1], p.TORQUE_CONTROL, forces=list(torque), physicsClientId=client)
             p.stepSimulation(client)
         states = p.getJointStates(body, [0, 1], client)
         return np.array([s[0] for s in states]), np.array([s[1] for s in states])
@@ -69,10 +77,11 @@ def simulated(robot: RobotModel, folder: Path, seconds: float) -> tuple[np.ndarr
 def integrated(robot: RobotModel, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """The same from M(q) a = tau - h(q, v), in steps ten times as small."""
     kinematics = Kinematics(robot, gravity=GRAVITY)
+    B = np.array([joint.damping for joint in robot.joints])
     q, v, zero = np.zeros(2), np.zeros(2), np.zeros(2)
     for _ in range(round(seconds / DT * 10)):
         bias = kinematics.inverse_dynamics(q, v, zero).copy()
-        v = v + DT / 10 * np.linalg.solve(kinematics.mass_matrix(q), TORQUE - bias)
+        v = v + DT / 10 * np.linalg.solve(kinematics.mass_matrix(q), TORQUE - bias - B * v)
         q = q + DT / 10 * v
     return q, v
 
@@ -87,6 +96,37 @@ def test_a_joint_accelerates_its_rotor_too(
     robot = pendulum(kind, *rotors)
     for ours, exact in zip(simulated(robot, tmp_path, 0.5), integrated(robot, 0.5), strict=True):
         np.testing.assert_allclose(ours, exact, atol=0.01 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("damping", [900.0, 2500.0, 6000.0, 150000.0])
+def test_a_slide_with_stiff_damping_comes_to_its_speed(tmp_path: Path, damping: float) -> None:
+    """From 0.6 to 100 times as much as takes away all velocity in a step: v = (F - m g) / b (1 - exp(-b t / m))."""
+    mass, seconds = 1.5, 20 * DT
+    robot = damped(pendulum("prismatic", 0.0, 0.0), damping, 0.0)
+    assert stiff_damping(robot, DT).tolist() == [damping, 0.0]
+    q, v = simulated(robot, tmp_path, seconds, np.array([300.0, 0.0]))
+    speed = (300.0 + mass * GRAVITY[2]) / damping
+    gone = 1.0 - np.exp(-damping * seconds / mass)
+    assert v[0] == pytest.approx(speed * gone, rel=1e-3)
+    assert q[0] == pytest.approx(speed * (seconds - gone * mass / damping), abs=speed * DT)
+    assert abs(q[1]) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("damping", [(20.0, 60.0), (0.0, 200.0), (900.0, 0.5)])
+def test_joints_with_stiff_damping_move_as_in_smaller_steps(
+    tmp_path: Path, kind: Literal["revolute", "prismatic"], damping: tuple[float, float]
+) -> None:
+    robot = damped(pendulum(kind, 0.0, 0.0), *damping)
+    assert stiff_damping(robot, DT).any()
+    for ours, exact in zip(simulated(robot, tmp_path, 0.2), integrated(robot, 0.2), strict=True):
+        np.testing.assert_allclose(ours, exact, atol=0.01 * np.abs(exact).max())
+
+
+def test_damping_that_takes_away_little_in_a_step_is_bullets_own() -> None:
+    robot = damped(pendulum("revolute", 0.0, 0.0), 1.0, 0.5)
+    assert not stiff_damping(robot, DT).any()
+    assert stiff_damping(robot, 100 * DT).all()
 
 
 def test_the_mass_matrix_holds_reduction_squared_times_the_rotor() -> None:

@@ -126,7 +126,7 @@ class PybulletEngine:
         for k, position in zip(self._joints, settings.start, strict=True):
             p.resetJointState(self._robot, k, float(position), 0.0, physicsClientId=client)
         couple_mimics(p, client, robot, self._robot, self._joints)
-        add_rotors(p, client, robot, self._robot, self._joints)
+        add_rotors(p, client, robot, self._robot, self._joints, step=settings.step)
         self._motors = Motors(p, client, self._robot, self._joints, robot, settings.step)
 
     def read(self, *, velocities: bool = True) -> WorldState:

@@ -1,8 +1,16 @@
-"""The rotors of actuators in Bullet, whose joints know no inertia of their own.
+"""The rotors of actuators in Bullet, whose joints know no inertia of their own, and damping that is stiff.
 
 Each is a flywheel that stands fixed in the world, geared one to one to its joint: it takes part in what the joint
 accelerates and in nothing else, no weight and no gyroscopic effect, and being a constraint it is stable whatever its
 inertia.
+
+Bullet takes the damping B of joints from the velocity v before a step h, which runs away where it takes away more than
+all of it. With what is before the step on the right, and v' after it, what is wanted is
+
+    M v' = M v + h tau - h B v'    or    (M + h B) v' = (M v + h tau) + (h B v - h B v):
+
+a flywheel of inertia h b whose own damping b stops it in every step. It is stable whatever b, and comes to the same
+speed under a constant effort (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.3: implicit Euler).
 """
 
 from __future__ import annotations
@@ -13,15 +21,40 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.control.stability import STIFF, damping_share
+from manipcli.core.geometry import Array, frozen
 from manipcli.model.drivetrain import reflected_inertia
+from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 
 RIGID: Final = 1e9
 """What the gear of a flywheel may carry [N m or N]."""
+POSTURES: Final = 60
+"""In which it is looked whether damping is stiff, always the same."""
+WIDE: Final = 3.2
+"""[rad or m] on both sides of zero that joints without limits are put there."""
 
 
-def add_rotors(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int]) -> None:
-    """Gears a flywheel to every joint with reflected inertia.
+def stiff_damping(robot: RobotModel, step: float) -> Array:
+    """(n) the damping [N m s/rad or N s/m] of joints where it is stiff for a physics step [s], 0 of the others.
+
+    It is where it is in some posture within the limits.
+    """
+    moving = robot.moving_joints
+    damping = np.array([joint.damping for joint in moving])
+    if not damping.any():
+        return frozen(damping)
+    kinematics = Kinematics(robot)
+    low = [-WIDE if joint.limits.lower is None else joint.limits.lower for joint in moving]
+    high = [WIDE if joint.limits.upper is None else joint.limits.upper for joint in moving]
+    share = np.zeros(len(moving))
+    for q in np.random.default_rng(0).uniform(low, high, (POSTURES, len(moving))):
+        share = np.maximum(share, damping_share(kinematics.mass_matrix(q), damping, step))
+    return frozen(np.where(share > STIFF, damping, 0.0))
+
+
+def add_rotors(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int], *, step: float) -> None:
+    """Gears a flywheel to every joint with reflected inertia or stiff damping.
 
     Args:
         p: PyBullet.
@@ -29,8 +62,10 @@ def add_rotors(p: ModuleType, client: int, robot: RobotModel, body: int, joints:
         robot: the robot, which `body` is in that world.
         body: Bullet's number of it.
         joints: (n) Bullet's numbers of its moving joints.
+        step: [s] of the physics.
     """
-    inertia = reflected_inertia(robot)
+    damping = stiff_damping(robot, step)
+    inertia = reflected_inertia(robot) + step * damping
     driven = [int(joint) for joint in np.flatnonzero(inertia)]
     k = len(driven)
     if k == 0:
@@ -56,9 +91,11 @@ def add_rotors(p: ModuleType, client: int, robot: RobotModel, body: int, joints:
             localInertiaDiagonal=[float(inertia[joint])] * 3,
             linearDamping=0.0,
             angularDamping=0.0,
-            jointDamping=0.0,
+            jointDamping=float(damping[joint]),
             physicsClientId=client,
         )
+        if damping[joint]:
+            p.changeDynamics(body, joints[joint], jointDamping=0.0, physicsClientId=client)
         p.setJointMotorControl2(wheels, wheel, p.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
         gear = p.createConstraint(
             body,
