@@ -34,7 +34,11 @@ class GripperController:
     A finger has *contact* when the sum of its joints' contact forces meets the goal's force, after a low pass of the
     time constant `contact_time`, so that the knock of the first touch does not count as a grip; it is *stalled* when
     none of its joints that are further than `goal_tolerance` from their targets moved faster than `stall_velocity`
-    for `stall_time`; it has *reached* when all its joints are within `goal_tolerance` and their references are there.
+    for `stall_time` although none will be pushed harder: each one's reference is at its target, or its effort at its
+    maximum; it has *reached* when all its joints are within `goal_tolerance` and their references are there.
+
+    A reference that stands beyond its joint, seen from the target, as one does that pressed on what the hand lets go,
+    begins where the joint is.
 
     Args:
         name: of the controller.
@@ -210,6 +214,7 @@ class GripperController:
                 self._starts = False
                 self._began = time
                 self._moved = [time] * len(self._fingers)
+                self._unwind(measured.position)
             self._judge(time, period, measured, contact_force)
             if self._goal is not None:
                 self._ramp(period)
@@ -233,6 +238,11 @@ class GripperController:
         self._reference[:] = measured.position
         self._velocity[:] = 0.0
         self._set_effort(self._effort if self._goal is not None else self._default_effort)
+
+    def _unwind(self, position: Array) -> None:
+        """Takes back references that push away from their targets."""
+        wrong = (self._target - position) * (self._reference - position) < 0.0
+        self._reference[wrong] = position[wrong]
 
     def _ramp(self, period: float) -> None:
         """Moves the references of the fingers that have not stopped towards their targets."""
@@ -279,7 +289,7 @@ class GripperController:
             if not far:
                 if all(abs(self._target[j] - self._reference[j]) <= REACHED for j in self._fingers[f]):
                     self._stop(f, "reached", "reached its target")
-            elif not still:
+            elif not still or self._winds_up(f):
                 moved[f] = time
             elif time - moved[f] >= self._stall_time:
                 away = [abs(float(self._target[j]) - position[j]) for j in self._fingers[f]]
@@ -299,6 +309,14 @@ class GripperController:
             else:
                 self._goal.end("succeeded", ErrorCode.SUCCESSFUL, text, time, stops)
             self._end_motion()
+
+    def _winds_up(self, f: int) -> bool:
+        """Whether a finger will be pushed harder: a reference is on its way, and its effort not at its maximum."""
+        for j in self._fingers[f]:
+            way, push, most = self._target[j] - self._reference[j], self._command[j], self._effort[j]
+            if (way > REACHED and push < most) or (way < -REACHED and push > -most):
+                return True
+        return False
 
     def _watch(self) -> None:
         """What is looked at every tick: the fingers that have not stopped."""

@@ -124,7 +124,8 @@ def test_a_finger_that_cannot_press_as_hard_as_asked_says_what_it_felt():
 
 
 def test_stall_takes_its_time():
-    controller = make(stall_time=0.05)
+    """From when the finger gives all that it may: at once here, where the reference's speed alone asks for 0.2 N m."""
+    controller = make(stall_time=0.05, max_effort=0.2)
     frozen = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
     handle = controller.send_goal(GripperGoal(target=np.ones(4)))
     for k in range(50):
@@ -133,6 +134,53 @@ def test_stall_takes_its_time():
     for k in range(50, 53):
         controller.update(k * PERIOD, PERIOD, frozen)
     assert handle.result.fingers == ("stalled", "stalled")
+
+
+def test_a_finger_has_not_stalled_as_long_as_its_reference_winds_it_up():
+    """A reference of 0.5 rad/s raises the force by 3 N m/rad x 0.5 rad/s / 0.1 m: 10 N take three stall times."""
+    controller, hand = make(speed=0.5), Hand([0.3, 9, 9, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0, 0, 0]), force=10.0))
+    output = hand.run(controller, 1.6)
+    assert handle.result.fingers == ("contact", "reached")
+    assert output.command[0] == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_finger_that_pressed_opens_from_where_it_is():
+    """What stalled at its maximum effort has a reference 2 / 3 rad inside the wall, four stall times of way back."""
+    controller, hand = make(speed=0.8), Hand([0.3, 9, 9, 9])
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0, 0, 0])))
+    ahead = hand.run(controller, 1.6).position[0] - hand.q[0]
+    assert handle.result.fingers == ("stalled", "reached")
+    assert ahead > 2.0 / 3.0
+    handle = controller.send_goal(GripperGoal(target=np.zeros(4)))
+    hand.run(controller, 0.5)  # 0.3 rad at 0.8 rad/s take 0.375 s
+    assert handle.result.fingers == ("reached", "reached")
+    assert hand.q == pytest.approx(np.zeros(4), abs=0.02)
+
+
+def test_a_finger_that_cannot_open_stalls_when_its_reference_is_there():
+    controller = make(speed=1.0, max_effort=None)
+    stuck = JointState(position=np.full(4, 0.3), velocity=np.zeros(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=np.zeros(4)))
+    for k in range(490):
+        controller.update(k * PERIOD, PERIOD, stuck)
+    assert handle.active
+    for k in range(490, 510):
+        controller.update(k * PERIOD, PERIOD, stuck)
+    assert handle.result.fingers == ("stalled", "stalled")
+    assert "stalled 0.3 before the target" in handle.result.text
+
+
+def test_a_firmer_grip_goes_on_from_the_one_before():
+    """No reference that pushes towards its target is taken back: what is held is not let go."""
+    controller, hand = make(), Hand([0.3, 9, 9, 9])
+    controller.send_goal(GripperGoal(target=np.array([1.5, 0, 0, 0]), force=3.0))
+    before = hand.run(controller, 1.0).position[0]
+    handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0, 0, 0]), force=6.0))
+    first = len(hand.references)
+    hand.run(controller, 1.0)
+    assert handle.result.fingers == ("contact", "reached")
+    assert min(reference[0] for reference in hand.references[first:]) >= before
 
 
 def test_opening_ignores_contact():
