@@ -126,8 +126,9 @@ class Controller(Protocol):
     ) -> ControllerOutput:
         """One update at `time` [s], `period` [s] before the next.
 
-        `contact_force` (n) [N] is the normal force of contacts on what each joint moves, up to the next joint; None
-        where nobody senses it.
+        `contact_force` (n) [N] is the normal force of contacts on what each joint moves, up to the next joint that
+        does not mimic it; where it moves several fingers, on the one that is pressed hardest. None where nobody senses
+        it.
         """
         ...
 

@@ -4,8 +4,8 @@
     command = manager.update(time, state, contact_force)   # a JointCommand, before limits, until the next update
 
 where `state` has the measured `position`, `velocity`, `effort` (n) in the order of `joints` (a `WorldState` will do),
-and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves, up to the next joint;
-it need only be up to date while `senses_contact`.
+and `contact_force` (n) [N] is the normal force of contacts on the links that each joint moves (see `Controller`); it
+need only be up to date while `senses_contact`.
 Goals go to the controllers: `manager["arm_controller"].send_goal(...)`; `manager.serving(joints)` finds the active one
 that claims them.
 
@@ -182,7 +182,7 @@ class ControllerManager:
         """Deactivates and activates controllers, all of it or, when refused, nothing.
 
         A name on both lists restarts that controller. With `best_effort` names that cannot be switched are left out and
-        told; it is refused only when none of a list is left, or when claims clash.
+        told, also where claims clash; it is refused only when no name of a list is loaded.
 
         Args:
             activate, deactivate: names, or one name.

@@ -99,7 +99,7 @@ class Session:
                 controller.attach(engine.sense_wrench(controller.joint))
         n = len(robot.joint_names)
         self._contact_force = np.zeros(n)
-        self._joint_of_part = _joint_of_part(robot)
+        self._joint_of_part, self._followers = _joint_of_part(robot)
         limits = [joint.limits.velocity for joint in robot.moving_joints]
         self._runaway = np.array([RUNAWAY_SPEED if v is None else max(RUNAWAY_FACTOR * v, 1.0) for v in limits])
         self._touching: tuple[Contact, ...] = ()
@@ -207,6 +207,9 @@ class Session:
                     forces[joint_b] += force
             elif joint_b is None:
                 forces[joint_a] += force
+        for driver, follower in self._followers:
+            if forces[follower] > forces[driver]:
+                forces[driver] = forces[follower]
         self._contact_force[:] = forces
         self.observer.contacts(ticks, self._touching)
 
@@ -216,7 +219,8 @@ class Session:
             k = int(np.argmax(np.where(np.isfinite(speeds), speeds / self._runaway, np.inf)))
             raise SimulationFailed(
                 f"joint '{self.robot.joint_names[k]}' runs away at {state.velocity[k]:.3g} per second; "
-                "its controller may be unstable (gains too high for the control period)",
+                "its controller may be unstable (gains too high for the control period), or too weak to hold its "
+                "weight (gains, clamps or effort too low, no gravity compensation)",
                 time=self.time,
             )
         slow = np.abs(state.body_linear) < 0.5 * BODY_SPEED  # along each axis
@@ -231,12 +235,28 @@ class Session:
                 raise SimulationFailed(f"'{body.name}' has fallen out of the scene", time=self.time)
 
 
-def _joint_of_part(robot: RobotModel) -> dict[str, int]:
-    """For every part `robot/<link>`: the joint vector index of the joint that moves it last; base parts are absent."""
+def _joint_of_part(robot: RobotModel) -> tuple[dict[str, int], tuple[tuple[int, int], ...]]:
+    """Which joints feel what touches a part.
+
+    Links below a joint that mimics one above it count as that one's, as the tip of a linkage. Where the mimic hangs
+    elsewhere, as the other jaw of a gripper with one motor, its driver feels the side that is pressed harder.
+
+    Returns:
+        For every part `robot/<link>` the joint vector index of the joint that moves it last; base parts are absent.
+        And (driver, mimic): pairs of indices of joints of which the first also feels what the second does.
+    """
+    names = robot.joint_names
     index: dict[str, int] = {}
+    followers: list[tuple[int, int]] = []
     for joint in robot.joints:
-        if joint.moves:
-            index[joint.child] = robot.joint_names.index(joint.name)
-        elif joint.parent in index:
-            index[joint.child] = index[joint.parent]
-    return {f"robot/{link}": k for link, k in index.items()}
+        k = index.get(joint.parent)
+        if joint.independent:
+            k = names.index(joint.name)
+        elif joint.mimic is not None:
+            driver = names.index(joint.mimic.joint)
+            if k is None or (k != driver and (driver, k) not in followers):
+                k = names.index(joint.name)
+                followers.append((driver, k))
+        if k is not None:
+            index[joint.child] = k
+    return {f"robot/{link}": k for link, k in index.items()}, tuple(followers)

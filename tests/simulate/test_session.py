@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from manipcli.core.errors import SimulationFailed
+from manipcli.model.robot import Mimic
 from manipcli.model.state import Contact
 from manipcli.simulate.session import BODY_SPEED, FALLEN, RUNAWAY_SPEED, SLOW, Session
 
@@ -176,6 +178,36 @@ def test_a_joint_feels_what_touches_the_links_that_it_moves_last(session_of: Ses
     engine.touching = ()
     ticks(session, 1)
     assert felt[-1] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("parent", "felt"), [("carriage", [4.5, 0.0, 0.0]), ("base", [2.5, 2.5, 0.0])])
+def test_a_joint_feels_what_those_that_mimic_it_do(
+    session_of: SessionOf, scripted: Any, parent: str, felt: list[float]
+) -> None:
+    """Slide, knuckle and tip have one motor; the two with the pad hang below its carriage, or are the other jaw."""
+    other = session_of()
+    slide, knuckle, tip, glue = other.robot.joints
+    mimic = Mimic("slide")
+    joints = (slide, replace(knuckle, parent=parent, mimic=mimic), replace(tip, mimic=mimic), glue)
+    engine = scripted()
+    engine.touching = tuple(
+        Contact("block", f"robot/{link}", force, 0.0)
+        for link, force in (("carriage", 2.0), ("near", 1.0), ("pad", 1.5))
+    )
+    session = Session(
+        robot=replace(other.robot, joints=joints), scene=other.scene, engine=engine, manager=other.manager,
+        period=other.period,
+    )  # fmt: skip
+    told: list[list[float]] = []
+    update = session.manager.update
+
+    def listening(time: float, state: Any, contact_force: Any) -> Any:
+        told.append(contact_force.tolist())
+        return update(time, state, contact_force)
+
+    session.manager.update = listening  # type: ignore[method-assign]
+    ticks(session, 1)
+    assert told == [felt]
 
 
 def test_a_short_touch_of_the_robot_is_told_with_its_end(session_of: SessionOf, scripted: Any) -> None:
