@@ -3,14 +3,13 @@ are those of an active controller: from the start, or from a step on that switch
 
 Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
 and whether there is effort enough for gravity, for the planned motions and grasps, and for standing near where it is
-to stand. Joints on other interfaces: `drives.py`.
+to stand (`weak.py`). Joints on other interfaces: `drives.py`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -28,10 +27,11 @@ from manipcli.control.stability import (
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
-from manipcli.flow.drives import drive_findings, driven_joints, too_weak
+from manipcli.flow.drives import drive_findings, driven_joints
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.flow.switches import active_in
+from manipcli.flow.weak import Held, weak
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims
@@ -46,18 +46,6 @@ RINGING: Final = 0.5
 """A pole that changes its sign every tick may be no larger."""
 SWINGING: Final = 0.1
 """The least damping ratio that passes without a word: it overshoots by 73 %."""
-
-
-@dataclass(frozen=True, slots=True)
-class Held:
-    """One joint on an effort loop: its controller, gains, tolerance, and whether its weight is carried for it."""
-
-    controller: str
-    joint: str
-    gains: GainsSpec
-    ticks: int
-    weightless: bool
-    tolerance: float | None
 
 
 def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
@@ -161,7 +149,8 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
                 own = spec.constraints.joints[joint]
                 tolerance = own.goal if own.goal is not None else own.trajectory
             gains = spec.gains.get(joint, GainsSpec())
-            found.append(Held(name, joint, gains, ticks, weightless, tolerance))
+            place = task.controllers_file.place("controllers", name, "gains", joint)
+            found.append(Held(joint, gains, ticks, weightless, tolerance, place))
     return tuple(found)
 
 
@@ -172,7 +161,6 @@ def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool)
     own, held = load.own_inertia, load.held_inertia
     sound = True
     for k, loop in enumerate(loops):
-        place = _place(task, loop)
         gains = loop.gains
         least, most = float(own[:, k].min()), float(held[:, k].max())
         one = Loop.of_joint(
@@ -194,8 +182,8 @@ def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool)
             sound = False
         if finding is not None:
             code, message, hint = finding
-            yield Finding(code, message, place, hint, "warning")
-        yield from _weak(task, loop, load, k, planned=planned)
+            yield Finding(code, message, loop.place, hint, "warning")
+        yield from weak(task.robot, loop, load, k, planned=planned)
     if sound:
         yield from _together(task, loops, load, substeps)
 
@@ -250,28 +238,6 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     return "CTRL153", message, f"kd {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
 
 
-def _weak(task: Task, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Finding]:
-    """Too little effort for gravity or for the plan; too little stiffness to stand where it shall."""
-    unit = "N" if task.robot.joint(loop.joint).type == "prismatic" else "N m"
-    weight, needed = (float(np.abs(part[:, k]).max()) for part in (load.gravity, load.needed))
-    limit = float(load.effort[k])
-    place = _place(task, loop)
-    needed = needed if planned else 0.0
-    weak = too_weak(task.robot, loop.joint, place, weight=weight, needed=needed, limit=limit)
-    if weak is not None:
-        yield weak
-    if loop.weightless or loop.gains.i > 0.0 or loop.gains.p == 0.0 or loop.tolerance is None:
-        return
-    sag = min(weight, limit) / loop.gains.p
-    if sag > loop.tolerance:
-        length = "m" if unit == "N" else "rad"
-        message = (
-            f"{loop.joint}: kp {digits(loop.gains.p)} gives way by {sag:.2g} {length} under {weight:.3g} {unit} of "
-            f"gravity, more than its tolerance of {loop.tolerance:.2g} {length}"
-        )
-        yield Finding("CTRL156", message, place, "gravity_compensation: true carries it, or an i gain", "warning")
-
-
 def _strained(task: Task, plan: Plan) -> Iterator[Finding]:
     """Grasps with more force than a finger that slides can press with.
 
@@ -311,12 +277,8 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"
         )
-        yield Finding("CTRL154", message, _place(task, loops[worst[0]]), "lower their kd", "warning")
+        yield Finding("CTRL154", message, loops[worst[0]].place, "lower their kd", "warning")
         return
-
-
-def _place(task: Task, loop: Held) -> Place:
-    return task.controllers_file.place("controllers", loop.controller, "gains", loop.joint)
 
 
 def _inertia_unit(robot: RobotModel, joint: str) -> str:

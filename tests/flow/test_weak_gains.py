@@ -1,0 +1,111 @@
+"""Gains that cannot hold a pendulum's weight: m g l sin q / p, against what the engine does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import Finding
+from manipcli.flow.gains import gain_findings
+from manipcli.flow.load import load_task
+from manipcli.pipeline import run_task
+from manipcli.record.reading import read_recording
+
+URDF = """<robot name="pendulum"><link name="base"/>
+<link name="arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="3" effort="20"/></joint></robot>"""
+ROBOT = """robot: pendulum
+description: pendulum.urdf
+groups: {all: {joints: [hinge]}}
+poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}
+"""
+WEIGHT = 1.0 * 9.80665 * 0.25 * math.sin(1.2)
+"""[N m]"""
+Written = Callable[..., Path]
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Written:
+    def of(gains: str, *, more: str = "", start: str = "up", steps: str = "{wait: 1 s}") -> Path:
+        (tmp_path / "pendulum.urdf").write_text(URDF)
+        (tmp_path / "robot.yaml").write_text(ROBOT)
+        head = "controllers:\n  c: {type: joint_trajectory, joints: [hinge], command_interface: effort"
+        (tmp_path / "c.yaml").write_text(f"{head}, gains: {{hinge: {{{gains}}}}}{more}}}\n")
+        task = tmp_path / "task.yaml"
+        task.write_text(f"task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: {start}\nsteps: [{steps}]\n")
+        return task
+
+    return of
+
+
+def told(task: Path) -> list[Finding]:
+    return list(gain_findings(load_task(task)))
+
+
+@pytest.mark.parametrize(
+    ("gains", "code", "message"),
+    [
+        ("p: 20, d: 2", "CTRL156", f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity"),
+        ("p: 1, d: 0.1", "CTRL156", f"kp 1 gives way by {WEIGHT:.2g} rad under"),
+        ("d: 12", "CTRL156", f"without kp nothing holds {WEIGHT:.3g} N m of gravity; it sinks"),
+        ("p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9", "CTRL155", f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1"),
+        (
+            "p: 5, d: 1, i: 20, i_clamp: 1",
+            "CTRL156",
+            f"kp 5, whose integral is clamped to -1 ... 1, gives way by {(WEIGHT - 1) / 5:.2g} rad under",
+        ),
+        (
+            "p: 20, d: 2, i: 4, i_clamp: 10",
+            "CTRL156",
+            f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity until its integral carries "
+            "it, some 5 s with ki 4",
+        ),
+    ],
+)
+def test_gains_too_weak_for_the_weight_are_told(written: Written, gains: str, code: str, message: str) -> None:
+    (one,) = told(written(gains))
+    assert (one.code, one.severity) == (code, "warning")
+    assert one.message.startswith("hinge: ")
+    assert message in one.message
+    assert told(written(gains, start="down")) == [], "nothing to hold there"
+    assert told(written(gains, more=", gravity_compensation: true")) == []
+
+
+@pytest.mark.parametrize(
+    "gains",
+    [
+        "p: 80, d: 6",
+        "p: 20, d: 2, i: 40",
+        "p: 20, d: 2, i: 40, i_clamp: 2",
+        "p: 80, d: 6, u_clamp_max: 2.5, u_clamp_min: -1",
+    ],
+)
+def test_gains_that_hold_it_are_not(written: Written, gains: str) -> None:
+    assert told(written(gains)) == []
+
+
+def test_a_clamp_on_the_other_side_is_told_on_the_other_side(written: Written) -> None:
+    gains = "p: 80, d: 6, u_clamp_max: 2.5, u_clamp_min: -1"
+    (one,) = told(written(gains, start="back"))
+    assert f"takes up to {-WEIGHT:.3g} N m, its u_clamp_min is -1" in one.message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gains", ["p: 8, d: 2", "p: 5, d: 1, i: 20, i_clamp: 1"])
+def test_what_is_told_is_what_the_engine_does(written: Written, gains: str, tmp_path: Path) -> None:
+    """It hangs where p (q_r - q) + I = m g l sin q: less than from the weight at the reference, which is told."""
+    task = written(gains, steps="{wait: 6 s}")
+    run_task(task, log=tmp_path / "t.mcap")
+    recording = read_recording(tmp_path / "t.mcap")
+    q = float(np.asarray(recording.states.position).ravel()[-1])
+    p, carried = (8.0, 0.0) if "i" not in gains else (5.0, 1.0)
+    assert p * (1.2 - q) + carried == pytest.approx(9.80665 * 0.25 * math.sin(q), rel=0.01)
+    (one,) = told(task)
+    assert 1.2 - q > 0.1
+    assert one.code == "CTRL156"
