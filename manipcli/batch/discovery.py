@@ -12,6 +12,9 @@ from manipcli.batch.first_look import first_look, is_entered
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
 
+NO_ROBOT = "has `task:` but no `robot:`; not run"
+"""What is told of a file that looks like a task and is none."""
+
 
 def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = None) -> tuple[Path, ...]:
     """The task files among and below `paths`, each once, folder by folder in the order of names.
@@ -31,7 +34,7 @@ def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = No
             below = [file for file, look in looks if look == "task"]
             if tell is not None:
                 for file in (file for file, look in looks if look == "no robot"):
-                    tell(f"{shown_path(file)} has `task:` but no `robot:`; not run")
+                    tell(f"{shown_path(file)} {NO_ROBOT}")
         else:
             below = [path]
             refused += _no_task(path)

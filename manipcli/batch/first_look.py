@@ -56,8 +56,10 @@ def first_look(path: Path, *, named: bool = False) -> Look:
 
 
 def is_entered(folder: Path) -> bool:
-    """Whether tasks are looked for in a folder that nobody named."""
-    return not (folder.name.startswith(".") or folder.name in NOT_ENTERED or (folder / "pyvenv.cfg").exists())
+    """Whether tasks are looked for in a folder that nobody named; links may lead around in circles."""
+    if folder.name.startswith(".") or folder.name in NOT_ENTERED:
+        return False
+    return not (folder.is_symlink() or (folder / "pyvenv.cfg").exists())
 
 
 def _utf_8(text: bytes) -> bytes:

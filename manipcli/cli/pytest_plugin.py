@@ -25,6 +25,10 @@ MARKS_OF_PYTEST = frozenset(
 )
 """Marks that mean something to pytest itself: a tag of that name is a word for `-k` and nothing else."""
 
+_SEEN = pytest.StashKey[dict[Path, Path]]()
+"""Task files that are tests, by what they are without links."""
+_NO_ROBOT = pytest.StashKey[dict[Path, None]]()
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("manipcli", "tasks of manipcli")
@@ -51,16 +55,34 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile | None:
     """The files that `manipcli test` takes, and no others.
 
-    That is one that is named, and has the top-level key `task`; of others, those with a name there and the key `robot`.
+    That is one that is named, and has the top-level key `task`; of others, those with a name there and the key `robot`,
+    each once, whatever links lead to it.
     """
     if file_path.suffix.lower() not in SUFFIXES:
         return None
     from manipcli.batch.first_look import first_look
 
     named = parent.session.isinitpath(file_path)
-    if first_look(file_path, named=named) != "task" or not _is_looked_for(file_path, parent.session):
+    look = first_look(file_path, named=named)
+    if look == "other" or not _is_looked_for(file_path, parent.session):
+        return None
+    stash = parent.config.stash
+    if look == "no robot":
+        stash.setdefault(_NO_ROBOT, {})[file_path] = None
+        return None
+    if stash.setdefault(_SEEN, {}).setdefault(file_path.resolve(), file_path) != file_path and not named:
         return None
     return TaskFile.from_parent(parent, path=file_path)
+
+
+def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
+    """What looks like a task and is left out."""
+    files = config.stash.get(_NO_ROBOT, {})
+    if not files:
+        return []
+    from manipcli.batch.discovery import NO_ROBOT, shown_path
+
+    return [f"{shown_path(file)} {NO_ROBOT}" for file in files]
 
 
 class TaskFile(pytest.File):

@@ -84,6 +84,22 @@ def test_the_files_are_those_of_the_command(project: pytest.Pytester) -> None:
     assert collected(project) == ids
 
 
+def test_links_lead_to_no_test_twice(project: pytest.Pytester) -> None:
+    from manipcli.batch.discovery import task_files
+
+    (project.path / "tasks" / "sub").mkdir()
+    (project.path / "tasks" / "sub" / "loop").symlink_to("..")
+    (project.path / "tasks" / "sub" / "link.yaml").symlink_to("../good.yaml")
+    assert len(collected(project)) == len(task_files([Path()])) == 3
+    assert collected(project, "tasks/sub/link.yaml") == ["tasks/sub/link.yaml::good"]  # it was named
+
+
+def test_what_looks_like_a_task_and_is_none_is_told(project: pytest.Pytester) -> None:
+    (project.path / "tasks" / "torn.yaml").write_text("task: torn\nrobo: r.yaml\nsteps: []\n")
+    result = project.runpytest_inprocess(*LOADED, *ALONE, "--collect-only")
+    assert "tasks/torn.yaml has `task:` but no `robot:`; not run" in result.outlines
+
+
 def test_tags_and_engine_are_markers_that_need_no_registration(project: pytest.Pytester) -> None:
     assert collected(project, "-m", "nightly and engine_kinematic") == ["tasks/good.yaml::good"]
     assert "tasks/good.yaml::good" not in collected(project, "-m", "not slow")
