@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -47,7 +47,7 @@ def decided(
     joints: Collection[str],
     following: Collection[str] = (),
 ) -> SwitchResult:
-    """What comes of a request.
+    """What comes of a request; where claims clash, strict refuses it and best_effort leaves out who came later.
 
     Args:
         controllers: all that are loaded, by name, and their states.
@@ -67,10 +67,31 @@ def decided(
     if not request.ok:
         return request
     kept = [one for one in active if one.name not in request.deactivated]
-    clashes = conflicts([*kept, *(controllers[name][0] for name in request.activated)], joints, following)
+    wanted = {name: controllers[name][0] for name in request.activated}
+    if switch.strictness == "best_effort":
+        return _without_clashes(request, kept, wanted, joints, following)
+    clashes = conflicts([*kept, *wanted.values()], joints, following)
     if clashes:
         return SwitchResult(False, (*request.messages, *(finding.message for finding in clashes)))
     return request
+
+
+def _without_clashes(
+    request: SwitchResult,
+    kept: Sequence[Claimant],
+    wanted: Mapping[str, Claimant],
+    joints: Collection[str],
+    following: Collection[str],
+) -> SwitchResult:
+    """The request without whoever claims what those that stay active, or one that was named before, claim."""
+    there = list(kept)
+    told = list(request.messages)
+    for name, one in wanted.items():
+        clashes = conflicts([*there, one], joints, following)
+        told += [f"cannot activate '{name}': {finding.message}" for finding in clashes]
+        there += [] if clashes else [one]
+    names = {one.name for one in there}
+    return SwitchResult(True, tuple(told), tuple(name for name in wanted if name in names), request.deactivated)
 
 
 def requested(

@@ -146,6 +146,17 @@ def test_an_interface_has_one_owner():  # [57]
     assert one.interfaces == two.interfaces
 
 
+def test_with_best_effort_who_claims_what_is_taken_is_left_out():  # [57]
+    manager = manager_of(Spring("one"), Spring("two"), Spring("three", "c", "position"), active=["one"])
+    clash = "cannot activate 'two': controllers 'one' and 'two' both claim a/effort, b/effort, c/effort"
+    left = manager.switch(["two", "three"], strictness="best_effort")
+    assert (left.ok, left.activated, left.messages) == (True, ("three",), (clash,))
+    assert states(manager) == {"one": "active", "two": "inactive", "three": "active"}
+    both = manager.switch(["one", "two"], ["one", "three"], strictness="best_effort")  # who is named first has it
+    assert (both.ok, both.activated, both.messages) == (True, ("one",), (clash,))
+    assert states(manager) == {"one": "active", "two": "inactive", "three": "inactive"}
+
+
 def test_interfaces_of_one_joint_go_to_two_controllers_only_where_a_joint_obeys_both():  # [57]
     manager = manager_of(
         Spring("p", JOINTS, "position"), Spring("e", JOINTS, "effort"), Spring("v", JOINTS, "velocity"), active=["p"]

@@ -31,8 +31,8 @@ Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity
 class MoveSpec(Model):
     """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` in a `frame`.
 
-    After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it: of
-    a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
+    After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
+    of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")

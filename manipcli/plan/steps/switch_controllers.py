@@ -35,7 +35,8 @@ class SwitchControllersSpec(Model):
 
     Either `to`: these are active afterwards, or `activate` and `deactivate`, as ROS's service has them. What is
     activated holds what it measures. Joints that nobody commands any more are braked. With `strict` a switch is done as
-    a whole or refused; with `best_effort` names that cannot be switched are left out.
+    a whole or refused; with `best_effort` names that cannot be switched are left out, also those that claim joints of
+    controllers that stay active.
     """
 
     to: Annotated[tuple[str, ...], BeforeValidator(_names, json_schema_input_type=Names)] = Field(
