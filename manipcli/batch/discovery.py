@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.batch.first_look import first_look, is_entered
+from manipcli.batch.first_look import SUFFIXES, first_look, is_entered
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
 
@@ -117,6 +117,23 @@ def shown_path(path: Path) -> str:
         return str(path)
 
 
+def is_named_task(path: Path) -> bool:
+    """Whether a file that somebody named as a task has the top-level key `task`, however that is written."""
+    from manipcli.spec.load import read_bytes
+    from manipcli.spec.tree import MappingNode
+    from manipcli.spec.yaml import parse
+
+    if first_look(path, named=True) == "task":
+        return True
+    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+        return False
+    try:
+        root = parse(read_bytes(path), str(path))
+    except InvalidInput:
+        return False
+    return isinstance(root, MappingNode) and root.get("task") is not None
+
+
 def _files(folder: Path) -> Iterator[Path]:
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if is_entered(Path(place, name)))
@@ -131,7 +148,7 @@ def _no_task(path: Path) -> tuple[Finding, ...]:
         read_bytes(path)
     except InvalidInput as invalid:
         return invalid.findings
-    if first_look(path, named=True) == "task":
+    if is_named_task(path):
         return ()
     message = "this is no task file: a YAML file with the top-level keys `task` and `robot` was expected"
     return (Finding("USE105", message, Place(str(path), 1, 1)),)

@@ -40,7 +40,7 @@ def first_look(path: Path, *, named: bool = False) -> Look:
         if not path.is_file():  # opening a pipe would wait for who writes into it
             return "other"
         with path.open("rb") as file:
-            text = _utf_8(file.read(SNIFFED))
+            text = _flush(_utf_8(file.read(SNIFFED)))
     except OSError:
         return "other"
     task = _TASK.search(text)
@@ -67,3 +67,12 @@ def _utf_8(text: bytes) -> bytes:
     if text.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return text.decode("utf-16", "replace").encode("utf-8", "replace")
     return text.removeprefix(codecs.BOM_UTF8)
+
+
+def _flush(text: bytes) -> bytes:
+    """With line feeds alone, and its top-level keys at the left."""
+    lines = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    content = (line for line in lines if line.lstrip(b" ") and not line.lstrip(b" ").startswith((b"#", b"---", b"%")))
+    first = next(content, b"")
+    by = first[: len(first) - len(first.lstrip(b" "))]
+    return b"\n".join(line.removeprefix(by) for line in lines)

@@ -64,6 +64,10 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
 
     named = parent.session.isinitpath(file_path)
     look = first_look(file_path, named=named)
+    if named and look == "other":
+        from manipcli.batch.discovery import is_named_task
+
+        look = "task" if is_named_task(file_path) else look
     if look == "other" or not _is_looked_for(file_path, parent.session):
         return None
     stash = parent.config.stash

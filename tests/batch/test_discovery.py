@@ -24,6 +24,8 @@ TASKS = {
     "tasks/empty.yaml": "task:  # later\nrobot: r.yaml\nsteps: []\n",
     "tasks/three.yaml": "task: 3\nrobot: r.yaml\ncontrollers: c.yaml\n",
     "tasks/accent.yaml": "task: été\nrobot: r.yaml\nsteps: []\n",
+    "tasks/indented.yaml": "# all of it\n  task: indented\n  robot: r.yaml\n",
+    "tasks/mac.yaml": "# old\rtask: mac\rrobot: r.yaml\r",
     "tasks/broken.yaml": "task: broken\nrobot: r.yaml\nsteps: [\n",
 }
 OTHERS = {
@@ -45,6 +47,7 @@ OTHERS = {
     "word.yaml": "task: null # as well\nrobot: r.yaml\n",
     "number.yaml": "task: 5\nrobot: r.yaml\n",
     "notes.txt": "task: no\nrobot: r.yaml\n",
+    "nested.yaml": "# all of it\n  a:\n    task: no\n    robot: r.yaml\n",
     ".hidden/h.yaml": "task: h\nrobot: r.yaml\n",
     "tasks/.hidden.yaml": "task: h\nrobot: r.yaml\n",
     "runs/old.yaml": "task: old\nrobot: r.yaml\n",
@@ -119,6 +122,14 @@ def test_a_file_that_is_named_is_a_case_that_tells_what_is_wrong(folder: Path, n
     case = read_case(Path(named))
     assert case.task == ("hello" if named == "robotless.yaml" else Path(named).stem)
     assert [one.code for one in case.findings] == ([] if named == "robotless.yaml" else ["TASK200"])
+
+
+@pytest.mark.parametrize("text", ["? task\n: t\n? robot\n: r.yaml\n", f"#{'-' * 70_000}\ntask: t\nrobot: r.yaml\n"])
+def test_a_file_that_is_named_is_a_task_however_it_is_written(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text(text)
+    assert task_files([path]) == (path,)
+    assert read_case(path).task == "t"
 
 
 def test_only_the_beginning_of_a_foreign_file_is_read(tmp_path: Path) -> None:
