@@ -1,0 +1,75 @@
+"""docs/json.md names the keys that programs get, all of them and no others."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from manipcli.core.errors import Finding, Place
+from manipcli.judge.cuts import Cuts
+from manipcli.judge.drawn import Drawn
+from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
+from manipcli.report.json import render_run
+from manipcli.report.run_report import RunReport, Timing
+from manipcli.report.suite import Case, CaseReport, Suite, Trouble
+from manipcli.report.suite_json import render_suite
+
+DOCS = Path(__file__).parents[2] / "docs" / "json.md"
+STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))
+NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1)
+WRONG = Finding("TASK201", "unknown key", Place("a.yaml", 3, 5))
+VERDICT = Verdict(
+    "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
+    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), cuts=Cuts({"joint_1": 3}, {"motor_1": 2}),
+)  # fmt: skip
+RUN = RunReport(VERDICT, 3.0, 8.0, "runs/pour.mcap", Timing(0.1, 0.2, 2.5, 0.2))
+CASE = CaseReport(
+    Case("a.yaml", "a"), "failed", 1.0, "", run=RUN, warnings=(WRONG,), troubles=(Trouble("x", Place("a.yaml", 1, 1)),)
+)
+OBJECTS = {
+    "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
+    "cases", "cases.tightest", "cases.troubles",
+}  # fmt: skip
+"""Their rows tell of keys, those of others of values."""
+BY_NAME = {"values", "joints", "actuators"}
+"""Their keys are names of the task."""
+
+
+def _rows() -> Iterator[list[tuple[str, str]]]:
+    """The cells of each table."""
+    for table in re.findall(r"(?:^\|.*\n)+", DOCS.read_text("utf-8"), re.MULTILINE):
+        lines = [line.strip("|\n ").split(" | ", 1) for line in table.splitlines()[2:]]
+        yield [(first, second) for first, second in lines]
+
+
+def _documented(rows: list[tuple[str, str]]) -> Iterator[str]:
+    """`steps`, `steps.id`: what stands in brackets only explains, and so do values."""
+    for first, second in rows:
+        names = [name.replace("[]", "") for name in re.findall(r"`([^`]+)`", first)]
+        yield from names
+        if names[0] in OBJECTS:
+            yield from (f"{names[0]}.{word}" for word in re.findall(r"`(\w+)`", re.sub(r"\([^()]*\)", "", second)))
+
+
+def _written(value: Any, path: str = "") -> Iterator[str]:
+    if isinstance(value, list):
+        for one in value:
+            yield from _written(one, path)
+    elif isinstance(value, dict) and path.rpartition(".")[2] not in BY_NAME:
+        for key, one in value.items():
+            name = f"{path}.{key}".lstrip(".")
+            yield name
+            yield from _written(one, name)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_keys_are_those_that_are_written(which: int) -> None:
+    text = render_run(RUN) if which == 0 else render_suite(Suite((CASE,), 1, 1, 1.0))
+    elsewhere = ("cases.run.", "cases.warnings.")
+    written = {one for one in _written(json.loads(text)) if not one.startswith(elsewhere)}
+    assert set(_documented(list(_rows())[which])) == written
