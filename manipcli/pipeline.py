@@ -86,6 +86,9 @@ def run_task(
     task = load_task(
         path, overrides=overrides, seed=seed, sample=sample, package_path=package_path, allow_outside=allow_outside
     )
+    warnings = tuple(finding for finding in task.findings if finding.severity == "warning")
+    if progress is not None and warnings:
+        progress.warned(warnings)
     load_libraries(task)
     loaded = time.perf_counter()
     try:
@@ -93,7 +96,9 @@ def run_task(
     except NotPlannable as refusal:
         took = time.perf_counter() - began
         timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
-        return RunReport(refused(task, refusal), wall_time=took, real_time_factor=None, log=None, timing=timing)
+        return RunReport(
+            refused(task, refusal), wall_time=took, real_time_factor=None, log=None, timing=timing, warnings=warnings
+        )
     doubts = gain_findings(task, plan)
     planned = time.perf_counter()
     if progress is not None and doubts:
@@ -120,6 +125,7 @@ def run_task(
         real_time_factor=verdict.simulated_time / timing.simulate,
         log=str(where),
         timing=timing,
+        warnings=(*warnings, *doubts),
     )
 
 

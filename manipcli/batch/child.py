@@ -63,8 +63,8 @@ class _Beats:
         self._parent.send(Beat(what))
 
     def warned(self, findings: Sequence[Finding]) -> None:
-        self.warnings = tuple(findings)
-        self.doing("planned")
+        self.warnings += tuple(findings)
+        self.doing("told of doubts")
 
     def judged(self) -> None:
         """From here on the time is not that of the run."""

@@ -30,7 +30,7 @@ class Progress(Protocol):
         ...
 
     def warned(self, findings: Sequence[Finding]) -> None:
-        """What may go wrong, known before the first step."""
+        """What may go wrong, known before the first step: once of the files, once of the plan."""
         ...
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:

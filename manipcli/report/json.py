@@ -35,7 +35,7 @@ def render_run(report: RunReport) -> str:
                 "simulate": number(timing.simulate),
                 "judge": number(timing.judge),
             },
-            errors=report.verdict.errors,
+            errors=(*report.verdict.errors, *report.warnings),
         )
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from manipcli.core.errors import ExitCode
+from manipcli.core.errors import ExitCode, Finding
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 
 
@@ -28,6 +28,7 @@ class RunReport:
         real_time_factor: simulated time over the wall time of its simulation; None where nothing was.
         log: path of the log, as text; None where nothing was run, or it was not kept.
         timing: the parts of `wall_time`.
+        warnings: what was doubted before the run began: about its files, and about gains.
     """
 
     verdict: Verdict
@@ -35,6 +36,7 @@ class RunReport:
     real_time_factor: float | None
     log: str | None
     timing: Timing
+    warnings: tuple[Finding, ...] = ()
 
 
 def exit_code(verdict: Verdict) -> ExitCode:
