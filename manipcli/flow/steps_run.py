@@ -16,12 +16,13 @@ from manipcli.flow.holding import Holding
 from manipcli.flow.live import Live, Probe
 from manipcli.flow.load import Task
 from manipcli.flow.onlooker import Progress
-from manipcli.flow.plan import Plan, PlannedStep, plan_step
+from manipcli.flow.plan import Plan, PlannedStep
 from manipcli.flow.replan import Measured, after
 from manipcli.flow.watching import Watching
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
+from manipcli.model.touch import grips, held_force
 from manipcli.plan.step import Situation
 from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
@@ -37,6 +38,8 @@ AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
 LEFT_BEHIND: Final = 0.05
 """A held object further than this [m] from where it was planned is no longer held."""
+HELD: Final = 0.1
+"""An object that two links press on with this force [N] was not let go."""
 
 
 def cuts_of(session: Session) -> Cuts:
@@ -111,7 +114,8 @@ class StepsRun:
             self._executor.stop()
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
-        """All attempts at a step."""
+        """All attempts at a step. Where a watch is broken it ends at once; that the robot is stopped then is no part of
+        it."""
         began = ended = self._session.time
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
@@ -135,6 +139,8 @@ class StepsRun:
                 self._tell(f"{end.outcome}: {end.text}; it is tried again", detail=False)
             if attempt < attempts or step.may_fail:
                 self._executor.stop()
+        if self._over:
+            self._executor.stop()
         tolerated = end.outcome != "done" and step.may_fail and self._may_go_on
         if tolerated:
             self._event("step_tolerated", planned, "", "on_fail: continue")
@@ -157,7 +163,6 @@ class StepsRun:
         broken = self._alarm(self._session.state)
         if not broken:
             return end
-        self._executor.stop()
         self._live.step_ended(planned.id, "failed")
         before = f"; before that: {end.outcome}: {end.text}" if end.outcome != "done" else ""
         return MotionEnd("failed", f"stopped: {broken}{before}")
@@ -202,19 +207,21 @@ class StepsRun:
         if anew:
             try:
                 with self._replanning:
-                    planned = replace(planned, plan=plan_step(self._plan.planner, step, now))
+                    plan, now, stays = self._measured.plan(step, planned_start, now)
+                planned = replace(planned, plan=plan)
             except NotPlannable as refusal:
                 self._believed = now
                 why = f", where {'; '.join(differences)}" if differences else ""
-                return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}")
+                way_out = "" if again or self._failed else "; `replan: false` keeps the plan that there was"
+                return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}{way_out}")
             why = "; ".join(differences) or ("it is tried again" if again else "the step before it failed")
+            why += stays
             self._event("replanned", planned, "", why)
             self._tell(f"planned again: {why}", detail=True)
             self._failed = False
         try:
             end = self._motions(step, planned, now)
         except Alarmed as alarm:
-            self._executor.stop()
             return MotionEnd("failed", f"stopped: {alarm}")
         except SimulationFailed as failure:
             text = str(failure) + _cut_since(before, self._session)
@@ -240,7 +247,9 @@ class StepsRun:
                     over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
                 end = self._executor.run(motion, until=until, deadline=over)
                 if end.outcome != "done":
-                    return MotionEnd(end.outcome, f"{motion.label}: {end.text}{_missing(end, probe)}")
+                    held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
+                    text = f"{motion.label}: {end.text}{_missing(end, probe)}{f'; {held}' if held else ''}"
+                    return MotionEnd(end.outcome, text)
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touching)
                 awaited = awaited and not motion.awaits
@@ -252,6 +261,9 @@ class StepsRun:
                 end = self._executor.wait(until, deadline=deadline)
                 if end.outcome != "done":
                     return replace(end, text=end.text + _missing(end, probe))
+        held = self._still_held(before) if planned.plan.end.carried is None else ""
+        if held:
+            return MotionEnd("failed", held)
         return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -280,6 +292,17 @@ class StepsRun:
         where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
         grasp = self._holding.told(carried.body)
         return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
+
+    def _still_held(self, before: Situation) -> str:
+        """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""
+        if before.carried is None or not self._physics:
+            return ""
+        body = before.carried.body
+        if held_force(self._session.touching, body) < HELD:
+            return ""
+        self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
+        (_, first), (_, second), *_ = grips(self._session.touching, body)
+        return f"the hand still holds '{body}', between '{first}' and '{second}'"
 
     def _tell(self, text: str, *, detail: bool) -> None:
         if self._progress is not None:

@@ -307,7 +307,8 @@ class TaskSpec(Model):
     expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")
     watch: tuple[WatchSpec, ...] = Field(
         (),
-        description="What ends the run where it is broken: `never` or `always`, all the time or `during` steps.",
+        description="What stops the robot and ends the run where it is broken: `never` or `always`, all the time or "
+        "`during` steps.",
     )
 
     @property

@@ -143,6 +143,7 @@ def test_a_watch_stops_the_robot_within_its_limits_and_names_moment_and_excess(r
     broken = float(verdict.text.split("'watch_at_pose' is broken at t = ")[1].split(" s by ")[0])
     assert crossed <= broken <= crossed + 2 * PERIOD
     assert broken <= told.time <= broken + 11 * PERIOD
+    assert verdict.steps[1].ended == told.time, "braking is no part of the step"
     assert "joint 'pitch'" in verdict.text
     speed = np.abs(states.velocity[:, 0])
     assert np.diff(speed).min() > -1.001 * ACCELERATION * PERIOD
@@ -178,6 +179,7 @@ def test_a_watch_that_breaks_in_the_last_ticks_of_its_step_fails_that_step(run: 
     assert "is broken at t = 0.1" in verdict.steps[0].text
     (broken,) = events(tmp_path, "watch_broken")
     assert broken.step == "wait_1"
+    assert verdict.steps[0].ended == broken.time == pytest.approx(0.11, abs=1.5 * PERIOD)
 
 
 def test_a_watch_tells_what_must_never_be_as_that(run: Run) -> None:
