@@ -188,14 +188,14 @@ def read_baseline(path: Path) -> Measures | None:
         tree = json.loads(path.read_bytes(), parse_constant=_refuse)
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidInput([_no_baseline(path, str(error))]) from None
     lacking = [key for key in ALWAYS if isinstance(tree, dict) and key not in tree]
     if lacking:
         raise InvalidInput([_no_baseline(path, f"it lacks {listed([f'`{key}`' for key in lacking])}")])
     try:
         return dict(_measures(tree))
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise InvalidInput([_no_baseline(path, "keys or numbers are not those of a baseline")]) from None
 
 
@@ -214,17 +214,26 @@ def _refuse(constant: str) -> float:
 def _measures(tree: dict[str, object]) -> Iterator[tuple[Key, Measure]]:
     for key, value in tree.items():
         match key, value:
-            case "duration", int() | float():
-                yield (key,), Measure(value, "s")
-            case "energy", int() | float():
-                yield (key,), Measure(value, "J")
+            case "duration", _:
+                yield (key,), Measure(_number(value), "s")
+            case "energy", _:
+                yield (key,), Measure(_number(value), "J")
             case "steps", dict():
-                yield from (((key, str(name)), Measure(float(one), "s")) for name, one in value.items())
+                yield from (((key, str(name)), Measure(_number(one), "s")) for name, one in value.items())
             case "margins", dict():
                 for name, one in value.items():
-                    yield (key, str(name)), Measure(float(one["value"]), str(one["unit"]))
+                    yield (key, str(name)), Measure(_number(one["value"]), str(one["unit"]))
             case _:
                 raise ValueError(key)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(value)
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(number)
+    return number
 
 
 def _no_baseline(path: Path, why: str) -> Finding:
