@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from manipcli.control.roles import is_follower
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
+from manipcli.flow.plan import plan_step
 from manipcli.model.collision import Carried
 from manipcli.model.robot import RobotModel
 from manipcli.plan.planner import Planner
@@ -72,14 +75,55 @@ class Measured:
             return now
         # The robot is told to be where it is commanded to be; so is what it holds, and what lies in that.
         shift = planner.kinematics.forward(position, carried.link) @ X_LO @ X_WO.inverse()
-        held = {carried.body, *planner.contents(now, carried.body)}
-        names = [body.name for body in planner.scene.movable]
-        moved = tuple(shift @ X if name in held else X for name, X in zip(names, bodies, strict=True))
-        return replace(now, bodies=moved, carried=Carried(carried.body, carried.link, X_LO))
+        return replace(self._shifted(now, carried.body, shift), carried=Carried(carried.body, carried.link, X_LO))
 
     def differences(self, planned: Situation, now: Situation, step: StepSpec) -> tuple[str, ...]:
         """In what `now` is not what the step was `planned` for, each with how much; () where it is near enough."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
+
+    def plan(self, step: StepSpec, planned: Situation, now: Situation) -> tuple[StepPlan, Situation, str]:
+        """The plan of a step that was `planned` for another situation, from where things are `now`.
+
+        An arm of few joints may be able to move what is held to where it belongs and unable to turn it. Where nothing
+        can be planned, a turn in the hand that does not count by itself is left as it is.
+
+        Returns:
+            The plan; the situation in which it begins; what is to be told of it, "" where there is nothing.
+
+        Raises:
+            NotPlannable: neither can be planned; why the first one cannot.
+        """
+        try:
+            return plan_step(self._planner, step, now), now, ""
+        except NotPlannable:
+            left = self._turn_left(planned, now)
+            if left is not None:
+                turned, told = left
+                with suppress(NotPlannable):
+                    return plan_step(self._planner, step, turned), turned, told
+            raise
+
+    def _turn_left(self, planned: Situation, now: Situation) -> tuple[Situation, str] | None:
+        """`now` with what is held turned in the hand as `planned`, and what to tell; None where the turn counts."""
+        before, after = planned.carried, now.carried
+        if before is None or after is None or before.body != after.body:
+            return None
+        _, turn = _between(before.X_LO, after.X_LO)
+        if turn > self._limits.rotation:
+            return None
+        planner = self._planner
+        X_LO = Transform(R=before.X_LO.R, p=after.X_LO.p)
+        X_WO = planner.body_pose(now, after.body)
+        shift = planner.kinematics.forward(now.position, after.link) @ X_LO @ X_WO.inverse()
+        turned = replace(self._shifted(now, after.body, shift), carried=replace(after, X_LO=X_LO))
+        return turned, f"; the arm cannot undo the {_deg(turn)} by which '{after.body}' is turned in the hand"
+
+    def _shifted(self, now: Situation, body: str, shift: Transform) -> Situation:
+        """With a body, and what lies in it, moved in the world."""
+        moving = {body, *self._planner.contents(now, body)}
+        names = [one.name for one in self._planner.scene.movable]
+        moved = (shift @ X if name in moving else X for name, X in zip(names, now.bodies, strict=True))
+        return replace(now, bodies=tuple(moved))
 
     def _commanded(self, measured: Array) -> Array:
         """(n) where joints are commanded to be if that is near, else where they are; within their limits."""

@@ -56,8 +56,12 @@ class Solution:
 
     def explain(self) -> str:
         """Why this attempt is no solution, for a message."""
-        off = f"{self.position_error * 1000.0:.1f} mm and {math.degrees(self.angle_error):.1f} deg"
-        text = f"the nearest pose is {off} off"
+        away, turned = 1000.0 * self.position_error, math.degrees(self.angle_error)
+        if away < 0.05 and turned < 0.05:
+            near = f"{1000.0 * POSITION_TOLERANCE:.2g} mm and {math.degrees(ANGLE_TOLERANCE):.2g} deg"
+            text = f"the nearest pose is {away:.2g} mm and {turned:.2g} deg off, and up to {near} counts as reached"
+            return f"{text}: an arm of few joints cannot take every orientation"
+        text = f"the nearest pose is {away:.1f} mm and {turned:.1f} deg off"
         if self.at_limit:
             return f"{text}, held back by the limits of {', '.join(self.at_limit)}"
         return f"{text}, out of reach"

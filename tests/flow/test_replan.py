@@ -11,17 +11,21 @@ from typing import cast
 import numpy as np
 import pytest
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
+from manipcli.flow import replan
 from manipcli.flow.execute import controllers
 from manipcli.flow.load import Task, load_task
 from manipcli.flow.plan import Plan, plan_step, plan_task
 from manipcli.flow.replan import COMMANDED, LOST, Measured, after
 from manipcli.model.collision import Carried
-from manipcli.plan.step import Situation
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Situation, StepPlan
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.task import StepSpec
 
 ROOT = Path(__file__).parents[2]
 PICK, LIFT, PLACE, MOVE = range(4)
@@ -174,6 +178,40 @@ def test_what_slipped_in_the_hand_is_put_down_where_it_belongs(world_at: WorldOf
     goal = planner.solver.forward(q) @ held
     np.testing.assert_allclose(goal.p, [0.5, 0.2, 0.225], atol=2e-5)
     assert goal.R[2, 2] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0.02, 0.05])
+def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_count(
+    world_at: WorldOf, monkeypatch: pytest.MonkeyPatch, turn: float
+) -> None:
+    """As for an arm that can only plan with the object turned in the hand as it was planned to be; 0.035 rad count."""
+    world = world_at(PLACE)
+    planner, before, step = world.plan.planner, world.before(PLACE), world.task.spec.steps[PLACE]
+    world.put("block", before.bodies[0] @ Transform.of(xyz=(0.004, 0.0, 0.0), rpy=(turn, 0.0, 0.0)))
+    now = world.measured.situation(before)
+    held = before.carried
+    assert held is not None
+
+    def few_joints(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:
+        assert situation.carried is not None
+        if not np.allclose(situation.carried.X_LO.R, held.X_LO.R, atol=1e-9):
+            raise NotPlannable("the arm has five joints")
+        return plan_step(planner, step, situation)
+
+    monkeypatch.setattr(replan, "plan_step", few_joints)
+    if turn > ReplanSpec().rotation:
+        with pytest.raises(NotPlannable, match="five joints"):
+            world.measured.plan(step, before, now)
+        return
+    again, begins, told = world.measured.plan(step, before, now)
+    assert told == "; the arm cannot undo the 1.1 deg by which 'block' is turned in the hand"
+    lowered = next(motion for motion in again.motions if motion.label == "lower")
+    assert lowered.trajectory is not None
+    q = np.array(begins.position)
+    q[list(planner.solver.columns)] = lowered.trajectory.positions[-1]
+    goal = planner.solver.forward(q) @ planner.held_in_tool(now)  # as it truly sits there
+    np.testing.assert_allclose(goal.p, [0.5, 0.2, 0.225], atol=2e-5)
+    assert math.acos(goal.R[2, 2]) == pytest.approx(turn, abs=1e-4)
 
 
 def test_an_object_that_fell_is_no_longer_in_the_hand(world_at: WorldOf) -> None:

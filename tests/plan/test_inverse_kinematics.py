@@ -13,6 +13,7 @@ from manipcli.plan.inverse_kinematics import (
     ANGLE_TOLERANCE,
     POSITION_TOLERANCE,
     InverseKinematics,
+    Solution,
     rotation_vector,
 )
 
@@ -75,6 +76,12 @@ def test_a_goal_out_of_reach_names_error_and_distance(solver: InverseKinematics,
     ) as refused:
         solver.solve(Transform.of(xyz=(3.0, 0.0, 0.0)), middle, np.random.default_rng(0))
     assert refused.value.hint is not None
+
+
+def test_a_pose_that_is_barely_missed_is_told_with_what_would_have_counted(middle: Array) -> None:
+    told = Solution(middle, position_error=2.4e-6, angle_error=1.5e-4, at_limit=()).explain()
+    assert told.startswith("the nearest pose is 0.0024 mm and 0.0086 deg off, and up to 0.01 mm and 0.0057 deg counts")
+    assert Solution(middle, 0.03, 0.1, ()).explain() == "the nearest pose is 30.0 mm and 5.7 deg off, out of reach"
 
 
 def test_limits_that_hold_the_arm_back_are_named(make_arm7: Callable[..., RobotModel], middle: Array) -> None:
