@@ -240,7 +240,7 @@ class Draft:
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
-        self._add("open", None, grip, allowed=allowed)
+        self._add("open", None, replace(grip, must_arrive=True), allowed=allowed)
 
     def dwell(self, label: str, duration: float, *, awaits: bool = False) -> None:
         """Hold still for `duration` [s]."""

@@ -53,13 +53,14 @@ class Situation:
 class Grip:
     """A goal of the hand: `joints` go to `target` (n) until each finger meets `force` [N] or arrives.
 
-    With `must_hold`, a hand that closed on nothing has failed.
+    With `must_hold`, a hand that closed on nothing has failed; with `must_arrive`, one that something stopped.
     """
 
     joints: tuple[str, ...]
     target: Array
     force: float | None
     must_hold: bool
+    must_arrive: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -90,7 +91,7 @@ class Executor:
             if not switched.ok:
                 return MotionEnd("failed", told)
         handles = self._handles = self._send(motion)
-        last_tick = session.ticks + round(motion.duration / session.period)
+        last_tick = session.ticks + self._ticks(motion.duration)
         awaited = until if motion.awaits else None
         while True:
             state = self._tick()
@@ -130,14 +131,18 @@ class Executor:
 
     def hold(self, duration: float) -> None:
         """Command nothing new for `duration` [s]."""
-        for _ in range(round(duration / self._session.period)):
+        for _ in range(self._ticks(duration)):
             self._tick()
 
     def stop(self) -> None:
         """Cancel what is on, let the joints slow down within their limits, and hold still; no alarm is heard now."""
         self._cancel()
-        for _ in range(round(REST / self._session.period)):
+        for _ in range(self._ticks(REST)):
             self._session.tick()
+
+    def _ticks(self, duration: float) -> int:
+        """In how many ticks `duration` [s] is over."""
+        return math.ceil(duration / self._session.period - 1e-6)
 
     def _tick(self) -> WorldState:
         """
@@ -210,12 +215,14 @@ def _told(switched: SwitchResult) -> str:
 
 
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:
-    """Done; unless the hand was to hold something and no finger met anything."""
+    """Done; unless the hand was to hold something and no finger met anything, or to open and something stopped one."""
     text = "; ".join(handle.result.text for handle in handles if handle.result is not None and handle.result.fingers)
-    if motion.grip is not None and motion.grip.must_hold and touch:
+    if motion.grip is not None:
         stops = [stop for handle in handles if handle.result is not None for stop in handle.result.fingers]
-        if "contact" not in stops and "stalled" not in stops:
+        if motion.grip.must_hold and touch and "contact" not in stops and "stalled" not in stops:
             return MotionEnd("failed", f"the hand closed on nothing: {text}")
+        if motion.grip.must_arrive and "stalled" in stops:
+            return MotionEnd("failed", f"the hand did not open: {text}")
     return MotionEnd("done", text)
 
 

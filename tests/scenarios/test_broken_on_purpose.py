@@ -114,6 +114,23 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     assert verdict.text.endswith("; it alone weighs 1.47 N")
 
 
+@pytest.mark.parametrize(
+    ("posture", "told"),
+    [
+        ("closed", r"open: the hand did not open: finger of 'panda_finger_joint1': stalled 0\.02\d* before .*; the hand"),
+        ("barely", r"the hand"),
+    ],
+)
+def test_a_hand_that_does_not_let_go_is_told(run: Run, posture: str, told: str) -> None:
+    """Fingers that press on, and fingers that come to within 2 mm of a pose that is too narrow."""
+    task = (ROOT / "tasks" / "pick_place.yaml").read_text(encoding="utf-8").partition("  - lift:")[0]
+    task = f"{task.replace('../', f'{ROOT}/')}  - release: {{posture: {posture}}}\n"
+    verdict = run(task, "robot.poses.barely={hand: [0.02]}")
+    assert outcomes(verdict) == ["done", "failed"]
+    held = r"still holds 'block', between 'robot/panda_(left|right)finger' and 'robot/panda_(left|right)finger'"
+    assert re.fullmatch(f"step 'release_1' failed: {told} {held}", verdict.text), verdict.text
+
+
 CUP = Mover("pick_1", ("cup", "ball"), (0.0, -0.1, 0.0))
 
 

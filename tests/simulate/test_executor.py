@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -127,6 +128,29 @@ def test_a_hand_that_closes_on_nothing_fails_where_it_must_hold(session_of: Sess
     assert end.text.startswith("the hand closed on nothing: finger of 'knuckle': reached its target")
     assert Executor(session_of()).run(close(must_hold=False), until=None, deadline=None).outcome == "done"
     assert Executor(session_of(), touch=False).run(close(), until=None, deadline=None).outcome == "done"
+
+
+def test_a_hand_that_something_stops_has_not_opened(session_of: SessionOf, scripted: Any) -> None:
+    def stuck(engine: Any) -> None:
+        engine.state.position[1:] = 0.4
+
+    opening = Grip(("knuckle", "tip"), np.zeros(2), None, must_hold=False, must_arrive=True)
+    end = Executor(session_of(scripted(stuck))).run(Motion("open", None, opening, 0.2), until=None, deadline=None)
+    assert end.outcome == "failed"
+    assert end.text.startswith("the hand did not open: finger of 'knuckle': stalled 0.4 before the target")
+    assert Executor(session_of()).run(Motion("open", None, opening, 0.2), until=None, deadline=None).outcome == "done"
+    moving = Motion("move", None, replace(opening, must_arrive=False), 0.2)
+    assert Executor(session_of(scripted(stuck))).run(moving, until=None, deadline=None).outcome == "done"
+
+
+@pytest.mark.parametrize(("periods", "ticks"), [(1.0, 1), (2.4, 3), (2.6, 3), (3.0 + 1e-9, 3), (600.0, 600)])
+def test_a_wait_is_never_shorter_than_it_was_asked_for(session_of: SessionOf, periods: float, ticks: int) -> None:
+    session = session_of()
+    wait = Motion("wait", None, None, periods * session.period)
+    assert Executor(session).run(wait, until=None, deadline=None).outcome == "done"
+    assert session.ticks == ticks
+    Executor(session).hold(periods * session.period)
+    assert session.ticks == 2 * ticks
 
 
 def test_a_hand_that_meets_something_holds(session_of: SessionOf, scripted: Any) -> None:
