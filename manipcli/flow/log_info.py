@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.judge.steps import step_outcomes
+from manipcli.judge.steps import COMPLETE, left_out, step_outcomes
 from manipcli.judge.verdict import StepOutcome
 from manipcli.record import channels
 from manipcli.record.contents import RECORD
@@ -33,9 +33,13 @@ def log_info(path: Path) -> LogInfo:
             missing += [] if found.faults else [error.cause]
         else:
             status = recording.metadata.get("run", {}).get("status", "")
-            steps = step_outcomes(recording, interrupted=status not in ("complete", "failed"))
+            lacks = left_out(recording) if status == COMPLETE and recording.lost is None else ""
+            steps = step_outcomes(recording, interrupted=bool(lacks) or status not in (COMPLETE, "failed"))
             if recording.lost is not None:
                 missing = [recording.lost]
+            missing += [lacks] if lacks else []
+            if channels.CONTACTS in recording.silent:
+                missing.append(recording.unknown(channels.CONTACTS))
             if not status:
                 missing.append("the run did not come to its end: the log has no status and no verdict")
     else:

@@ -14,7 +14,7 @@ from manipcli.flow.log import URDF
 from manipcli.flow.log_info import COMMON
 from manipcli.model.located_xml import element_of, parse_document
 from manipcli.model.state import Contact
-from manipcli.record.channels import CONTACTS, TF
+from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.inventory import Inventory, inventory
@@ -50,7 +50,7 @@ def moment(path: Path, time: float) -> Moment:
 def _ours(path: Path, time: float) -> Moment:
     recording = open_recording(path)
     missing = [] if recording.lost is None else [recording.lost]
-    missing += [f"the run did not record {topic}" for topic in recording.absent if topic in (TF, CONTACTS)]
+    missing += [recording.unknown(topic) for topic in (TF, CONTACTS, EVENTS) if recording.unknown(topic)]
     span, k, touched, end = _at(recording.spans, time)
     if span is None:
         raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
@@ -94,7 +94,7 @@ def _ours(path: Path, time: float) -> Moment:
         phase=phase,
         joints=joints,
         poses=poses,
-        contacts=None if CONTACTS in recording.absent else touched,
+        contacts=None if recording.unknown(CONTACTS) else touched,
         missing=tuple(missing),
     )
 

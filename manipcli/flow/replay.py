@@ -67,6 +67,7 @@ def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_ou
         body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
         body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
         notes = (*notes, f"the run did not record {TF}: every body is drawn where it was at the start")
+    notes = (*notes, *(recording.unknown(topic) for topic in recording.silent))
     return Playback(
         name=verdict.task or path.name,
         robot=robot,

@@ -10,7 +10,7 @@ from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.expectation import Seams
-from manipcli.judge.steps import step_outcomes
+from manipcli.judge.steps import COMPLETE, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.robot import RobotModel
@@ -21,7 +21,7 @@ from manipcli.spec.condition import ExpectationSpec
 RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
-_JUDGED = ("complete", "failed")
+_JUDGED = (COMPLETE, "failed")
 """Values of `status` of a run that came to its own end, whether it went well or not."""
 
 
@@ -94,6 +94,8 @@ def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
         errors.append(Finding("RUN103", f"the run did not come to its end: the log has {what}"))
     if recording.lost is not None:
         errors.append(Finding("RUN104", f"the log is incomplete: {recording.lost}"))
+    elif status == COMPLETE and left_out(recording):
+        errors.append(Finding("RUN104", f"the log is incomplete: {left_out(recording)}"))
     return tuple(errors)
 
 

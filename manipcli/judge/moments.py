@@ -55,17 +55,20 @@ class Order:
 
 
 def unrecorded(recording: Recording) -> dict[Seen, str]:
-    """Why nothing is known of what the task told not to record."""
+    """Why nothing is known of what the task told not to record, or of what the log lost."""
     words: dict[Seen, str] = {"bodies": TF, "contacts": CONTACTS, "references": "/controller_state"}
     absent = {
         seen: [topic for topic in recording.absent if topic == word or (seen == "references" and topic.endswith(word))]
         for seen, word in words.items()
     }
-    return {
+    found = {
         seen: f"the log holds no {topics[0]}: `record:` of the task leaves it out"
         for seen, topics in absent.items()
         if topics
     }
+    if CONTACTS in recording.silent:
+        found["contacts"] = f"{recording.unknown(CONTACTS)}, though every run records some"
+    return found
 
 
 class MomentsOfSpans:

@@ -8,10 +8,15 @@ from itertools import pairwise
 from typing import Any, get_args
 
 from manipcli.judge.verdict import Attempt, StepOutcome, StepWord
+from manipcli.record.channels import EVENTS
 from manipcli.record.recording import Recording, TaskEvent
 
 PLAN_FILE = "plan.json"
 """The attachment with the planned steps: `{"steps": [{"id", "verb", "planned_duration"}, ...]}`."""
+
+
+COMPLETE = "complete"
+"""Status, in the metadata of the log, of a run that came to its own end, whether its steps went well or not."""
 
 
 def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutcome, ...]:
@@ -29,6 +34,17 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
     return tuple(
         _outcome(step_id, verb, duration, recording.events, interrupted) for step_id, verb, duration in planned
     )
+
+
+def left_out(recording: Recording) -> str:
+    """What of its events the log of a complete run lacks; "" where it lacks none.
+
+    Such a run tells the beginning of a step at least, and the end of every step that it began.
+    """
+    if EVENTS in recording.silent:
+        return recording.unknown(EVENTS)
+    begun = next((one for one in step_outcomes(recording, interrupted=True) if one.outcome == "interrupted"), None)
+    return "" if begun is None else f"there is no end of step '{begun.id}', though the run came to its end"
 
 
 def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:

@@ -30,16 +30,17 @@ _pair = attrgetter("a", "b")
 
 
 class ContactFilter:
-    """Remembers what was recorded last."""
+    """Remembers what was recorded last. The first contacts are always recorded, were there none: a log without any
+    message of them lost its messages."""
 
     def __init__(self) -> None:
-        self._pairs: list[tuple[str, str]] = []
+        self._pairs: list[tuple[str, str]] | None = None
         self._last: list[Contact] = []
         self._time = 0.0
 
     def changed(self, time: float, contacts: Sequence[Contact]) -> list[Contact] | None:
         """The contacts to record at `time` [s], sorted by their names; None when the last message still holds."""
-        if not contacts and not self._pairs:
+        if not contacts and self._pairs == []:
             return None
         found = sorted(contacts, key=_pair)
         pairs = [(contact.a, contact.b) for contact in found]

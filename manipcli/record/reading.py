@@ -100,6 +100,7 @@ class _Reader:
         self._events: list[TaskEvent] = []
         self._chunks: list[ChunkPlace] = []
         self._newest = -1
+        self._heard: set[str] = set()
 
     def declaration(self, record: Record) -> None:
         """Anything but a chunk."""
@@ -172,6 +173,7 @@ class _Reader:
         needed = {channel: raw for channel, raw in indexes.items() if of[channel] == topics.EVENTS}
         if needed:
             guarded(self._path, record, lambda record: self._opened(record, needed))
+        self._heard.update(of[channel] for channel, entries in indexes.items() if entries)
         for channel, entries in indexes.items():
             if of[channel] == topics.JOINT_STATES and entries:
                 self._newest = int.from_bytes(entries[-16:-8], "little")
@@ -189,6 +191,7 @@ class _Reader:
             if channel not in self._channels:
                 raise CdrError(f"it has a message of channel {channel}, which is not declared")
             topic, _ = self._channels[channel]
+            self._heard.add(topic)
             if topic == topics.EVENTS:
                 self._events += [_event(ns, reader) for ns, reader in singly(data, found)]
             elif topic == topics.JOINT_STATES:
@@ -234,6 +237,7 @@ class _Reader:
             lost=lost,
             period=known.period,
             absent=known.absent,
+            silent=tuple(topic for topic in self._types if topic not in self._heard),
         )
 
 

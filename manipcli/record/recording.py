@@ -99,6 +99,8 @@ class Recording:
         period: [s] of a tick.
         absent: topics that the task told not to record. States whose topic is absent are NaN, and a controller whose
             state is absent has no trace.
+        silent: topics of which there is no message, though a run always records some: another program left them out, or
+            the run ended before.
 
     `states`, `controllers` and `contacts` are those of all spans together: ask them of a recording that is `whole`.
     Velocities of bodies are central differences of their recorded poses.
@@ -113,12 +115,19 @@ class Recording:
     lost: str | None
     period: float = 0.0
     absent: tuple[str, ...] = ()
+    silent: tuple[str, ...] = ()
 
     def embedded_meshes(self) -> dict[str, bytes]:
         """The mesh files that the log carries, by the URI that its URDF and its scene call them by; empty unless the
         run was told to embed them. The material libraries of OBJ files are among them, beside their meshes."""
         names = self.metadata.get(EMBEDDED, {})
         return {uri: self.attachments[name] for uri, name in names.items() if name in self.attachments}
+
+    def unknown(self, topic: str) -> str:
+        """Why nothing is known of what a topic tells; "" where it is known."""
+        if topic in self.absent:
+            return f"the run did not record {topic}"
+        return f"the log holds no message of {topic}" if topic in self.silent else ""
 
     def whole(self) -> Recording:
         """The same with all ticks in one span in memory: some 1.2 kB a tick for an arm with a hand and two objects."""

@@ -16,6 +16,7 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.columns import (
     Columns,
+    Int,
     Places,
     body_layout,
     controller_state_layout,
@@ -42,7 +43,7 @@ class FileSpans:
         contents: what it says it holds.
         channels: channel id -> topic.
         chunks: where its chunks stand.
-        cut: whether its end is missing, so that messages of the last tick may be, too.
+        cut: whether its end is missing, or parts of it, so that messages of some ticks may be, too.
     """
 
     path: Path
@@ -66,7 +67,7 @@ class FileSpans:
         yield _with_velocities(before, span, None)
 
     def _without_velocities(self) -> Iterator[Span]:
-        reader = _SpanReader(self.contents, self.channels)
+        reader = _SpanReader(self.contents, self.channels, gaps=self.cut)
         empty = True
         try:
             with self.path.open("rb") as file:
@@ -99,13 +100,16 @@ class FileSpans:
 
 
 class _Apart(Exception):
-    """Joints, bodies and controllers were not recorded at the same times."""
+    """Joints, bodies and controllers were not recorded at the same times, or not as often as the log says."""
 
 
 class _SpanReader:
-    """Gathers the messages of successive chunks, and gives them out once a tick is complete."""
+    """Gathers the messages of successive chunks, and gives them out once a tick is complete.
 
-    def __init__(self, contents: Contents, channels: Mapping[int, str]) -> None:
+    `gaps`: ticks may be missing.
+    """
+
+    def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool) -> None:
         n, m = len(contents.joints), len(contents.bodies)
         self._channels = channels
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
@@ -124,6 +128,8 @@ class _SpanReader:
         self._grid_ns = common_stride(strides) * contents.period * 1e9
         self._strided = len(set(strides.values())) > 1
         self._contacts: list[ContactSnapshot] = []
+        self._gaps = gaps
+        self._last = -1
 
     @property
     def ready(self) -> int:
@@ -164,6 +170,7 @@ class _SpanReader:
         for times in (body_ns, *(times for times, _ in taken)):
             if not np.array_equal(ns, times):
                 raise _Apart
+        self._count(ns)
         time = _settled(ns / 1e9)
         bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
         zeros = np.zeros_like(bodies[..., :3])
@@ -176,6 +183,13 @@ class _SpanReader:
             ),
             contacts=self._contacts_until(time[-1] if ticks else np.inf),
         )
+
+    def _count(self, ns: Int) -> None:
+        """Ticks begin at 0, and none is left out."""
+        ticks = np.concatenate(([self._last], np.rint(ns / self._grid_ns).astype(np.int64)))
+        if not self._gaps and not np.all(np.diff(ticks) == 1):
+            raise _Apart
+        self._last = int(ticks[-1])
 
     def _contacts_until(self, time: float) -> tuple[ContactSnapshot, ...]:
         now = tuple(snapshot for snapshot in self._contacts if snapshot.time <= time)

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from manipcli.flow.log_info import log_info
 from manipcli.flow.moment import moment
 from manipcli.flow.replay import open_playback
 from manipcli.pipeline import judge_log, run_task
@@ -51,3 +52,33 @@ def test_what_another_program_left_is_shown(
     assert any("left out messages" in note for note in shown.notes)
     assert shown.times[-1] > 0.15
     assert any("left out messages" in one for one in moment(thinned, 0.1).missing)
+
+
+def test_a_log_whose_ticks_are_thinned_alike_is_not_judged(log: Path, rewrite_log: Any, tmp_path: Path) -> None:
+    """Joints, bodies and controllers at the same tenth of the ticks: less than the log says that it holds."""
+    ticks = ("/joint_states", "/tf", "/arm_controller/controller_state", "/hand_controller/controller_state")
+    for name, kept in (
+        ("tenth", lambda ns: ns % 10_000_000 == 0),
+        ("late", lambda ns: ns >= 100_000_000),
+        ("gap", lambda ns: not 100_000_000 <= ns < 150_000_000),
+    ):
+        thinned = tmp_path / f"{name}.mcap"
+        rewrite_log(
+            log,
+            thinned,
+            message=lambda topic, one, kept=kept: one.data if topic not in ticks or kept(one.log_time) else None,
+        )
+        with pytest.raises(Thinned, match="left out messages"):
+            judge_log(thinned)
+        assert any("left out messages" in note for note in open_playback(thinned).notes)
+
+
+@pytest.mark.parametrize("topic", ["/contacts", "/task/events"])
+def test_a_topic_without_any_message_is_told(log: Path, rewrite_log: Any, tmp_path: Path, topic: str) -> None:
+    emptied = tmp_path / "emptied.mcap"
+    rewrite_log(log, emptied, message=lambda name, one: None if name == topic else one.data)
+    told = f"the log holds no message of {topic}"
+    assert told in moment(emptied, 0.1).missing
+    assert told in log_info(emptied).missing
+    assert told in open_playback(emptied).notes
+    assert log_info(log).missing == ()

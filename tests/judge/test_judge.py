@@ -314,10 +314,31 @@ def test_a_step_that_is_not_done_fails_the_run_before_any_expectation(outcome: s
 
 def test_steps_that_never_ran_or_never_ended_are_told_apart() -> None:
     started = step("go", 0.0, 1.0)[:1]
-    assert [s.outcome for s in judged(recording(events=started)).steps] == ["failed", "not_run"]
+    failed = judged(recording(events=started, metadata=run(status="failed")))
+    assert [s.outcome for s in failed.steps] == ["failed", "not_run"]
     assert [s.outcome for s in judged(recording(events=())).steps] == ["not_run", "not_run"]
     stopped = judged(recording(events=started, metadata=run(status="interrupted")))
     assert [s.outcome for s in stopped.steps] == ["interrupted", "not_run"]
+
+
+def test_a_complete_run_whose_events_are_missing_is_not_judged_as_if_it_were_whole() -> None:
+    """A run that came to its end has begun a step, and has ended every step that it began."""
+    events = (*step("go", 0.0, 1.0), step("wait_1", 1.0, 2.0)[0])
+    cut = judged(recording(events=events))
+    assert (cut.verdict, cut.errors[0].code) == ("error", "RUN104")
+    assert "no end of step 'wait_1'" in cut.text
+    assert cut.steps[1].outcome == "interrupted"
+    silent = judged(recording(events=(), silent=("/task/events",)))
+    assert (silent.verdict, silent.errors[0].code) == ("error", "RUN104")
+    assert "no message of /task/events" in silent.text
+
+
+def test_what_needs_contacts_is_not_evaluated_without_any_message_of_them() -> None:
+    never: tuple[str, Any] = ("no_collision", {"pairs": [["ball", "desk"]]})
+    assert judged(recording(), never).verdict == "passed"
+    verdict = judged(recording(contacts=(), silent=("/contacts",)), never)
+    assert (verdict.verdict, verdict.expectations[0].outcome) == ("failed", "not_evaluated")
+    assert "no message of /contacts" in verdict.expectations[0].text
 
 
 def test_a_log_without_plan_knows_the_steps_that_started_and_one_without_steps_fails() -> None:

@@ -84,9 +84,10 @@ def test_reads_back_what_was_recorded(tmp_path: Path, make_run: MakeRun) -> None
         np.testing.assert_array_equal(trace.position, run.states.position[:, columns])
         np.testing.assert_array_equal(trace.output, output[3])
         np.testing.assert_array_equal(trace.times, recording.states.time)
-    assert [snapshot.time for snapshot in recording.contacts] == [k / 10 for k in range(1, 13)]
-    assert recording.contacts[0].contacts == (run.contacts[1], run.contacts[0])
-    assert recording.contacts[1].contacts == ()
+    assert [snapshot.time for snapshot in recording.contacts] == [k / 10 for k in range(13)]
+    assert recording.contacts[0].contacts == ()
+    assert recording.contacts[1].contacts == (run.contacts[1], run.contacts[0])
+    assert recording.silent == ()
     assert [(event.time, event.step, event.text) for event in recording.events] == [
         (k / 4, f"step_{250 * k}", "é ok") for k in range(5)
     ]
