@@ -26,6 +26,8 @@ FILES: Final = {
 """What is written, and from which template."""
 MAY_BE_THERE: Final = ("README.md", ".gitignore")
 """What a folder has before it is a project: kept as it is."""
+RESULTS: Final = ("runs", "report")
+"""Folders that no repository should hold."""
 
 
 def init(
@@ -60,9 +62,35 @@ def init(
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
         console.result(f"written: {path}")
-    enter = "" if Path(os.path.realpath(folder)) == Path.cwd() else f"cd {quote(str(folder))} && "
+    for note in (*_unignored(folder / ".gitignore"), *_not_at_the_top(folder)):
+        console.talk(f"note: {note}")
+    name = f"./{folder}" if str(folder).startswith("-") else str(folder)
+    enter = "" if Path(os.path.realpath(folder)) == Path.cwd() else f"cd {quote(name)} && "
     console.talk(f"next: {enter}manipcli test")
     return ExitCode.PASSED
+
+
+def _unignored(file: Path) -> Iterator[str]:
+    """What a .gitignore that was kept lacks."""
+    if not file.is_file():  # a link to nothing was kept
+        return
+    known = {line.strip().strip("/") for line in file.read_text("utf-8", "replace").splitlines()}
+    lacking = [f"`{name}/`" for name in RESULTS if name not in known]
+    if lacking:
+        yield f"{file} has no {listed(lacking)}: git would take logs and reports of runs for files of yours"
+
+
+def _not_at_the_top(folder: Path) -> Iterator[str]:
+    """That GitHub does not see the workflow."""
+    whole = Path(os.path.realpath(folder))
+    top = next((place for place in (whole, *whole.parents) if (place / ".git").exists()), whole)
+    if top != whole:
+        workflow = Path(".github", "workflows", "manipcli.yml")
+        yield (
+            f"GitHub runs workflows at the top of a repository alone: move {folder / workflow} to {top / workflow}, "
+            f"begin its job with `defaults: {{run: {{working-directory: {whole.relative_to(top)}}}}}`, "
+            "and the paths of its artifact with that folder"
+        )
 
 
 def _in_the_way(path: Path) -> Iterator[str]:

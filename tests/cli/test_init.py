@@ -92,11 +92,29 @@ def test_what_a_folder_has_before_it_is_a_project_is_kept(
     for name in ("README.md", ".gitignore"):
         (tmp_path / name).write_text("mine")
     assert main(["init"]) == 0
-    told = capsys.readouterr().out.splitlines()
+    out, err = capsys.readouterr()
+    told = out.splitlines()
+    assert "note: .gitignore has no `runs/`, `report/`: git would take" in err
     assert [line for line in told if line.startswith("kept: ")] == ["kept: README.md", "kept: .gitignore"]
     assert "written: README.md" not in told
     assert {(tmp_path / name).read_text() for name in ("README.md", ".gitignore")} == {"mine"}
     assert main(["check", "tasks/pick_place.yaml"]) == 0
+
+
+def test_a_folder_below_the_top_of_a_repository_is_told_where_its_workflow_belongs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".git").mkdir()
+    (tmp_path / "-sub").mkdir()
+    (tmp_path / "-sub" / ".gitignore").write_text("/runs\nreport/\n")
+    assert main(["init", "--", "-sub"]) == 0
+    note, following = capsys.readouterr().err.splitlines()
+    top = tmp_path / ".github" / "workflows" / "manipcli.yml"
+    assert note.startswith("note: GitHub runs workflows at the top of a repository alone: move -sub/.github/workflows/")
+    assert f"manipcli.yml to {top}, begin its job" in note
+    assert "`defaults: {run: {working-directory: -sub}}`" in note
+    assert following == "next: cd ./-sub && manipcli test"
 
 
 def test_every_template_is_written_somewhere() -> None:
