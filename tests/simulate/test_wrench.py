@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,20 @@ from manipcli.control.controllers.forward_command import ForwardCommandControlle
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array, Transform, cross, frozen
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, JointType, Link, RobotModel, Sphere
+from manipcli.model.robot import (
+    Actuator,
+    Box,
+    Geometry,
+    Inertial,
+    Joint,
+    JointLimits,
+    JointType,
+    Link,
+    Mimic,
+    RobotModel,
+    Sphere,
+    TransmissionTag,
+)
 from manipcli.model.scene import Body, Scene
 from manipcli.simulate.engine import Engine, EngineSettings
 from manipcli.simulate.engines import ENGINES
@@ -110,12 +124,14 @@ def test_an_effort_is_measured_along_its_own_axis() -> None:
     np.testing.assert_allclose(sensor, expected(model, q, "upper"), atol=1e-3)
 
 
-def _ball(mass: float, at: Array) -> Body:
+def _body(shape: Sphere | Box, mass: float, at: Sequence[float], *, rolls: float = 0.0) -> Body:
+    """About 10 cm across."""
     return Body(
-        name="ball", kind="sphere", geometries=(Geometry(Transform.identity(), Sphere(0.05)),), mass=mass,
-        X_OI=Transform.identity(), inertia=frozen(np.eye(3) * 0.4 * mass * 0.05**2), friction=0.8,
-        rolling_friction=0.01, spinning_friction=0.01, restitution=0.0, fixed=False, X_WO=Transform.of(xyz=at),
-        interior=None, size=frozen([0.1] * 3), centre=frozen(np.zeros(3)),
+        name="body", kind="sphere" if isinstance(shape, Sphere) else "box",
+        geometries=(Geometry(Transform.identity(), shape),), mass=mass, X_OI=Transform.identity(),
+        inertia=frozen(np.eye(3) * 0.4 * mass * 0.05**2), friction=0.8, rolling_friction=rolls,
+        spinning_friction=rolls, restitution=0.0, fixed=False, X_WO=Transform.of(xyz=at), interior=None,
+        size=frozen([0.1] * 3), centre=frozen(np.zeros(3)),
     )  # fmt: skip
 
 
@@ -127,8 +143,10 @@ def test_what_lies_on_a_link_is_measured_through_the_contact() -> None:
     solid = Inertial(0.8, Transform.identity(), frozen(np.eye(3) * 0.01))
     links = (Link("base", None, (), ()), Link("carriage", solid, (), ()), Link("tray", solid, (plate,), (plate,)))
     model = RobotModel("lift", "base", links, (slide, glue), (), (), (), Transform.identity(), "")
-    at = np.array([0.25, 0.03, 1.06])
-    engine = ENGINES["pybullet"].open(model, scene(_ball(2.0, at)), EngineSettings(STEP, 1, frozen([0.0])))
+    at = (0.25, 0.03, 1.06)
+    engine = ENGINES["pybullet"].open(
+        model, scene(_body(Sphere(0.05), 2.0, at, rolls=0.01)), EngineSettings(STEP, 1, frozen([0.0]))
+    )
     try:
         q, (wrench,) = settled(engine, [engine.sense_wrench("glue")], "position")
         ball = np.array(engine.read().body_position[0])
@@ -137,6 +155,93 @@ def test_what_lies_on_a_link_is_measured_through_the_contact() -> None:
     arm = ball - np.array([0.2, 0.0, 1.0 + q[0]])
     np.testing.assert_allclose(wrench[:3], 2.8 * G, atol=2e-2)
     np.testing.assert_allclose(wrench[3:], cross(arm, 2.0 * G), atol=2e-3)
+
+
+def _gripper() -> RobotModel:
+    """Two fingers that close along y, the right one a mimic of the left; masses as little alike as their places."""
+    pad = Geometry(Transform.identity(), Box((0.04, 0.02, 0.06)))
+    links = [Link("base", None, (), ())]
+    for name, mass in (("palm", 0.7), ("left", 0.2), ("right", 0.1)):
+        shapes = () if name == "palm" else (pad,)
+        inertial = Inertial(mass, Transform.identity(), frozen(np.eye(3) * 1e-3))
+        links.append(Link(name, inertial, shapes, shapes))
+    left = _joint("drive", "prismatic", "palm", "left", Transform.of(xyz=(0.3, -0.06, -0.1)), (0.0, 1.0, 0.0))
+    right = _joint("follow", "prismatic", "palm", "right", Transform.of(xyz=(0.3, 0.06, -0.1)), (0.0, -1.0, 0.0))
+    joints = (
+        _joint("mount", "fixed", "base", "palm", Transform.of(xyz=(0.0, 0.0, 1.0)), (1, 0, 0)),
+        left,
+        replace(right, mimic=Mimic("drive", 1.0, 0.0)),
+    )
+    return RobotModel("gripper", "base", tuple(links), joints, (), (), (), Transform.identity(), "")
+
+
+def test_what_couples_joints_and_the_grip_stay_inside_the_hand() -> None:
+    """A hand that squeezes 0.5 kg with 20 N pulls with its weight and the block's; each finger with half the grip."""
+    model, mass, grip = _gripper(), 0.5, 20.0
+    block = _body(Box((0.1, 0.1, 0.1)), mass, (0.3, 0.0, 0.9))
+    engine = ENGINES["pybullet"].open(model, scene(block), EngineSettings(STEP, 1, frozen([0.0, 0.0])))
+    try:
+        ticks = []
+        palm, left, right = (engine.sense_wrench(joint) for joint in ("mount", "drive", "follow"))
+        command = JointCommand(2)
+        command.obey(("effort", "free"))
+        command.effort[:] = (grip, 0.0)
+        for _ in range(1500):
+            engine.write(command)
+            engine.advance()
+            state = engine.read()
+            ticks.append(np.array((palm, left, right)))
+        held, (q_left, q_right) = np.array(state.body_position[0]), state.position
+    finally:
+        engine.close()
+    assert held[2] == pytest.approx(0.9, abs=0.01)  # it is held
+    palm, left, right = np.mean(ticks[-500:], axis=0)  # the solver shakes the pads by some mN
+    np.testing.assert_allclose(palm[:3], 1.5 * G, atol=1e-2)
+    fingers = np.array([[0.3, q_left - 0.06, -0.1], [0.3, 0.06 - q_right, -0.1]])
+    arms = 0.2 * fingers[0] + 0.1 * fingers[1] + mass * (held - np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(palm[3:], cross(arms, G), atol=1e-3)
+    assert left[1] == pytest.approx(-grip / 2, abs=0.1)
+    assert right[1] == pytest.approx(grip / 2, abs=0.1)
+    assert left[2] + right[2] == pytest.approx(-0.8 * 9.81, abs=1e-2)
+
+
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_a_link_that_moves_pulls_with_what_accelerates_it(substeps: int) -> None:
+    """Of a pendulum with a rotor, f = m (g - a) where a = q'' x r + q' x (q' x r) from the joint's motion."""
+    hinge = _joint("drive", "continuous", "base", "upper", Transform.of(xyz=(0.0, 0.0, 1.0)), (0.0, 1.0, 0.0))
+    mass, inertia, rotor = 1.5, 0.02, 0.4
+    solid = Inertial(mass, Transform.of(xyz=(0.0, 0.0, -0.5)), frozen(np.eye(3) * inertia))
+    links = (Link("base", None, (), ()), Link("upper", solid, (), ()))
+    tag = TransmissionTag("t", "SimpleTransmission", ("drive",), (1.0,), (0.0,), ("m",), (10.0,))
+    model = RobotModel(
+        "pendulum", "base", links, (hinge,), (), (), (tag,), Transform.identity(), "",
+        actuators=(Actuator("m", rotor_inertia=rotor / 100.0),),
+    )  # fmt: skip
+    engine = ENGINES["pybullet"].open(model, scene(), EngineSettings(STEP, substeps, frozen([0.6])))
+    torque, axis = 12.0, np.array([0.0, 1.0, 0.0])
+    speeds, wrenches, angles = [], [], []
+    try:
+        sensor = engine.sense_wrench("drive")
+        command = JointCommand(1)
+        command.obey(("effort",))
+        command.effort[:] = torque
+        for _ in range(152):
+            engine.write(command)
+            engine.advance()
+            state = engine.read()
+            speeds.append(float(state.velocity[0]))
+            angles.append(float(state.position[0]))
+            wrenches.append(sensor.copy())
+    finally:
+        engine.close()
+    k, period = 150, STEP * substeps
+    faster = (speeds[k + 1] - speeds[k - 1]) / (2 * period)
+    assert abs(faster) > 1.0 < abs(speeds[k])
+    r = np.array([0.0, 0.0, -0.5])
+    a = faster * cross(axis, r) + speeds[k] ** 2 * cross(axis, cross(axis, r))
+    R = Transform.of(rpy=(0.0, angles[k], 0.0)).R
+    np.testing.assert_allclose(wrenches[k][:3], mass * (R.T @ G - a), atol=0.05)
+    assert wrenches[k][4] == pytest.approx(-(torque - rotor * faster), abs=0.02)  # the rotor takes its share
 
 
 def test_a_session_attaches_the_broadcaster_and_an_ideal_engine_feels_nothing() -> None:

@@ -28,7 +28,7 @@ from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
 from manipcli.simulate.engines.pybullet_rotors import add_rotors
 from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
-from manipcli.simulate.engines.pybullet_wrench import WrenchSensor
+from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
 
 SOLVER_ITERATIONS: Final = 50
@@ -76,6 +76,7 @@ class PybulletEngine:
             (k, *centre(body)) for body, k in zip(scene.bodies, self._bodies, strict=True) if not body.fixed
         ]
         self._start(robot, settings)
+        self._wrenches = WrenchSensors(p, client, self._robot, gravity=scene.gravity, step=settings.step)
         n, m = len(self._joints), len(self._movable)
         state = self._state = WorldState.room(n, m)
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
@@ -100,8 +101,7 @@ class PybulletEngine:
         infos = [p.getJointInfo(self._robot, k, physicsClientId=client) for k in range(count)]
         by_name = {info[1].decode(): k for k, info in enumerate(infos)}
         self._joints = [by_name[name] for name in robot.joint_names]
-        self._sensed = {joint.name: (by_name[joint.name], joint) for joint in robot.joints}
-        self._sensors: list[WrenchSensor] = []
+        self._model, self._numbers = robot, by_name
         link_names = {-1: robot.root} | {k: info[12].decode() for k, info in enumerate(infos)}
         for link in link_names:
             p.changeDynamics(
@@ -151,22 +151,26 @@ class PybulletEngine:
                     linear = _minus(linear, _cross(angular, arm))
                 state.body_linear[row] = linear
                 state.body_angular[row] = angular
-        for sensor in self._sensors:
-            sensor.measure()
+        if self._wrenches:
+            self._wrenches.measure(self._contact_points())
         return state
 
     def write(self, command: JointCommand) -> None:
         self._motors.write(command)
 
     def sense_wrench(self, joint: str) -> Array:
-        sensor = WrenchSensor(self._p, self._client, self._robot, *self._sensed[joint])
-        self._sensors.append(sensor)
-        return sensor.values
+        hanging = self._model.descendants(self._model.joint(joint).child)
+        below = [self._numbers[one.name] for one in self._model.joints if one.child in hanging]
+        return self._wrenches.add(self._numbers[joint], below)
 
     def advance(self) -> None:
-        for _ in range(self._substeps):
+        last = self._substeps - 1
+        for k in range(self._substeps):
             self._motors.push()
+            if k == last and self._wrenches:
+                self._wrenches.remember()
             self._p.stepSimulation(self._client)
+            self._wrenches.moved()
         self._points = None
 
     def touches_changed(self) -> bool:

@@ -10,8 +10,9 @@ from manipcli.model.state import Contact
 Vector = tuple[float, float, float]
 Pair = tuple[int, int, int, int]
 """Body a, body b, link of a, link of b."""
-ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float]
-"""What PyBullet says of a contact point, up to its distance and normal force."""
+ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float, float, Vector, float, Vector]
+"""What PyBullet says of a contact point: a flag, bodies and links a and b, places on a and b, the normal on b, the
+distance, the normal force on a, and twice: friction on a along a direction."""
 _sides = attrgetter("a", "b")
 
 

@@ -1,52 +1,150 @@
-"""Wrenches at joints of PyBullet's robot.
+"""Wrenches at joints of PyBullet's robot, from what moves and what touches.
 
-Bullet tells what a joint's parent puts on its child: along the axes of the child's inertial frame C, about the centre
-of mass, and without what a motor puts along (a force through the centre of mass) or about the axis of the joint. From
-it the wrench of the child on the parent, in the child's frame L, about its origin:
+Bullet's own reactions at joints do not hold what couples two of them (mimic joints, rotors): they count it as forces on
+the children from outside, which the parents do not feel. What is known exactly is what the links k below a joint did in
+the last physics step h, with the velocities v and w and the places c of their centres of mass. By Newton and Euler
 
-    f_L = -R_LC f_C        m_L = -(R_LC m_C + p_LC x R_LC f_C)        and the same of the motor's
+    f = sum_k m_k ((v_k' - v_k) / h - g)
+    t = sum_k c_k x m_k ((v_k' - v_k) / h - g) + ((I_k w_k)' - I_k w_k) / h
+
+came to them, about the origin of the world; less what contacts gave, it came through the joint, and the opposite of
+that is what the child puts on its parent. A point of contact gives its normal force and the friction along the surface.
+The moment of spinning and rolling friction PyBullet does not tell: it is missing in the torque.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
 
-from manipcli.core.geometry import Array, cross, matrix_from_quat
-from manipcli.model.robot import Joint
+from manipcli.core.geometry import Array, cross, rotate, rotate_inverse
+from manipcli.simulate.engines.pybullet_contacts import ContactPoint, Vector
 
 
-class WrenchSensor:
-    """Measures at one joint.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sensor:
+    """`link`: the child, `links`: all that hangs on the joint, Bullet's numbers; `values` (6)."""
+
+    link: int
+    links: frozenset[int]
+    values: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Motion:
+    """Of the links that any sensor looks at (k): places and momenta in the world.
+
+    Attributes:
+        centres: (k, 3) centres of mass.
+        origins, turned: (k, 3), (k, 4) their frames; the quaternions xyzw.
+        momenta: (k, 6) linear [N s] and of turning about the centre of mass [N m s].
+    """
+
+    centres: Array
+    origins: Array
+    turned: Array
+    momenta: Array
+
+
+class WrenchSensors:
+    """All sensors of one robot.
 
     Args:
         p: PyBullet.
         client: its world.
         body: Bullet's number of the robot.
-        index: Bullet's number of the joint.
-        joint: the joint.
-
-    Attributes:
-        values: (6) force [N] and torque [N m] of the child on the parent at the last measurement.
+        gravity: (3) [m/s^2].
+        step: [s] of the physics.
     """
 
-    def __init__(self, p: ModuleType, client: int, body: int, index: int, joint: Joint) -> None:
-        self._p, self._client, self._body, self._index = p, client, body, index
-        p.enableJointForceTorqueSensor(body, index, True, physicsClientId=client)
-        inertial = p.getDynamicsInfo(body, index, physicsClientId=client)
-        p_LC, R_LC = np.array(inertial[3]), matrix_from_quat(inertial[4])
-        arm = np.array([cross(p_LC, column) for column in R_LC.T]).T
-        self._map = -np.block([[R_LC, np.zeros((3, 3))], [arm, R_LC]])
-        axis, none = -joint.axis, np.zeros(3)
-        slides = joint.type == "prismatic"
-        self._motor = np.concatenate([axis, cross(p_LC, axis)] if slides else [none, axis])
-        self._driven = joint.moves
-        self.values: Array = np.zeros(6)
+    def __init__(self, p: ModuleType, client: int, body: int, *, gravity: Array, step: float) -> None:
+        self._p, self._client, self._body, self._gravity, self._step = p, client, body, gravity, step
+        self._sensors: list[_Sensor] = []
+        self._rows: dict[int, int] = {}
+        self._mass: Array = np.zeros((0, 1))
+        self._moments: Array = np.zeros((0, 3))
+        self._carries: Array = np.zeros((0, 0))
+        self._now: _Motion | None = None
+        self._before: _Motion | None = None
 
-    def measure(self) -> None:
-        """What the last physics step came to."""
-        _, _, reaction, motor = self._p.getJointState(self._body, self._index, self._client)
-        np.matmul(self._map, reaction, out=self.values)
-        if self._driven:
-            self.values += motor * self._motor
+    def __bool__(self) -> bool:
+        return bool(self._sensors)
+
+    def add(self, link: int, below: Sequence[int]) -> Array:
+        """A sensor between `link` and its parent; `below`: the links that hang there, itself among them.
+
+        Returns:
+            (6) force [N] and torque [N m] of the link on its parent, in the link's frame, about its origin.
+        """
+        sensor = _Sensor(link, frozenset(below), np.zeros(6))
+        self._sensors.append(sensor)
+        links = sorted(frozenset[int]().union(*(one.links for one in self._sensors)))
+        self._rows = {k: row for row, k in enumerate(links)}
+        infos = [self._p.getDynamicsInfo(self._body, k, physicsClientId=self._client) for k in links]
+        self._mass = np.array([[info[0]] for info in infos])
+        self._moments = np.array([info[2] for info in infos])
+        self._carries = np.array([[k in one.links for k in links] for one in self._sensors], dtype=float)
+        self._now = self._before = None
+        return sensor.values
+
+    def moved(self) -> None:
+        """A physics step was made."""
+        self._now = None
+
+    def remember(self) -> None:
+        """How things are before the last physics step of a tick."""
+        self._before = self._motion() if self._now is None else self._now
+
+    def measure(self, points: Sequence[ContactPoint]) -> None:
+        """What the last physics step came to, with all `points` of contact in it."""
+        if self._now is not None or self._before is None:
+            return
+        now = self._now = self._motion()
+        rate = (now.momenta - self._before.momenta) / self._step
+        force = rate[:, :3] - self._mass * self._gravity
+        torque = rate[:, 3:] + cross(now.centres, force)
+        rows, places, pushes = self._pushed(points)
+        if rows:
+            given = np.array(pushes)
+            np.subtract.at(force, rows, given)
+            np.subtract.at(torque, rows, cross(np.array(places), given))
+        forces, torques = self._carries @ force, self._carries @ torque
+        for sensor, f, t in zip(self._sensors, forces, torques, strict=True):
+            row = self._rows[sensor.link]
+            turned = now.turned[row]
+            sensor.values[:3] = rotate_inverse(turned, -f)
+            sensor.values[3:] = rotate_inverse(turned, cross(now.origins[row], f) - t)
+
+    def _motion(self) -> _Motion:
+        links = self._p.getLinkStates(
+            self._body, list(self._rows), computeLinkVelocity=1, computeForwardKinematics=1,
+            physicsClientId=self._client,
+        )  # fmt: skip
+        states = np.array([(*s[0], *s[1], *s[4], *s[5], *s[6], *s[7]) for s in links])
+        principal = states[:, 3:7]
+        turning = rotate(principal, self._moments * rotate_inverse(principal, states[:, 17:20]))
+        momenta = np.hstack([self._mass * states[:, 14:17], turning])
+        return _Motion(states[:, :3], states[:, 7:10], states[:, 10:14], momenta)
+
+    def _pushed(self, points: Sequence[ContactPoint]) -> tuple[list[int], list[Vector], list[list[float]]]:
+        """Which rows of links contacts push, where, and with what force."""
+        rows: list[int] = []
+        places: list[Vector] = []
+        pushes: list[list[float]] = []
+        for point in points:
+            _, a, b, link_a, link_b, at_a, at_b, normal, _, press, first, along, second, across = point[:14]
+            if self._body not in (a, b):
+                continue
+            push = [press * n + first * u + second * v for n, u, v in zip(normal, along, across, strict=True)]
+            if a == self._body and link_a in self._rows:
+                rows.append(self._rows[link_a])
+                places.append(at_a)
+                pushes.append(push)
+            if b == self._body and link_b in self._rows:
+                rows.append(self._rows[link_b])
+                places.append(at_b)
+                pushes.append([-one for one in push])
+        return rows, places, pushes

@@ -40,7 +40,6 @@ CASES = [
     ("arm7_hand3", "type: force_torque_broadcaster, link: plam", "CTRL184", "'plam' is not in robot"),
     ("panda", "type: force_torque_broadcaster, link: panda_link0", "CTRL184", "nothing carries it"),
     ("arm7_hand3", "type: force_torque_broadcaster, link: palm, joints: [joint_1]", "CTRL184", "it reads no joints"),
-    ("panda", "type: force_torque_broadcaster, link: panda_rightfinger", "CTRL184", "mimics another"),
     ("arm7_hand3", "type: joint_state_broadcaster, joints: [joint_9]", "CTRL144", "'joint_9' is not in robot"),
     ("arm7_hand3", "type: gripper, joints: [finger_1_distal], command_interface: position, max_effort: 1",
      "CTRL147", "positions know no maximum effort"),
