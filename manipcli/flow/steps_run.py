@@ -252,6 +252,8 @@ class StepsRun:
                     return MotionEnd(end.outcome, text)
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touching)
+                if end.weak:
+                    self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
                 texts += [end.text] if end.text else []
             self._believed = planned.plan.end

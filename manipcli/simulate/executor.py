@@ -34,11 +34,16 @@ PATIENCE: Final = 30.0
 
 @dataclass(frozen=True, slots=True)
 class MotionEnd:
-    """How a motion or a wait ended; `awaited`: its time was over because the condition under `until` did not hold."""
+    """How a motion or a wait ended.
+
+    `awaited`: its time was over because the condition under `until` did not hold; `weak`: it is done, and a finger did
+    not press as hard as it was asked to.
+    """
 
     outcome: Literal["done", "failed", "timeout"]
     text: str = ""
     awaited: bool = False
+    weak: bool = False
 
 
 DONE: Final = MotionEnd("done")
@@ -217,13 +222,15 @@ def _told(switched: SwitchResult) -> str:
 def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> MotionEnd:
     """Done; unless the hand was to hold something and no finger met anything, or to open and something stopped one."""
     text = "; ".join(handle.result.text for handle in handles if handle.result is not None and handle.result.fingers)
+    weak = False
     if motion.grip is not None:
         stops = [stop for handle in handles if handle.result is not None for stop in handle.result.fingers]
         if motion.grip.must_hold and touch and "contact" not in stops and "stalled" not in stops:
             return MotionEnd("failed", f"the hand closed on nothing: {text}")
         if motion.grip.must_arrive and "stalled" in stops:
             return MotionEnd("failed", f"the hand did not open: {text}")
-    return MotionEnd("done", text)
+        weak = motion.grip.force is not None and "stalled" in stops
+    return MotionEnd("done", text, weak=weak)
 
 
 def _unreached(handles: tuple[GoalHandle, ...]) -> str:

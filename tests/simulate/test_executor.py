@@ -162,6 +162,10 @@ def test_a_hand_that_meets_something_holds(session_of: SessionOf, scripted: Any)
     end = Executor(session_of(scripted(touch))).run(close(), until=None, deadline=None)
     assert end.outcome == "done"
     assert "contact at" in end.text
+    assert not end.weak
+    end = Executor(session_of(scripted(touch))).run(close(force=9.0), until=None, deadline=None)
+    assert (end.outcome, end.weak) == ("done", True)
+    assert "where it felt 8 N of the 9 N asked" in end.text
 
 
 def test_a_hand_that_never_comes_to_an_end_is_given_up(
