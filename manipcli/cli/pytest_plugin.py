@@ -138,7 +138,9 @@ class TaskItem(pytest.Item):
             from manipcli.report.suite_text import case_lines, gist
 
             report = excinfo.value.report
-            return "\n".join([f"{report.outcome}: {gist(report)}", "", *case_lines(report)])
+            why = gist(report)
+            first = why if why.startswith(report.outcome) else f"{report.outcome}: {why}"
+            return "\n".join([first, "", *case_lines(report)])
         return str(super().repr_failure(excinfo))
 
     def reportinfo(self) -> tuple[Path, int, str]:
@@ -189,7 +191,7 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
         case = replace(read_case(found, shown=shown_path(found)), sample=sample)
         settings = replace(
             _settings(request.config, tmp_path / "runs" / str(count)),
-            overrides=tuple(overrides),
+            overrides=(overrides,) if isinstance(overrides, str) else tuple(overrides),
             seed=seed,
             keep_logs=True,
         )

@@ -55,6 +55,9 @@ def load_task(
         return task
     robot_path = Path(os.path.normpath(path.parent / task.spec.robot))
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    if sample < 0:
+        message = f"there is no sample {sample}: they count from 0"
+        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
     varied, _ = bind(task.file, task.robot_file, task.controllers_file)
     if not varied:
         message = f"there is no sample {sample}: task '{task.name}' has no `vary:`"

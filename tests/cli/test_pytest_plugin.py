@@ -16,7 +16,8 @@ import pytest
 import manipcli.batch.discovery
 import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
-from manipcli.cli.pytest_plugin import _settings
+from manipcli.cli.pytest_plugin import TaskFailed, _settings
+from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
 
 pytest_plugins = ["pytester"]
 
@@ -82,6 +83,22 @@ def test_the_files_are_those_of_the_command(project: pytest.Pytester) -> None:
 
     ids = [read_case(path, shown=shown_path(path)).id for path in task_files([Path()])]
     assert collected(project) == ids
+
+
+@pytest.mark.parametrize(
+    ("outcome", "why", "first"),
+    [
+        ("hung", "hung: no progress for 4 s", "hung: no progress for 4 s"),
+        ("crashed", "crashed by signal 11", "crashed by signal 11"),
+        ("failed", "duration: fails by 0.1 s", "failed: duration: fails by 0.1 s"),
+    ],
+)
+def test_a_failure_says_its_outcome_once(pytester: pytest.Pytester, outcome: CaseWord, why: str, first: str) -> None:
+    (pytester.path / "t.yaml").write_text("task: t\nrobot: r.yaml\n")
+    (item,), _ = pytester.inline_genitems(*LOADED, *ALONE, "t.yaml")
+    with pytest.raises(TaskFailed) as raised:
+        raise TaskFailed(CaseReport(Case("t.yaml", "t"), outcome, 1.0, "", troubles=(Trouble(why),)))
+    assert str(item.repr_failure(raised)).splitlines()[0] == first
 
 
 def test_links_lead_to_no_test_twice(project: pytest.Pytester) -> None:
@@ -206,7 +223,7 @@ def test_a_python_test_runs_a_task_and_looks_at_its_report(project: pytest.Pytes
 
         def test_report(run_task):
             report = run_task("tasks/good.yaml", overrides=["steps.0.wait=0.4 s"], seed=7)
-            again = run_task(Path("tasks") / "good.yaml")
+            again = run_task(Path("tasks") / "good.yaml", overrides="steps.0.wait=0.1 s")
             assert (report.verdict.verdict, report.verdict.seed) == ("passed", 7)
             assert report.verdict.simulated_time > again.verdict.simulated_time
             assert manipcli.read_recording(Path(report.log)).states.time[-1] > 0.4

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.core.errors import InvalidInput
 from manipcli.flow.load import Task
 from manipcli.flow.plan import plan_task
 from manipcli.flow.sample import load_task
@@ -52,6 +53,11 @@ def test_what_is_set_is_not_drawn_but_an_offset_or_scale_is_about_it() -> None:
     assert dict(task.drawn.values) == {"scene.block.friction": 0.4, "simulation.settle": 0.3}
     block = task.true.scene.body("block")
     assert (block.mass, block.friction, block.X_WO.p[0]) == (0.06, 0.4, 0.55)
+
+
+def test_samples_count_from_0() -> None:
+    with pytest.raises(InvalidInput, match="there is no sample -1: they count from 0"):
+        _sample("{scene.block.mass: {choice: [1 kg]}}", -1)
 
 
 def test_inertia_follows_a_varied_mass() -> None:
