@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import stat
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
-from manipcli.core.text import any_of, nearest_file
+from manipcli.core.text import any_of, nearest, nearest_file
 from manipcli.model.located_xml import shown_path
 from manipcli.model.package_xml import package_name, packages_below
 
@@ -243,10 +244,21 @@ def _uri(root: Path, path: Path) -> str:
 def _meant(path: Path) -> str | None:
     """The file beside it with nearly this name."""
     try:
-        near = nearest_file(path.name, sorted(entry.name for entry in path.parent.iterdir()))
+        known = sorted(entry.name for entry in path.parent.iterdir() if not _of_another_part(path.name, entry.name))
     except OSError:
         return None
+    near = nearest_file(path.name, known)
     return f"did you mean {any_of(near)}?" if near else None
+
+
+def _of_another_part(name: str, other: str) -> bool:
+    """Files are called after parts: `link6` is not `link7`, and `laser_link` is no `wheel_link` for its last word."""
+    mine, others = (re.split(r"[_-]", Path(each).stem) for each in (name, other))
+    while len(mine) > 1 and len(others) > 1 and mine[-1] == others[-1]:
+        mine.pop()
+        others.pop()
+    numbered = (re.sub(r"\D", "", each) for each in (name, other))
+    return len(set(numbered)) > 1 or not nearest("_".join(mine), ["_".join(others)])
 
 
 def _installed_package(name: str) -> Path | None:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from manipcli.model.located_xml import Element
 from manipcli.model.mesh_facts import mesh_facts
 from manipcli.model.mesh_fault import UnusableMesh
-from manipcli.model.packages import NotFound, Outside, Packages, RemoteFile
+from manipcli.model.packages import Absent, NotFound, Outside, Packages, RemoteFile
 from manipcli.model.robot import Mesh
 from manipcli.model.urdf_numbers import Reader
+
+WITHOUT_IT: Final = (
+    "put the file there, or a <box>, <cylinder> or the mesh of the <visual> in its place, or take the <collision> out: "
+    "the link then touches nothing"
+)
 
 
 def read_mesh_element(reader: Reader, element: Element, tag: str, packages: Packages) -> Mesh | None:
@@ -27,7 +34,10 @@ def read_mesh_element(reader: Reader, element: Element, tag: str, packages: Pack
         return None
     except NotFound as error:
         if tag == "collision":
-            reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=error.hint)
+            hint = error.hint
+            if isinstance(error, Absent):
+                hint = f"{hint} Else: {WITHOUT_IT}" if hint else WITHOUT_IT
+            reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=hint)
         else:
             message = f"visual mesh, left out: {error.message}"
             reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")

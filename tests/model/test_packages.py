@@ -159,6 +159,24 @@ def test_a_portable_uri_resolves_to_the_same_file(tree: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "known", "meant"),
+    [
+        ("link6.STL", "link7.STL", False),
+        ("laser_link.STL", "l_wheel_link.STL", False),
+        ("estop_link.STL", "bellows_link.STL", False),
+        ("link6.STL", "Link_6.stl", True),
+        ("elbow_flex_link.STL", "elbow_flx_link.STL", True),
+    ],
+)
+def test_the_mesh_of_another_part_was_not_meant(tmp_path: Path, name: str, known: str, meant: bool) -> None:
+    (tmp_path / "r.urdf").touch()
+    (tmp_path / known).touch()
+    with pytest.raises(NotFound) as refused:
+        Packages(tmp_path / "r.urdf").resolve(name)
+    assert refused.value.hint == (f"did you mean '{known}'?" if meant else None)
+
+
+@pytest.mark.parametrize(
     ("uri", "hint"), [("arn.urdf", "arm.urdf"), ("../meshes/texture.png", None), ("none/arm.urdf", None)]
 )
 def test_the_file_that_was_meant_is_named(tree: Path, uri: str, hint: str | None) -> None:

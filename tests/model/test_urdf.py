@@ -288,6 +288,18 @@ def test_colours_come_from_materials_by_name_and_in_place(tmp_path: Path) -> Non
     assert parts.links[1].visuals[0].shape == Box((1.0, 2.0, 3.0))
 
 
+@pytest.mark.parametrize(
+    ("there", "begins"), [("none.stl", "put the file"), ("elbw.stl", "did you mean 'elbw.stl'? Else: ")]
+)
+def test_what_to_do_without_a_collision_mesh_is_told(tmp_path: Path, there: str, begins: str) -> None:
+    (tmp_path / there).touch()
+    shape = '<collision><geometry><mesh filename="elbow.stl"/></geometry></collision>'
+    (finding,) = errors(tmp_path, link_b(INERTIAL + shape))
+    assert finding.code == "URDF013"
+    assert (finding.hint or "").startswith(begins)
+    assert "take the <collision> out" in (finding.hint or "")
+
+
 def test_a_mesh_is_named_without_the_machine_it_lies_on(tmp_path: Path) -> None:
     folder = tmp_path / "arm" / "urdf"
     folder.mkdir(parents=True)

@@ -10,7 +10,9 @@ CHECK = Check(
     severity="error",
     summary="A collision mesh is not found",
     reason=(
-        "A link without its collision shape passes through what it should hit. A missing visual is a warning, URDF033."
+        "A link without its collision shape passes through what it should hit. Many descriptions are published without "
+        "their meshes: put the file there, or a <box>, <cylinder> or the mesh of the <visual> in its place, or take "
+        "the <collision> out, after which the link touches nothing. A missing visual is a warning, URDF033."
     ),
     bad=one_link('filename="package://missing_package/a.stl"', role="collision"),
     find=found_while_reading("URDF013"),
