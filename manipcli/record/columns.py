@@ -19,6 +19,8 @@ from manipcli.record.cdr import CdrError, CdrReader
 Int = npt.NDArray[np.int64]
 _HEAD = struct.Struct("<BQHIQQ")
 _MESSAGE = 0x05
+_MAX_OTHERS = 8192
+"""Schemas and channels in a chunk."""
 PAYLOAD = _HEAD.size
 """From the beginning of a message record to its CDR bytes."""
 
@@ -78,7 +80,7 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
     """Messages by channel, found by walking over the records; and the records of other kinds (opcode, body).
 
     Raises:
-        CdrError: a record does not fit into the chunk.
+        CdrError: a record does not fit into the chunk, or there are too many that are no messages.
     """
     rows: dict[int, list[tuple[int, int, int]]] = {}
     others: list[tuple[int, bytes]] = []
@@ -93,6 +95,8 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
         if opcode == _MESSAGE:
             _, _, channel, _, time, _ = _HEAD.unpack_from(data, offset)
             rows.setdefault(channel, []).append((min(time, 2**63 - 1), offset + PAYLOAD, length - (PAYLOAD - 9)))
+        elif opcode == 0 or len(others) == _MAX_OTHERS:
+            raise CdrError("holds too much that is no message")
         else:
             others.append((opcode, data[offset + 9 : end]))
         offset = end

@@ -112,7 +112,7 @@ def inventory(path: Path) -> Inventory:
                     spans[channel] = min(first, known[0]), max(last, known[1])
                     counts[channel] = counts.get(channel, 0) + len(places.times)
             case Damage():
-                faults.append(f"bytes {piece.start} to {piece.end} are damaged: {piece.what}")
+                faults.append(f"bytes {piece.start} to {piece.end} cannot be read: {piece.what}")
     if salvage.end is not None:
         faults.append(salvage.end)
     topics = []

@@ -24,9 +24,7 @@ MAX_NAMED = 4096
 
 MAX_RECORD = 1 << 28
 MAX_CHUNK = 1 << 26
-MAX_RATIO = 1000
-_SMALL_CHUNK = 1 << 20
-"""Below this size a chunk may compress as well as it likes."""
+"""[byte] of a chunk, unpacked; below, it may compress as well as it likes: images and maps of one value do."""
 
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA, DATA_END = (
     0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09, 0x0C, 0x0F,
@@ -211,11 +209,11 @@ def open_chunk(path: Path, record: Record) -> bytes:
     packed = memoryview(record.body)[name_end + 8 :]
     if len(packed) != length:
         raise BadRecording(path, f"{where} is damaged", hint=REPAIRABLE)
-    if size > MAX_CHUNK or (size > _SMALL_CHUNK and size > MAX_RATIO * length):
+    if size > MAX_CHUNK:
         raise BadRecording(
             path,
-            f"{where} declares {size} bytes, packed into {length}",
-            hint=f"at most {MAX_CHUNK} bytes, and {MAX_RATIO} times the packed size, are taken",
+            f"{where} declares {size} bytes, more than the {MAX_CHUNK} that are read of one",
+            hint="have the program that wrote it write smaller chunks",
         )
     data = _decompress(compression, packed, size)
     if data is None or len(data) != size or crc not in (0, zlib.crc32(data)):

@@ -323,12 +323,19 @@ class TestBounds:
         with pytest.raises(BadRecording, match=r"declares 6442450944 bytes"):
             read_recording(with_records(small[1], chunk(b"x" * 197_000, 6 << 30)))
 
-    def test_ratio(self, small: tuple[Any, Path]) -> None:
+    @pytest.mark.parametrize("content", [bytes(60 << 20), b"\x03\1" + bytes(7) + b"\0"], ids=["nothing", "schemas"])
+    def test_what_unpacks_to_much_that_is_no_message(self, small: tuple[Any, Path], content: bytes) -> None:
+        """No more than the chunk itself is held."""
         import zstandard
 
-        packed = zstandard.compress(bytes(60 << 20))
-        with pytest.raises(BadRecording, match=r"packed into"):
-            read_recording(with_records(small[1], chunk(packed, 60 << 20)))
+        content = content * ((60 << 20) // len(content))
+        made = with_records(small[1], chunk(zstandard.compress(content), len(content)))
+        tracemalloc.start()
+        with pytest.raises(BadRecording, match=r"no message"):
+            read_recording(made)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < 1 << 27
 
     @pytest.mark.parametrize("compression", ["zstd", "lz4"])
     def test_a_chunk_larger_than_it_says(self, small: tuple[Any, Path], compression: str) -> None:
