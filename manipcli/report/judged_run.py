@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from manipcli.report.run_report import RunReport
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedRun(RunReport):
     """A run, and what `manipcli test` says of it.
 
@@ -24,7 +24,8 @@ class JudgedRun(RunReport):
     @staticmethod
     def of(run: RunReport, *, passed: bool, text: str, picture: str | None) -> JudgedRun:
         """With all that the run says."""
-        return JudgedRun(run.verdict, run.wall_time, run.real_time_factor, run.log, run.timing, passed, text, picture)
+        told = {field.name: getattr(run, field.name) for field in fields(RunReport)}
+        return JudgedRun(**told, passed=passed, text=text, picture=picture)
 
     def __repr__(self) -> str:
         """`<passed pour 'runs/pour.mcap'>`: what an assertion shows of it."""
