@@ -28,6 +28,7 @@ Samples = tuple[Array, Array, Array]
 
 Interpolation = Literal["splines", "none"]
 
+NO_JOINT = "the trajectory names no joint"
 SINGULAR = {"positions": "position", "velocities": "velocity", "accelerations": "acceleration", "efforts": "effort"}
 
 
@@ -86,6 +87,8 @@ class JointTrajectory:
     ) -> None:
         if isinstance(names, str):
             raise InvalidArgument("TRAJ100", f"the names are one text, '{names}'; expected a list of joints")
+        if not names:
+            raise InvalidArgument("TRAJ100", NO_JOINT)
         read = read_points(points, start, len(names))
         highest = int(read.orders.max())
         self._set(
@@ -355,7 +358,7 @@ class JointTrajectory:
 def _validate(trajectory: JointTrajectory) -> None:
     names, times = trajectory.names, trajectory.times
     if not names:
-        raise InvalidArgument("TRAJ100", "the trajectory names no joint")
+        raise InvalidArgument("TRAJ100", NO_JOINT)
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise InvalidArgument("TRAJ104", f"joint '{repeated[0]}' is named twice in the trajectory")

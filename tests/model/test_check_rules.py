@@ -81,6 +81,17 @@ def differential(roles: str) -> str:
     return one_joint(more=SECOND + "</joint>" + transmission(joints + motors, kind="DifferentialTransmission"))
 
 
+def geared_twice(reduction: float) -> str:
+    """Joint j with a reduction of 50 in the form of ROS 1 and one of ros2_control."""
+    ros2 = control(
+        '<joint name="j"><command_interface name="position"/></joint><transmission name="u">'
+        "<plugin>transmission_interface/SimpleTransmission</plugin>"
+        f'<joint name="j" role="joint1"><mechanical_reduction>{reduction}</mechanical_reduction></joint></transmission>'
+    )
+    ros1 = transmission().replace("<mechanicalReduction>1", "<mechanicalReduction>50")
+    return ros2.replace("</robot>", ros1 + "</robot>")
+
+
 # The cube is 0.35 m wide: its corners lie 0.303 m from its centre, its mass sqrt(0.02 / 1) = 0.141 m on average.
 QUIET = {
     "sound": one_joint(),
@@ -117,6 +128,7 @@ QUIET = {
         "<plugin>transmission_interface/SimpleTransmission</plugin>"
         '<joint name="j" role="joint1"><mechanical_reduction>50</mechanical_reduction></joint></transmission>'
     ),
+    "one gear in both forms": geared_twice(50.0),
     "sensors, switches and types": control(
         '<joint name="j"><limits enable="false"/><state_interface name="position" data_type="double"/>'
         '<command_interface name="position"/></joint><sensor name="s"><state_interface name="force.x"/></sensor>'
@@ -189,6 +201,7 @@ LOUD = {
         ),
         "URDF312",
     ),
+    "two gears in two forms": (geared_twice(40.0), "URDF311"),
     "no actuator": (one_joint(more=transmission().replace(MOTOR, "")), "URDF313"),
     "mimic in ros2_control": (
         control('<joint name="k"><command_interface name="position"/></joint>', SECOND + '<mimic joint="j"/></joint>'),

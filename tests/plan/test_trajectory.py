@@ -317,6 +317,7 @@ def test_durations_of_both_ros_are_read():
     ("names", "points", "text"),
     [
         ("ab", [at([1, 1], 1)], "the names are one text, 'ab'; expected a list"),
+        ([], [at([], 1)], "the trajectory names no joint"),
         (["a"], at(1, 1), "the points are TrajectoryPoint; expected a list"),
         (["a"], [3.0], "point 0 is 3.0; expected a TrajectoryPoint"),
         (["a"], [{"position": [1]}], "point 0 has an unknown 'position'"),
