@@ -140,6 +140,7 @@ def _type(kind: object) -> str:
     if origin is Annotated:
         said = [one for part in parts[1:] for one in (part.metadata if isinstance(part, FieldInfo) else [part])]
         named = [re.sub(r"\ban? ", "", one.name) for one in said if isinstance(one, Unit)]
+        named = ["number or percentage" if name == "plain number" else name for name in named]
         short = [_type(one.json_schema_input_type) for one in said if isinstance(one, BeforeValidator)]
         return ", ".join([*(named or short or [_type(parts[0])]), *_bounds(said, _unit(kind))])
     if origin in (Union, UnionType):

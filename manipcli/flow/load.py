@@ -263,7 +263,8 @@ def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: 
             loc: Loc = ("steps", k, "on_fail", "with")
             wrong = STEPS[tried.verb].check(tried.body, robot, scene)
             wrong += () if tried.until is None else until_problems(tried.until, step.id, setting, CONDITIONS)
-            found += [(loc, replace(p, loc=())) for p in wrong]
+            before = {p.message for at, p in found if at[:2] == loc[:2]}
+            found += [(loc, replace(p, loc=())) for p in wrong if p.message not in before]
     findings = [
         *again,
         *(

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from typing import Generic, Literal, TypeVar
+from typing import Final, Generic, Literal, TypeVar
 
 from pydantic import ValidationError
 
@@ -32,6 +32,10 @@ from manipcli.spec.tree import (
 M = TypeVar("M", bound=Model)
 
 Area = Literal["TASK", "ROBOT", "CTRL"]
+
+UNCOMPUTED: Final = ("TASK203", "TASK211")
+"""An expression that has no value. That its text is no name either (`MISNAMED`) needs no second telling."""
+MISNAMED: Final = "TASK23"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,10 +140,15 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()
 def apart(findings: Sequence[Finding], unknown: AbstractSet[Place] = frozenset()) -> tuple[Finding, ...]:
     """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
     places = {one.place for one in findings if one.code.startswith("YAML")}
+    uncomputed = {one.place for one in findings if one.code in UNCOMPUTED}
     return tuple(
         one
         for one in findings
-        if one.code.startswith("YAML") or one.place is None or (one.place not in places and one.place not in unknown)
+        if one.code.startswith("YAML")
+        or one.place is None
+        or not (
+            one.place in places or one.place in unknown or (one.place in uncomputed and one.code.startswith(MISNAMED))
+        )
     )
 
 

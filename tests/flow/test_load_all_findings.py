@@ -186,6 +186,29 @@ def test_a_faulty_point_of_a_trajectory_is_told_at_its_line(tmp_path: Path) -> N
         assert expected in told
 
 
+def test_what_cannot_be_computed_or_was_told_before_is_told_once(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path,
+        """\
+params: {s: home, h: 0.1 rad}
+steps:
+  - move: {to: pre_$s}
+  - move: {to: $zz}
+  - id: a
+    move: {to: {joint_1: $h}, speed: 150 %}
+  - id: b
+    move: {to: {joint_1: $h}, speed: 50 %}
+    until: {step_done: {step: zz}}
+    on_fail: {retry: 2, with: {h: -0.1 rad}}
+""",
+    )
+    assert [place[:2] for place in found] == [(6, 16), (7, 16), (9, 38), (12, 31)]
+    assert "at most 1, not '150 %'" in found[2][2]
+    text = "steps:\n  - move: {to: {joint_1: $h}}\n    until: {step_done: {step: zz}}\n"
+    (once,) = findings(tmp_path, f"params: {{h: 0.1 rad}}\n{text}    on_fail: {{retry: 2, with: {{h: -0.1 rad}}}}\n")
+    assert once[:2] == (7, 31)
+
+
 def test_a_faulty_body_is_still_known_by_its_name(tmp_path: Path) -> None:
     found = findings(
         tmp_path, "scene:\n  cup: {box: {size: 1}}\nsteps:\n  - pick: {object: cup, grasp: {posture: wrap}}\n"

@@ -22,10 +22,10 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import JointValue
+from manipcli.spec.quantity import JointValue, Share
 from manipcli.spec.robot import PoseSpec
 
-Speed = Annotated[float, Field(gt=0, le=1, description="Fraction of the velocity and acceleration limits.")]
+Speed = Annotated[Share, Field(gt=0, le=1, description="Share of the velocity, acceleration and jerk limits.")]
 
 
 class MoveSpec(Model):

@@ -71,7 +71,7 @@ class PickSpec(Model):
     open: str = Field("open", description="The pose of the hand while approaching.")
     speed: Speed = Field(
         1.0,
-        description="Fraction of the velocity and acceleration limits in reaching; the straight approach takes half.",
+        description="Share of the velocity, acceleration and jerk limits in reaching; the straight approach: half.",
     )
 
 

@@ -53,7 +53,7 @@ class PlaceSpec(Model):
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
     speed: Speed = Field(
-        0.5, description="Fraction of the velocity and acceleration limits in carrying; lowering takes half of it."
+        0.5, description="Share of the velocity, acceleration and jerk limits in carrying; lowering takes half of it."
     )
 
 

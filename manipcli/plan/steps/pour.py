@@ -49,7 +49,7 @@ class PourSpec(Model):
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Pause, Field(ge=0, description="How long to stay tilted [s], to 1 h; `until` prolongs it.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
-    speed: Speed = Field(0.5, description="Fraction of the velocity and acceleration limits, in carrying and tilting.")
+    speed: Speed = Field(0.5, description="Share of the velocity, acceleration and jerk limits, carrying and tilting.")
 
 
 def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
