@@ -178,6 +178,14 @@ def test_upright_is_what_is_left_of_the_tilt(axis: tuple[float, float, float], t
     )
 
 
+def test_a_tilt_just_beyond_is_told_with_digits_that_differ() -> None:
+    tilt = np.radians(30.0) + 2e-5
+    leaning = state(poses={"cup": Transform.of(rpy=(tilt, 0, 0))})
+    found = read("upright", leaning, object="cup", within=np.radians(30.0)).found(0)
+    assert found.margin == pytest.approx(-2e-5)
+    assert found.text == "'cup' leans 30.001 deg; within 30 deg"
+
+
 @pytest.mark.parametrize(
     ("to", "expected"),
     [

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
 from manipcli.core.geometry import rotate
-from manipcli.core.units import readable
+from manipcli.core.text import told_apart
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
@@ -34,7 +35,8 @@ def gauge(spec: UprightSpec, world: World) -> Gauge:
         tilts = np.broadcast_to(tilt, np.shape(moments.times))
 
         def say(k: int) -> str:
-            return f"'{spec.object}' leans {readable(float(tilts[k]), 'rad')}; within {readable(spec.within, 'rad')}"
+            leans, within = told_apart(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
+            return f"'{spec.object}' leans {leans} deg; within {within} deg"
 
         return reading(spec.within - tilts, moments.times, unit="rad", scale=spec.within, say=say)
 
