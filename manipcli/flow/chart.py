@@ -66,7 +66,9 @@ def open_chart(
             one.read(group, number, panels, first, last)
     shown = panels.all()
     if not shown:
-        raise InvalidInput([Finding("PLOT004", f"there is no value of {listed(words)} in that time")])
+        what = f" of {listed(words)}" if words else ""
+        raise InvalidInput([Finding("PLOT004", f"there is no value{what} in that time")])
+    missing = [word for number, word in enumerate(words) if number not in panels.numbers]
     steps = next((one.steps for one in opened if one.steps), ())
     ends = [one.duration for one in opened]
     return Chart(
@@ -75,7 +77,10 @@ def open_chart(
         steps=steps,
         start=max(first, 0.0),
         end=min(last, max(ends)) if max(ends) > max(first, 0.0) else max(first, 0.0) + 1.0,
-        notes=tuple(f"{one.name}: {one.topics.lost}" for one in opened if one.topics.lost is not None),
+        notes=(
+            *(f"{one.name}: {one.topics.lost}" for one in opened if one.topics.lost is not None),
+            *([f"there is no value of {listed(missing)} in that time"] if missing else []),
+        ),
     )
 
 
@@ -118,6 +123,11 @@ class _Panels:
         key = (number, title, unit)
         self._heads.setdefault(key, (title, quantity))
         self._found.setdefault(key, []).append(curve)
+
+    @property
+    def numbers(self) -> set[int]:
+        """Which words have a curve."""
+        return {number for number, _, _ in self._found}
 
     def all(self) -> tuple[Panel, ...]:
         order = sorted(self._found, key=lambda key: key[0])

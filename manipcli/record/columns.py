@@ -33,6 +33,10 @@ class Places:
     starts: Int
     lengths: Int
 
+    def at(self, which: Int) -> Places:
+        """Some of them."""
+        return Places(self.times[which], self.starts[which], self.lengths[which])
+
 
 def indexed(data: bytes, indexes: Mapping[int, bytes], *, whole: bool = True) -> dict[int, Places] | None:
     """Messages by channel from a chunk's message indexes (channel -> pairs of log time and offset).

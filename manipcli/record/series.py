@@ -7,7 +7,7 @@ chunk, so that a channel whose names never change is walked once.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,7 @@ def read_series(
     Args:
         topics: of the log.
         wanted: what to read, all of it in one pass over the file.
-        start, end: [s] only what lies between.
+        start, end: [s] only what lies between; a value that holds at `start` begins there.
 
     Raises:
         BadRecording: a message does not fit its type, or there is more than fits into memory.
@@ -73,17 +73,11 @@ def read_series(
     of: dict[str, list[_Gathered]] = {}
     for one, into in zip(wanted, gathered, strict=True):
         of.setdefault(one.topic, []).append(into)
-    begin = topics.start
     total = 0
-    for topic, data, places in topics.messages(of):
-        seconds = (places.times - begin) / 1e9
-        inside = (seconds >= start) & (seconds <= end)
-        if not inside.any():
-            continue
-        kept = Places(places.times[inside], places.starts[inside], places.lengths[inside])
+    for topic, data, kept, seconds in _between(topics, of, start, end):
         for into in of[topic]:
             try:
-                total += into.add(data, kept, seconds[inside])
+                total += into.add(data, kept, seconds)
             except CdrError as error:
                 raise BadRecording(topics.path, f"{topic}: a message of {into.type} {error}") from error
         if total > MAX_VALUES:
@@ -93,6 +87,31 @@ def read_series(
                 hint="ask for fewer fields, or for a part of the time with --from and --to",
             )
     return [into.series() for into in gathered]
+
+
+def _between(
+    topics: Topics, names: Collection[str], start: float, end: float
+) -> Iterator[tuple[str, bytes, Places, Array]]:
+    """The messages from `start` to `end` and their times [s]; of a topic whose messages hold until the next, the last
+    before `start` too, as if it were of that time."""
+    earlier: dict[str, tuple[float, bytes, Places]] = {}
+    for topic, data, places in topics.messages(names):
+        seconds = (places.times - topics.start) / 1e9
+        inside = np.flatnonzero((seconds >= start) & (seconds <= end))
+        before = np.flatnonzero(seconds < start)
+        if len(before) and topics.all[topic].type == CONTACTS:
+            newest = before[np.argmax(seconds[before])]
+            if topic not in earlier or earlier[topic][0] <= seconds[newest]:
+                earlier[topic] = (float(seconds[newest]), data, places.at(newest[None]))
+        if len(inside):
+            if topic in earlier and seconds[inside].min() > start:
+                _, old, place = earlier.pop(topic)
+                yield topic, old, place, np.array([start])
+            yield topic, data, places.at(inside), seconds[inside]
+            earlier.pop(topic, None)
+    if start <= (topics.end - topics.start) / 1e9:
+        for topic, (_, data, place) in earlier.items():
+            yield topic, data, place, np.array([start])
 
 
 class _Gathered:

@@ -84,6 +84,13 @@ def test_the_axes_of_a_vector_share_a_panel_and_words_with_commas_too(log: Path)
     assert [label.split()[0] for label in labels] == [word.partition("[")[0] for word in words.split(",")]
 
 
+@pytest.mark.slow
+def test_a_word_without_a_value_is_told(log: Path) -> None:
+    chart = open_chart([log], ["joint_states.position[joint_1]", "contacts.force"])
+    assert chart.notes == ("there is no value of contacts.force in that time",)
+    assert len(chart.panels) == 1
+
+
 def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", str(log), "--fields"]) == 0
     out = capsys.readouterr().out
@@ -102,7 +109,8 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["--from", "move_9"], "PLOT003", "neither a time nor a step"),
         (["--from", "2 m"], "PLOT003", "neither a time nor a step"),
         (["--from", "0.3", "--to", "0.2"], "PLOT003", "nothing lies between"),
-        (["joint_states.position", "--from", "500"], "PLOT004", "no value"),
+        (["joint_states.position", "--from", "500"], "PLOT004", "no value of joint_states.position in that time"),
+        (["--from", "500"], "PLOT004", "no value in that time"),
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
         (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
         (["gone.mcap"], "LOG300", "No such file"),

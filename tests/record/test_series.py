@@ -134,6 +134,20 @@ def test_who_touches_no_more_has_no_value(log: Path) -> None:
     assert set(series(log, "contacts[cup].force")) == set(ours)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.15, 0.2, 0.25, 0.35])
+def test_a_contact_that_holds_when_the_window_opens_is_in_it(log: Path, start: float) -> None:
+    """What is known at each time of the window is what is known without it."""
+    whole, part = series(log, "contacts.force"), series(log, "contacts.force", start=start, end=start + 0.12)
+    for time in np.linspace(start, start + 0.12, 7):
+        for label, one in whole.items():
+            expected = one.values[np.searchsorted(one.times, time, side="right") - 1]
+            mine = part.get(label)
+            found = np.nan if mine is None else mine.values[np.searchsorted(mine.times, time, side="right") - 1]
+            np.testing.assert_equal(found, expected)
+    assert all(one.times[0] >= start for one in part.values())
+    assert not series(log, "contacts.force", start=100.0)
+
+
 def test_only_the_asked_time_is_read(log: Path) -> None:
     whole = series(log, "joint_states.position[spin]")["spin"]
     part = series(log, "joint_states.position[spin]", start=0.1, end=0.2)["spin"]
