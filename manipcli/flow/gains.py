@@ -28,6 +28,7 @@ from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.flow.drives import drive_findings, driven_joints
+from manipcli.flow.grips import strained, too_swift
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.flow.switches import active_in
@@ -67,8 +68,9 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
             plan = plan_task(task)
         except NotPlannable as refusal:
             found += refusal.findings
+    found += too_swift(task)
     if plan is not None:
-        found += _strained(task, plan)
+        found += strained(task, plan)
     rows = None if plan is None else _planned(task, plan)
     named = Postures.at_rest(named_postures(robot, start_position(task)))
     told: set[tuple[str, Place | None, str]] = set()
@@ -236,26 +238,6 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
         f"{ratio:.2g}; {inertia}"
     )
     return "CTRL153", message, f"kd {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
-
-
-def _strained(task: Task, plan: Plan) -> Iterator[Finding]:
-    """Grasps with more force than a finger that slides can press with.
-
-    Fingers that mimic it take their part: the effort is that of all of them, f (1 + sum |multiplier|).
-    """
-    owners = [one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec)]
-    for k, step in enumerate(plan.steps):
-        grips = [motion.grip for motion in step.plan.motions if motion.grip is not None]
-        for force, name in ((grip.force, name) for grip in grips if grip.force is not None for name in grip.joints):
-            joint = task.robot.joint(name)
-            limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
-            mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
-            fingers = 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
-            most = min((limit for limit in limits if limit), default=math.inf) / fingers
-            if joint.type == "prismatic" and force > most:
-                message = f"step '{step.id}': a grasp with {force:.3g} N; {name} presses with {most:.3g} N at most"
-                hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
-                yield Finding("TASK238", message, task.file.place("steps", k), hint, "warning")
 
 
 def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Finding]:

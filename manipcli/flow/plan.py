@@ -14,7 +14,7 @@ from manipcli.flow.load import Task
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.plan.claims import Claims
-from manipcli.plan.hand import with_mimics
+from manipcli.plan.hand import SPEED, closing_speed, with_mimics
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
@@ -162,14 +162,15 @@ def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[
 
 
 def _planner(task: Task) -> Planner:
-    grippers = [spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec)]
+    hands = [spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec)]
+    speeds = (closing_speed(task.robot, hand.joints, hand.speed) for hand in hands)
     return Planner(
         task.robot,
         task.scene,
         period=task.spec.simulation.control_period,
         rng=np.random.default_rng(task.spec.simulation.seed),
         gripper_joints=Claims.of(task.controllers).hand,
-        gripper_speed=min((spec.speed for spec in grippers), default=1.0),
+        gripper_speed=min(speeds, default=SPEED),
     )
 
 

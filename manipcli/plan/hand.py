@@ -12,6 +12,8 @@ from manipcli.model.robot import RobotModel
 
 STEPS = 40
 """Points of the way of a closing hand at which contact is looked for."""
+SPEED = 1.0
+"""[rad/s or m/s] of a hand's references, where nobody says."""
 
 
 def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
@@ -26,6 +28,14 @@ def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], 
             link = mover[link].parent
         found.setdefault(first, []).append(k)
     return tuple(tuple(finger) for finger in found.values())
+
+
+def closing_speed(robot: RobotModel, joints: Sequence[str], stated: float | None) -> float:
+    """At which all references of a hand move [rad/s or m/s]: as stated, else no faster than its slowest joint may."""
+    if stated is not None:
+        return stated
+    limits = (robot.joint(name).limits.velocity for name in joints)
+    return min([SPEED, *(limit for limit in limits if limit)])
 
 
 def moved_links(robot: RobotModel, joints: Sequence[str]) -> frozenset[str]:

@@ -199,7 +199,9 @@ class GripperSpec(ControllerSpec):
     command_interface: Literal["position", "effort"] = Field("effort", description="What it commands. Default effort.")
     gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
     gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
-    speed: Annotated[JointVelocity, Field(gt=0, description="Of the reference, above 0. Default 1 rad/s or m/s.")] = 1.0
+    speed: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Of the reference, above 0. Default 1 rad/s or m/s, or the least limit of its joints."
+    )
     max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
         None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
     )

@@ -14,6 +14,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.flow.load import Task, load_task
 from manipcli.flow.plan import start_position
+from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.plan.steps import STEPS
@@ -68,7 +69,7 @@ def make_planner(task: Task, seed: int = 3) -> Planner:
     (gripper,) = (spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec))
     return Planner(
         task.robot, task.scene, period=TICK, rng=np.random.default_rng(seed),
-        gripper_joints=gripper.joints, gripper_speed=gripper.speed,
+        gripper_joints=gripper.joints, gripper_speed=closing_speed(task.robot, gripper.joints, gripper.speed),
     )  # fmt: skip
 
 

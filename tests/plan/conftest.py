@@ -25,6 +25,7 @@ from manipcli.model.robot import (
     RobotModel,
     Shape,
 )
+from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
@@ -126,7 +127,7 @@ class Bench:
             period=1e-3,
             rng=np.random.default_rng(1),
             gripper_joints=() if gripper is None else gripper.joints,
-            gripper_speed=1.0 if gripper is None else gripper.speed,
+            gripper_speed=1.0 if gripper is None else closing_speed(task.robot, gripper.joints, gripper.speed),
         )
         self.start = Situation(start_position(task), tuple(body.X_WO for body in task.scene.movable))
         self.now = self.start

@@ -33,7 +33,7 @@ from manipcli.control.gripper_controller import GripperController
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import Joint, RobotModel
-from manipcli.plan.hand import fingers
+from manipcli.plan.hand import closing_speed, fingers
 from manipcli.spec.controllers import GripperSpec
 
 __all__ = ["MEMBER", "GripperController", "GripperGoal"]
@@ -57,7 +57,7 @@ def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
         gains=spec.gains,
         interface=spec.command_interface,
         fingers=fingers(fit.robot, spec.joints),
-        speed=spec.speed,
+        speed=closing_speed(fit.robot, spec.joints, spec.speed),
         max_effort=effort if spec.command_interface == "effort" else None,
         stall_velocity=_each(joints, spec.stall_velocity, turning=STALL_VELOCITY, sliding=STALL_SPEED),
         stall_time=spec.stall_time,
