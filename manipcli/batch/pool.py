@@ -11,7 +11,6 @@ from pathlib import Path
 
 from manipcli.batch.job import Job
 from manipcli.batch.process import Process
-from manipcli.core.errors import Finding
 from manipcli.core.lock import Taken
 from manipcli.report.suite import CaseReport, Trouble, doubts_of, troubles_of
 
@@ -43,14 +42,15 @@ def run_jobs(
             while waiting and len(running) < at_once:
                 job = waiting.popleft()
                 if job.case.findings:
-                    yield _not_run(job, "the file cannot be read", job.case.findings)
+                    yield _unreadable(job)
                     continue
                 try:
                     running.append(Process(job, command=command))
                 except Taken:
-                    yield _taken(job)
+                    where = f"writes into '{job.settings.folder}', too"
+                    yield _no_process(job, f"another process is running this task, and {where}; nothing was run")
                 except OSError as error:
-                    yield _not_run(job, "it cannot be run", (Finding("USE106", f"it cannot be run: {error}"),))
+                    yield _no_process(job, f"it cannot be run: {error}")
             if not running:
                 continue
             if onlooker is not None:
@@ -77,18 +77,18 @@ def remove_empty(folder: Path) -> None:
             Path(place).rmdir()
 
 
-def _taken(job: Job) -> CaseReport:
-    text = f"another process is running this task, and writes into '{job.settings.folder}', too; nothing was run"
-    return CaseReport(job.case, "error", 0.0, job.command(), text, troubles=(Trouble(text),))
+def _no_process(job: Job, why: str) -> CaseReport:
+    return CaseReport(job.case, "error", 0.0, job.command(), why, troubles=(Trouble(why),))
 
 
-def _not_run(job: Job, why: str, findings: tuple[Finding, ...]) -> CaseReport:
+def _unreadable(job: Job) -> CaseReport:
+    findings = job.case.findings
     return CaseReport(
         case=job.case,
         outcome="invalid",
         duration=0.0,
         command=job.command(),
-        text=why,
+        text="the file cannot be read",
         findings=findings,
         troubles=troubles_of(findings),
         warnings=doubts_of(findings),

@@ -36,6 +36,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--manipcli-samples", type=_count, metavar="N", help="run samples 0 to N-1 of each task that has a `vary:`"
     )
     group.addoption(
+        "--manipcli-logs", type=Path, metavar="DIR", help="where logs and pictures go; runs/test when absent"
+    )
+    group.addoption(
         "--manipcli-timeout", type=_limit, default=600.0, metavar="S", help="end a task that takes longer [s]; 0: never"
     )
     group.addoption(
@@ -123,7 +126,8 @@ class TaskItem(pytest.Item):
         from manipcli.batch.job import FOLDER
         from manipcli.report.suite_text import judged_lines
 
-        folder = Path(shown_path(self.config.invocation_params.dir / FOLDER))
+        chosen = self.config.getoption("manipcli_logs") or FOLDER
+        folder = Path(shown_path(self.config.invocation_params.dir / chosen))
         report = _run(self._case, self.path, _settings(self.config, folder))
         tightest = report.tightest
         if tightest is not None and tightest.margin is not None:

@@ -56,6 +56,10 @@ def test(
     github: Annotated[
         bool, typer.Option("--github", help="Annotate the lines that failed, for GitHub Actions.")
     ] = False,
+    logs: Annotated[
+        Path | None,
+        typer.Option("--logs", metavar="DIR", help="Where logs and pictures go; runs/test when absent."),
+    ] = None,
     keep_logs: Annotated[bool, typer.Option("--keep-logs", help="Keep the logs of runs that passed, too.")] = False,
     seed: Seed = None,
     overrides: Overrides = None,
@@ -73,7 +77,7 @@ def test(
     from manipcli.cli.interrupts import Interrupts
 
     with Interrupts():
-        from manipcli.batch.job import Settings, limit
+        from manipcli.batch.job import FOLDER, Settings, limit
         from manipcli.batch.pool import remove_empty
 
         settings = Settings(
@@ -81,6 +85,7 @@ def test(
             seed=seed,
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
+            folder=logs or FOLDER,
             pages=report,
             junit=junit is not None,
             keep_logs=keep_logs,
@@ -89,7 +94,8 @@ def test(
         )
         check_outputs(("--junit", junit))
         _check_replaced(junit)
-        _check_folder(report)
+        _check_folder("--report", report)
+        _check_folder("--logs", settings.folder, hint=None if logs else "--logs DIR names another place")
         places = paths or [Path()]
         chosen, among = _jobs(places, settings, keyword=keyword, samples=samples, last_failed=last_failed)
         at_once = min(jobs or _cores(), max(1, len(chosen)))
@@ -268,20 +274,22 @@ def _check_replaced(junit: Path | None) -> None:
             raise InvalidInput([Finding("USE089", message)])
 
 
-def _check_folder(report: Path | None) -> None:
+def _check_folder(option: str, folder: Path | None, *, hint: str | None = None) -> None:
     """Before anything is run.
 
     Raises:
         InvalidInput: a file is where the folder should be, nothing can be written there, or it is `-`.
     """
-    if report is not None and str(report) == "-":
-        raise InvalidInput([Finding("USE083", "--report '-': expected the name of a folder")])
-    if report is not None and report.exists() and not report.is_dir():
-        raise InvalidInput([Finding("USE086", f"--report '{report}': this is a file; a folder was expected")])
-    if report is not None:
-        there = next(place for place in (report.absolute(), *report.absolute().parents) if place.exists())
-        if not os.access(there, os.W_OK):
-            raise InvalidInput([Finding("USE086", f"--report '{report}': nothing can be written in '{there}'")])
+    if folder is None:
+        return
+    if str(folder) == "-":
+        raise InvalidInput([Finding("USE083", f"{option} '-': expected the name of a folder")])
+    there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
+    if not there.is_dir():
+        message = f"{option} '{folder}': '{there}' is a file; a folder was expected"
+        raise InvalidInput([Finding("USE086", message, hint=hint)])
+    if not os.access(there, os.W_OK):
+        raise InvalidInput([Finding("USE086", f"{option} '{folder}': nothing can be written in '{there}'", hint=hint)])
 
 
 def _cores() -> int:

@@ -97,7 +97,7 @@ def test_a_run_whose_files_cannot_be_written_costs_itself_alone(tmp_path: Path) 
     long, other = jobs(tmp_path, END, "os.abort()")
     long = replace(long, case=replace(long.case, file=f"{'x' * 245}.yaml"))
     one, other_report = run([long, other], at_once=1)
-    assert (one.case, one.outcome, other_report.outcome) == (long.case, "invalid", "crashed")
+    assert (one.case, one.outcome, other_report.outcome) == (long.case, "error", "crashed")
     assert "File name too long" in one.troubles[0].message
 
 
@@ -320,8 +320,9 @@ def test_no_process_to_be_had_is_not_another_batch(tmp_path: Path, monkeypatch: 
 
     monkeypatch.setattr("manipcli.batch.process.subprocess.Popen", refused)
     (report,) = run(jobs(tmp_path, END))
-    assert (report.outcome, report.text) == ("invalid", "it cannot be run")
-    assert "Resource temporarily unavailable" in report.findings[0].message
+    assert report.outcome == "error"  # and not the fault of the file
+    assert "it cannot be run: " in report.text
+    assert "Resource temporarily unavailable" in report.troubles[0].message
 
 
 def test_a_folder_without_locks_runs_its_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

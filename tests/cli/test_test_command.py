@@ -130,17 +130,16 @@ def test_an_earlier_result_or_an_empty_file_is_replaced(folder: Path) -> None:
         assert parse(folder / "out.xml").getroot().get("errors") == "1"
 
 
-def test_a_folder_that_cannot_be_written_to_takes_nothing_from_the_answer(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_logs_go_where_something_can_be_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "runs").touch()
     (folder / "b.yaml").write_text("task: b\nrobot: r.yaml\nsteps: [\n")
-    write(folder, "a")
-    assert main(["test", "-n", "1"]) == 4
+    assert main(["test"]) == 4
     told = capsys.readouterr()
-    assert "error[USE106]: it cannot be run: [Errno" in told.out
-    assert "✗ 2 invalid" in told.out
-    assert "what failed is not remembered: " in told.err
+    assert (told.out, "error[USE086]: --logs 'runs/test': " in told.err) == ("", True)
+    assert "hint: --logs DIR names another place" in told.err
+    assert main(["test", "--logs", "else/where"]) == 4
+    assert "✗ 1 invalid" in capsys.readouterr().out
+    assert (folder / "else" / "where" / "last_failed.json").exists()
 
 
 def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
