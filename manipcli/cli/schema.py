@@ -15,7 +15,11 @@ def schema(
         Literal["task", "robot", "controllers"], typer.Argument(metavar="KIND", help="The kind of file.")
     ] = "task",
 ) -> ExitCode:
-    """Print the JSON Schema of a kind of file."""
+    """Print the JSON Schema of a kind of file.
+
+    It says which keys there are, and types and limits of values; `check` finds everything, as wrong units. Controllers
+    files in a form of ROS have no schema.
+    """
     from manipcli import pipeline
     from manipcli.report.json import dumps
 
