@@ -30,7 +30,8 @@ class Holding:
         self._pressed[body] = sum(force for force, _ in grips(contacts, body))
 
     def told(self, name: str) -> str:
-        """The force N of the hand on a body at the grasp, the mu N that friction can carry, and its weight m g.
+        """The force N of the hand on a body at the grasp, the mu N that friction can carry, its weight m g, and the
+        acceleration mu N / m - g that is left.
 
         The friction of a contact is the product of the two surfaces', as in Bullet.
         """
@@ -42,4 +43,6 @@ class Holding:
         weight = body.mass * float(np.linalg.norm(self._scene.gravity))
         grasp = f"the hand took it with {readable(pressed, 'N')}, of which friction {friction:.3g}"
         shares = f"({body.friction:.3g} x {self._robot.friction:.3g} of the hand)"
-        return f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it alone weighs {readable(weight, 'N')}"
+        told = f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it alone weighs {readable(weight, 'N')}"
+        left = (friction * pressed - weight) / body.mass
+        return told if left <= 0.0 else f"{told}, which leaves {left:.2g} m/s2 to accelerate it with"

@@ -27,6 +27,8 @@ from manipcli.plan.verify import verify
 GRAZE = 1e-4
 """[m] by which a finger that withdraws may come nearer than it was: rounding, and the arm's own curve."""
 
+HIGHER = "take the object where the closing fingers have room, as higher: `grasp: {height: ...}` of `pick`"
+
 
 class Draft:
     """The motions of one step. What refuses one is told with its label, unless the step has no other."""
@@ -269,11 +271,11 @@ class Draft:
         def refuse(q: Array) -> object | None:
             hit = query.check(q)
             if hit is not None or not free:
-                return hit
+                return None if hit is None else planner.in_the_way(hit)
             count = max(1, int(np.ceil(float(np.max(np.abs(q - seed))) / RESOLUTION)))
             share = np.linspace(0.0, 1.0, count + 1)
             on_way = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
-            return None if on_way is None else f"{on_way} on the way there"
+            return None if on_way is None else f"{planner.in_the_way(on_way)}, on the way there"
 
         return planner.solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
@@ -322,7 +324,8 @@ class Draft:
         hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
         if hit is not None:
             when = f"at t = {hit.time:.2f} s of '{label}'"
-            raise self._planner.refusal(self._now, hit, "would come", when)
+            refusal = self._planner.refusal(self._now, hit, "would come", when)
+            raise NotPlannable(refusal.cause, hint=HIGHER) if label == "close" else refusal
 
     def _swept(self, trajectory: JointTrajectory | None, grip: Grip | None) -> tuple[Array, Array]:
         """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""

@@ -214,7 +214,7 @@ class Planner:
         carried = situation.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         if begins and hit.distance < 0.0 and not held:
-            hint = "put them apart (a task begins elsewhere with `start: POSE`)"
+            hint = "put them apart: `start: POSE` of a task begins elsewhere, `mount` of a robot file moves its base"
             overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
             return NotPlannable(f"{overlap} already, {when}", hint=hint)
         hint = "no way around is searched for: `move` to a pose from which the way is free"
@@ -223,6 +223,10 @@ class Planner:
         near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
         clearance = f"{1000 * CLEARANCE:.0f} mm"
         return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)
+
+    def in_the_way(self, hit: CollisionHit) -> str:
+        """A hit as text; of what does not overlap, also how far apart it was to stay."""
+        return str(hit) if hit.distance < 0.0 else f"{hit}, and {1000 * CLEARANCE:.0f} mm are to stay between them"
 
     def touching(self, situation: Situation, body: str) -> Pairs:
         """The pairs of a movable body with what it stands on or leans against."""

@@ -10,6 +10,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
+from manipcli.model.collision import CollisionHit
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.follow import FollowSpec
 from manipcli.plan.steps.move import MoveSpec
@@ -131,6 +132,16 @@ def test_a_move_into_the_desk_is_refused_with_pair_time_and_motion(bench: Make) 
     assert "s of 'move'" in refusal.cause
     cause = arm.refused("move", {"pose": {"xyz": [0.7, -0.2, 0.43], **AHEAD}}).cause
     assert cause.startswith("the arm reaches (0.700, -0.200, 0.430) m only where desk and robot/")
+
+
+def test_what_is_too_near_is_told_with_the_clearance_that_is_kept(bench: Make) -> None:
+    planner = bench().planner
+    too_near, overlap = CollisionHit("cup", "robot/palm", 0.0039), CollisionHit("floor", "robot/base", -0.005)
+    told = "cup and robot/palm come as near as 3.9 mm, and 4 mm are to stay between them"
+    assert planner.in_the_way(too_near) == told
+    assert planner.in_the_way(overlap) == "floor and robot/base overlap by 5.0 mm"
+    refusal = planner.refusal(bench().now, overlap, "is", "before it moves")
+    assert "`mount` of a robot file" in (refusal.hint or "")
 
 
 def test_moving_while_holding_keeps_holding(bench: Make, story: Story) -> None:
