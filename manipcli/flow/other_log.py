@@ -75,6 +75,12 @@ class _Samples:
         order = np.argsort(known, kind="stable")
         return np.stack([np.interp(times, known[order], column[order]) for column in rows.T], axis=1)
 
+    def told(self, times: Array) -> Array:
+        """The same with NaN before the first sample."""
+        found = self.at(times)
+        found[times < min(self.times)] = np.nan
+        return found
+
 
 @dataclass(frozen=True, slots=True)
 class _Poses:
@@ -157,6 +163,8 @@ class _Log:
             samples.rows.append(row)
 
 
+NOWHERE: Final = "shown at zero, as nothing says where they are"
+AT_TIMES: Final = "shown as they were before, or will be, while nothing says where they are"
 FOREIGN: Final = "manipcli did not write this log"
 
 
@@ -272,8 +280,12 @@ def _joint(
 ) -> Array:
     """(T, 3) position, velocity, effort of a joint; NaN for what is not known. `unknown`: what to say, of which."""
     if name in log.joints:
-        found = log.joints[name].at(times)
-        found[:, 0] = np.nan_to_num(found[:, 0])
+        found = log.joints[name].told(times)
+        lacks = np.isnan(found[:, 0])
+        if lacks.all():
+            unknown.setdefault(NOWHERE, []).append(name)
+        elif lacks.any():
+            unknown.setdefault(AT_TIMES, []).append(name)
         return found
     found = np.full((len(times), 3), np.nan)
     joint = robot.joint(name) if robot is not None else None
@@ -281,11 +293,10 @@ def _joint(
         found[:, 0] = _angle(joint, tree[joint.child][1])
         unknown.setdefault(f"taken from {channels.TF}, as no {channels.JOINT_STATES} names them", []).append(name)
     elif joint is not None and joint.mimic is not None and joint.mimic.joint in log.joints:
-        leader = log.joints[joint.mimic.joint].at(times)[:, 0]
+        leader = log.joints[joint.mimic.joint].told(times)[:, 0]
         found[:, 0] = joint.mimic.multiplier * leader + joint.mimic.offset
     else:
-        found[:, 0] = 0.0
-        unknown.setdefault("shown at zero, as nothing says where they are", []).append(name)
+        unknown.setdefault(NOWHERE, []).append(name)
     return found
 
 

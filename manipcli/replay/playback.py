@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -140,14 +141,25 @@ class Playback:
         """The step that is on at `time` [s]; between two steps, none."""
         return next((step for step in reversed(self.steps) if step.start <= time <= step.end), None)
 
+    @cached_property
+    def stance(self) -> Array:
+        """(T, n) where the joints are drawn: as measured, without a measurement as they were last, before the first one
+        as they are then, and at zero where there is none at all."""
+        known = ~np.isnan(self.position)
+        if known.all():
+            return self.position
+        rows = np.arange(len(self.times))[:, None]
+        last = np.maximum.accumulate(np.where(known, rows, known.argmax(axis=0)), axis=0)
+        return np.nan_to_num(np.take_along_axis(self.position, last, axis=0))
+
     def poses(self) -> Poses:
         """Where the frames of `draw(robot, scene)` are at every time."""
-        return Placing(self.robot, self.scene).at(self.position, self.body_position, self.body_quat_xyzw)
+        return Placing(self.robot, self.scene).at(self.stance, self.body_position, self.body_quat_xyzw)
 
     def reference_position(self) -> Array:
         """(T, n) where the joints should be: what no controller moves stands as measured, mimic joints follow."""
         assert self.robot is not None
-        return following(self.robot, np.where(np.isnan(self.reference), self.position, self.reference))
+        return following(self.robot, np.where(np.isnan(self.reference), self.stance, self.reference))
 
     def reference_poses(self) -> Poses:
         """Where the robot should be, and the bodies as they are: the frames of `draw(robot, scene)` at every time."""
@@ -157,7 +169,7 @@ class Playback:
         """(T, 3) [m] the origin of the tool in the world; (0, 3) where the robot has none."""
         if self.robot is None or self.robot.tool is None:
             return np.zeros((0, 3))
-        return tool_positions(self.robot, self.position)
+        return tool_positions(self.robot, self.stance)
 
     def curves(self) -> tuple[PlotTable, ...]:
         """The curves of `tables`, at the times of what is shown."""

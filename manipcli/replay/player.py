@@ -145,7 +145,7 @@ def _contents(playback: Playback) -> tuple[str, str]:
         "surfaces": surfaces,
         "drawables": drawables,
         "times": pack.add(playback.times, "f"),
-        "position": pack.add(np.nan_to_num(playback.position), "f"),
+        "position": pack.add(playback.stance, "f"),
         "reference": pack.add(playback.reference_position(), "f") if playback.has_reference else None,
         "body": pack.add(np.concatenate([playback.body_position, playback.body_quat_xyzw], axis=2), "f"),
         "path": pack.add(path, "f") if len(path) > 1 else None,

@@ -77,9 +77,7 @@ class Shots:
 
     def _poses(self, k: int | Numbers) -> Poses:
         run = self.playback
-        # A joint of which the log says nothing stands at zero.
-        position = np.nan_to_num(run.position[k])
-        return self._placing.at(position, run.body_position[k], run.body_quat_xyzw[k])
+        return self._placing.at(run.stance[k], run.body_position[k], run.body_quat_xyzw[k])
 
     def _furniture(self, some: Numbers) -> frozenset[str]:
         """Bodies that need not be in view as a whole: the floor, and what stands still and is as large as the rest."""

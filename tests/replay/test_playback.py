@@ -230,8 +230,16 @@ URDF = """<robot name="two">
 BEGIN = 1_700_000_000_000_000_000
 
 
-def _foreign(path: Path, *, urdf: bool = True, joints: tuple[str, ...] = ("turn", "push"), tf: bool = True) -> Path:
-    """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by."""
+def _foreign(
+    path: Path,
+    *,
+    urdf: bool = True,
+    joints: tuple[str, ...] = ("turn", "push"),
+    tf: bool = True,
+    gaps: bool = False,
+) -> Path:
+    """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by.
+    With `gaps` the second joint comes late, and the first is NaN for a while."""
     message = TYPES.types
     with path.open("wb") as file:
         writer = Writer(file)
@@ -261,8 +269,12 @@ def _foreign(path: Path, *, urdf: bool = True, joints: tuple[str, ...] = ("turn"
         for k in range(101):
             t, ns = k / 100, BEGIN + k * 10**7
             if joints:
+                if gaps:
+                    joints = ("turn", "push") if t >= 0.5 else ("turn",)
                 kind, value = "sensor_msgs/msg/JointState", {"turn": np.sin(t), "push": 0.1 * t}
                 position = np.array([value[name] for name in joints])
+                if gaps and 0.2 < t < 0.4:
+                    position[0] = np.nan
                 put(
                     "/joint_states", kind, ns, message[kind](header(ns, ""), list(joints), position, *[np.zeros(0)] * 2)
                 )
@@ -299,11 +311,25 @@ def test_joints_that_no_joint_state_names_come_from_tf_or_stand_at_zero(tmp_path
     whole = open_playback(_foreign(tmp_path / "bag.mcap"), rate=100.0)
     shown = open_playback(_foreign(tmp_path / "bare.mcap", joints=()), rate=100.0)
     np.testing.assert_allclose(shown.position[:, 0], whole.position[:, 0], atol=1e-4)
-    assert not shown.position[:, 1].any()
+    assert np.isnan(shown.position[:, 1]).all() and not shown.stance[:, 1].any()
     told = "\n".join(shown.notes)
     assert "no /joint_states" in told
     assert "at zero" in told and "push" in told
     assert "from /tf" in told and "turn" in told
+
+
+def test_what_a_log_does_not_say_is_no_curve(tmp_path: Path) -> None:
+    """One joint is told from 0.5 s on, of the other there is no number from 0.2 s to 0.4 s: the curves have gaps there,
+    and the robot is drawn as it was before, or will be."""
+    shown = open_playback(_foreign(tmp_path / "bag.mcap", tf=False, gaps=True), rate=100.0)
+    times, (turn, push) = shown.times, shown.curves()[0].values.T
+    inside, late = (times > 0.201) & (times < 0.399), times > 0.499
+    np.testing.assert_array_equal(np.isnan(turn), inside)
+    np.testing.assert_array_equal(np.isnan(push), ~late)
+    np.testing.assert_allclose(shown.stance[inside, 0], np.sin(0.2), atol=1e-6)
+    np.testing.assert_allclose(shown.stance[~late, 1], 0.05, atol=1e-6)
+    assert np.isfinite(shown.poses().position).all()
+    assert any("shown as they were before" in note and "turn" in note and "push" in note for note in shown.notes)
 
 
 def test_without_a_description_there_are_frames_and_curves(tmp_path: Path) -> None:
