@@ -37,6 +37,7 @@ class Page(Protocol):
     requests: list[str]
     complaints: list[str]
 
+    def ask(self, method: str, **parameters: object) -> dict[str, object]: ...
     def open(self, url: str) -> None: ...
     def evaluate(self, script: str) -> object: ...
     def wait_for(self, script: str, seconds: float = 30.0) -> None: ...
@@ -112,6 +113,61 @@ def test_the_page_of_its_own_plays(browser: Page, playback: Playback, tmp_path: 
     assert not browser.evaluate(f"{player}.playing")
 
     assert [url for url in browser.requests if url != path.as_uri()] == []
+    assert browser.complaints == []
+
+
+def _press(page: Page, key: str, code: str, number: int) -> None:
+    text = {"text": key} if len(key) == 1 else {}
+    about = {"key": key, "code": code, "windowsVirtualKeyCode": number}
+    page.ask("Input.dispatchKeyEvent", type="keyDown", **about, **text)
+    page.ask("Input.dispatchKeyEvent", type="keyUp", **about)
+
+
+@pytest.mark.slow
+def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """What has the focus gets its own keys; behind a click on a step they are for the time."""
+    path = tmp_path / "run.html"
+    path.write_text(player_page(playback), "utf-8")
+    browser.open(path.as_uri())
+    browser.wait_for("!!document.querySelector('.mc-player').player")
+    player, space = "document.querySelector('.mc-player').player", (" ", "Space", 32)
+    place = json.loads(
+        str(
+            browser.evaluate(
+                "JSON.stringify(document.querySelector('.steps button:nth-child(2)').getBoundingClientRect())"
+            )
+        )
+    )
+    for kind in ("mousePressed", "mouseReleased"):
+        where = {"x": place["x"] + 20, "y": place["y"] + 8, "button": "left", "clickCount": 1}
+        browser.ask("Input.dispatchMouseEvent", type=kind, **where)
+    browser.wait_for(f"Math.abs({player}.time - {playback.steps[1].start}) < 1e-6")
+    _press(browser, *space)
+    assert browser.evaluate(f"{player}.playing")
+    _press(browser, *space)
+    assert not browser.evaluate(f"{player}.playing")
+
+    for name in ("loop", "show-path"):
+        box = f"document.querySelector('[data-part={name}]')"
+        before = browser.evaluate(f"{box}.focus(), {box}.checked")
+        _press(browser, *space)
+        assert browser.evaluate(f"{box}.checked") is not before
+        assert not browser.evaluate(f"{player}.playing")
+
+    track = "document.querySelector('[data-part=track]')"
+    browser.evaluate(f"{track}.focus()")
+    assert browser.evaluate(f"document.activeElement === {track}")
+    for key, code, number, then in (
+        ("End", "End", 35, playback.end),
+        ("ArrowDown", "ArrowDown", 40, playback.end - 0.1),
+        ("Home", "Home", 36, playback.start),
+        ("ArrowRight", "ArrowRight", 39, playback.start + 0.1),
+    ):
+        _press(browser, key, code, number)
+        assert browser.evaluate(f"{player}.time") == pytest.approx(then, abs=1e-6)
+    ends = [browser.evaluate(f"Number({track}.getAttribute('aria-value{name}'))") for name in ("min", "max")]
+    assert ends == pytest.approx([playback.start, playback.end], abs=0.005)
+    browser.wait_for(f"{track}.getAttribute('aria-valuetext').startsWith('0.10 s')")
     assert browser.complaints == []
 
 

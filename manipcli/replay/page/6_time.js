@@ -52,6 +52,7 @@ function tell() {
   const track = part("track");
   part("head-line").style.left = `${(100 * (time - run.start)) / (run.end - run.start || 1)}%`;
   track.setAttribute("aria-valuenow", time.toFixed(2));
+  track.setAttribute("aria-valuetext", `${time.toFixed(2)} s${step ? ", " + step.label : ""}`);
   for (const each of root.querySelectorAll("[data-step]"))
     each.classList.toggle("now", step !== null && run.steps[Number(each.dataset.step)] === step);
   const button = step && part("steps").children[run.steps.indexOf(step)];

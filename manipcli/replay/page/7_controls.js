@@ -15,6 +15,8 @@ function scrub(box, at) {
 
 function build() {
   const track = part("track"), length = run.end - run.start || 1, good = (step) => step.outcome === "done";
+  track.setAttribute("aria-valuemin", run.start.toFixed(2));
+  track.setAttribute("aria-valuemax", run.end.toFixed(2));
   run.steps.forEach((step, k) => {
     const piece = track.insertBefore(document.createElement("div"), part("head-line"));
     piece.className = "step" + (good(step) ? "" : " bad");
@@ -35,7 +37,11 @@ function build() {
     element(button, "span", "", step.label);
     element(button, "span", "phase", step.phases.map((one) => one.name).join(" · "));
     element(button, "span", "when", `${step.start.toFixed(2)} s`);
-    button.addEventListener("click", () => seek(step.start));
+    button.addEventListener("click", (event) => {
+      seek(step.start);
+      // Of a pointer: the next key is for the time, not for this button again.
+      if (event.detail) track.focus({ preventScroll: true });
+    });
   });
   scrub(track, (event) => {
     const box = track.getBoundingClientRect();
@@ -66,10 +72,13 @@ function build() {
   part("span").addEventListener("change", () => { plot.span = Number(part("span").value); refresh(); });
   fill();
   (root.dataset.page ? document : root).addEventListener("keydown", (event) => {
-    if (event.target.tagName === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === " " && event.target.tagName !== "BUTTON") play(!playing);
-    else if (event.key === "ArrowRight" || event.key === "ArrowLeft")
-      seek(time + (event.key === "ArrowRight" ? 1 : -1) * (event.shiftKey ? 1 : 0.1));
+    const kind = event.target.tagName, slider = event.target === track;
+    const way = { ArrowRight: 1, ArrowLeft: -1, ...(slider ? { ArrowUp: 1, ArrowDown: -1 } : {}) }[event.key];
+    if (kind === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " " && kind !== "BUTTON" && kind !== "INPUT") play(!playing);
+    else if (way) seek(time + way * (event.shiftKey ? 1 : 0.1));
+    else if (slider && event.key === "Home") seek(run.start);
+    else if (slider && event.key === "End") seek(run.end);
     else return;
     event.preventDefault();
   });
