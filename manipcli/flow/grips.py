@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from typing import Final
+
+import numpy as np
 
 from manipcli.core.errors import Finding
-from manipcli.core.text import told_apart
+from manipcli.core.geometry import Array
+from manipcli.core.text import digits, told_apart
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
-from manipcli.spec.controllers import GripperSpec
+from manipcli.plan.hand import fingers, moved_links, with_mimics
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Situation
+from manipcli.spec.controllers import GainsSpec, GripperSpec
+
+ENOUGH: Final = 1.01
+"""A force that is asked beyond this share of what there is is not met."""
+NUDGE: Final = 1e-4
+"""[rad or m] by which a finger is moved to see how its parts move."""
 
 
 def too_swift(task: Task) -> Iterator[Finding]:
@@ -39,9 +51,73 @@ def strained(task: Task, plan: Plan) -> Iterator[Finding]:
             joint = task.robot.joint(name)
             limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
             mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
-            fingers = 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
-            most = min((limit for limit in limits if limit), default=math.inf) / fingers
+            sides = 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
+            most = min((limit for limit in limits if limit), default=math.inf) / sides
             if joint.type == "prismatic" and force > most:
                 message = f"step '{step.id}': a grasp with {force:.3g} N; {name} presses with {most:.3g} N at most"
                 hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
                 yield Finding("TASK238", message, task.file.place("steps", k), hint, "warning")
+
+
+def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
+    """Grasps with more force than the spring of a finger's gain gives, all the way from the object to the posture.
+
+    A finger of one joint, alone or with others that mimic it, gives p |q_posture - q_object| of effort, and by virtual
+    work that over `_closing` of force.
+    """
+    owners = {
+        joint: (name, spec)
+        for name, spec in task.controllers.controllers.items()
+        if isinstance(spec, GripperSpec) and spec.command_interface == "effort"
+        for joint in spec.joints
+    }
+    for step in plan.steps:
+        end = step.plan.end
+        for grip in (motion.grip for motion in step.plan.motions):
+            if grip is None or grip.force is None or end.carried is None:
+                continue
+            hits = plan.planner.grasping(end, end.carried.body).every(end.position)
+            touched = {part for hit in hits for part in (hit.a, hit.b)}
+            for name, target in zip(grip.joints, grip.target, strict=True):
+                if name not in owners or (grip.joints.index(name),) not in fingers(task.robot, grip.joints):
+                    continue
+                controller, spec = owners[name]
+                gains = spec.gains.get(name, GainsSpec())
+                closing = _closing(plan.planner, end, name, touched)
+                way = abs(float(target) - float(end.position[task.robot.joint_names.index(name)]))
+                if not closing or not way or gains.i or grip.force <= ENOUGH * gains.p * way / closing:
+                    continue
+                given = f"kp {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
+                message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; {given}"
+                hint = f"kp {digits(1.2 * grip.force * closing / way)} gives a fifth more than that"
+                place = task.controllers_file.place("controllers", controller, "gains", name)
+                yield Finding("CTRL168", message, place, hint, "warning")
+
+
+def _closing(planner: Planner, situation: Situation, name: str, touched: Collection[str]) -> float:
+    """How fast a joint, with those that mimic it, closes the gap between the parts that touch, at the tool's point.
+
+    |dp_1/dq - dp_2/dq| of two sides, |dp/dq| of one that slides [m/rad or 1]; 0 where it is neither.
+    """
+    robot, kinematics = planner.robot, planner.kinematics
+    mover = {joint.child: joint for joint in robot.joints}
+    p_WT = planner.tool_pose(situation).p
+    q = np.array(situation.position)
+    q[robot.joint_names.index(name)] += NUDGE
+    nudged = with_mimics(robot, q)
+    sides: dict[str, Array] = {}
+    for link in sorted(moved_links(robot, [name])):
+        if f"robot/{link}" not in touched:
+            continue
+        side = above = link
+        while above in mover:
+            joint = mover[above]
+            if joint.name == name or (joint.mimic is not None and joint.mimic.joint == name):
+                side = above
+            above = joint.parent
+        p_LT = kinematics.forward(situation.position, link).inverse().apply(p_WT)
+        sides[side] = (kinematics.forward(nudged, link).apply(p_LT) - p_WT) / NUDGE
+    rates = list(sides.values())
+    if len(rates) == 1 and robot.joint(name).type == "prismatic":
+        return float(np.linalg.norm(rates[0]))
+    return float(np.linalg.norm(rates[0] - rates[1])) if len(rates) == 2 else 0.0

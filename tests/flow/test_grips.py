@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -10,9 +12,26 @@ from manipcli.core.errors import Finding
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_task
 from manipcli.flow.plan import plan_task
+from manipcli.pipeline import run_task
 
 ROOT = Path(__file__).parents[2]
 SPEED = "controllers.hand_controller.speed"
+
+
+@dataclass
+class Listener:
+    """Keeps what a run tells beside its steps."""
+
+    heard: list[str]
+
+    def doing(self, what: str) -> None: ...
+    def warned(self, findings: object) -> None: ...
+    def tick(self, simulated_time: float, wall: float) -> None: ...
+    def step_started(self, step: object, index: int, total: int) -> None: ...
+    def step_ended(self, outcome: object) -> None: ...
+
+    def told(self, text: str, *, detail: bool) -> None:
+        self.heard += [] if detail else [text]
 
 
 @pytest.fixture
@@ -44,3 +63,36 @@ def test_a_hand_that_is_told_to_be_faster_than_a_joint_may_be_is_doubted(small: 
     (found,) = findings(load_task(small, overrides=[f"{SPEED}=0.25"]))
     assert (found.code, found.severity) == ("CTRL167", "warning")
     assert found.message == ("panda_finger_joint1: its references move at 0.25 m/s, its velocity limit is 0.2 m/s")
+
+
+PICK = (ROOT / "tasks" / "pick_place.yaml").read_text(encoding="utf-8").partition("  - lift:")[0]
+
+
+@pytest.fixture
+def pick(tmp_path: Path) -> Path:
+    """The Panda takes a block of 4 cm with 7 N a finger."""
+    file = tmp_path / "pick.yaml"
+    file.write_text(PICK.replace("../", f"{ROOT}/"))
+    return file
+
+
+@pytest.mark.slow
+def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) -> None:
+    """kp 500 x 20 mm are 10 N for two fingers: 5 N each, and so the run feels."""
+    gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
+    (found,) = findings(load_task(pick, overrides=[f"{gain}=500"]))
+    assert (found.code, found.severity) == ("CTRL168", "warning")
+    assert found.message == "panda_finger_joint1: step 'pick_1' grasps with 7 N; kp 500 gives about 5 N"
+    assert found.hint == "kp 840 gives a fifth more than that"
+    heard: list[str] = []
+
+    def told_of(overrides: list[str]) -> str:
+        heard.clear()
+        run_task(pick, overrides=overrides, log=pick.with_suffix(".mcap"), force=True, progress=Listener(heard))
+        return " ".join(heard)
+
+    felt = re.search(r"where it felt ([\d.]+) N of the 7 N asked", told_of([f"{gain}=500"]))
+    assert felt is not None
+    assert float(felt[1]) == pytest.approx(5.0, rel=0.1)
+    assert "felt" not in told_of([f"{gain}=840"])
+    assert findings(load_task(pick, overrides=[f"{gain}=840"])) == ()
