@@ -56,7 +56,7 @@ def caption(image: Image, playback: Playback, time: float) -> Image:
     pen.text((canvas.width - margin, margin), clock, fill=INK, font=font(size), anchor="ra")
     step = playback.step_at(time)
     if step is not None:
-        number = f"{playback.steps.index(step) + 1}/{len(playback.steps)}"
+        number = f"{playback.steps.index(step) + 1}/{playback.total}"
         room = canvas.width - 3.0 * margin - width
         x = float(margin)
         pen.text((x, margin), number, fill=QUIET, font=font(size), anchor="la")

@@ -130,6 +130,11 @@ class Playback:
         """Whether a controller moves any joint of a robot that is known."""
         return self.robot is not None and not bool(np.isnan(self.reference).all())
 
+    @property
+    def total(self) -> int:
+        """Of the steps, those that were never begun too."""
+        return max(len(self.steps), 0 if self.verdict is None else len(self.verdict.steps))
+
     def index(self, time: float) -> int:
         """Number of the time nearest to `time` [s]."""
         k = int(np.searchsorted(self.times, time))

@@ -17,6 +17,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import matrix_from_quat
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.replay import open_playback
+from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.model.robot import Mesh
 from manipcli.model.state import Contact
 from manipcli.pipeline import run_task
@@ -24,7 +25,7 @@ from manipcli.record.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
 from manipcli.replay.drawing import draw
-from manipcli.replay.playback import Playback
+from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.sampling import _Contacts, sampled
 
 ROOT = Path(__file__).parents[2]
@@ -330,6 +331,15 @@ def test_what_a_log_does_not_say_is_no_curve(tmp_path: Path) -> None:
     np.testing.assert_allclose(shown.stance[~late, 1], 0.05, atol=1e-6)
     assert np.isfinite(shown.poses().position).all()
     assert any("shown as they were before" in note and "turn" in note and "push" in note for note in shown.notes)
+
+
+def test_steps_that_never_began_are_counted(tmp_path: Path) -> None:
+    shown = open_playback(_foreign(tmp_path / "bag.mcap"), rate=10.0)
+    steps = tuple(PlaybackStep(f"step_{k}", "move", f"step_{k}", k / 2, (k + 1) / 2, "done") for k in range(2))
+    outcomes = tuple(StepOutcome(f"step_{k}", "move", "not_run", None, None, 1.0) for k in range(3))
+    verdict = Verdict("t", "failed", 0, "pybullet", 1.0, outcomes, ())
+    assert replace(shown, steps=steps).total == 2
+    assert replace(shown, steps=steps, verdict=verdict).total == 3
 
 
 def test_without_a_description_there_are_frames_and_curves(tmp_path: Path) -> None:
