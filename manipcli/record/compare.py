@@ -147,8 +147,8 @@ def _topic(logs: tuple[Topics, Topics], name: str) -> TopicComparison:
     one = TopicComparison(name, there[0].type, counts)
     if len(there) == 2 and (there[0].type, there[0].definition) != (there[1].type, there[1].definition):
         one.why = f"its type is {there[0].type} in one log and another {there[1].type} in the other"
-    elif not all(topic.definition for topic in there):
-        one.why = f"it is no topic of ROS 2 messages, but {there[0].encoding or 'of an unknown encoding'}"
+    elif there[0].encoding != there[-1].encoding:
+        one.why = f"it is written as {there[0].encoding} in one log and as {there[1].encoding} in the other"
     return one
 
 
@@ -314,7 +314,8 @@ class _Merge:
                 found = ("(a message that is cut)", len(a) - HEAD, len(b) - HEAD)
         if found is None and self._before:
             found = _head_difference(a, b)
-        label, x, y = found or ("(bytes between its fields)", "", "")
+        nothing = "(bytes between its fields)" if message is not None else "(its bytes)"
+        label, x, y = found or (nothing, "", "")
         return Difference(ns / 1e9, name, label, x, y, index)
 
     def _alone(self, name: str, side: int, block: _Block) -> None:
@@ -347,6 +348,9 @@ def _leading(true: npt.NDArray[np.bool_]) -> int:
 
 
 def _definition(topic: Topic) -> Message | None:
+    """None where only bytes can be compared: of no ROS 2 message, or of one that nobody describes."""
+    if not topic.definition:
+        return None
     try:
         return read_definition(topic.type, topic.definition)
     except UnknownDefinition:

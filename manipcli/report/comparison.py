@@ -51,12 +51,16 @@ def topics_table(topics: Sequence[TopicComparison], names: Names) -> str:
 
 
 def counted(found: Comparison) -> str:
-    """`3 messages of 1 topic`; or that it is not the messages."""
-    topics = [topic for topic in found.topics if not topic.same]
-    if not topics:
-        return "the messages are the same, what is beside them is not"
-    messages = sum(topic.different + sum(topic.only) for topic in topics)
-    return f"{number_of(messages, 'message')} of {number_of(len(topics), 'topic')}"
+    """`3 messages of 1 topic`, `1 topic is not compared`; or that it is not the messages."""
+    topics = [topic for topic in found.topics if not topic.same and not topic.why]
+    apart = sum(bool(topic.why) for topic in found.topics)
+    told = []
+    if topics:
+        messages = sum(topic.different + sum(topic.only) for topic in topics)
+        told.append(f"{number_of(messages, 'message')} of {number_of(len(topics), 'topic')}")
+    if apart:
+        told.append(f"{number_of(apart, 'topic')} {'is' if apart == 1 else 'are'} not compared")
+    return "; ".join(told) or "the messages are the same, what is beside them is not"
 
 
 def entries_lines(entries: Sequence[EntryDifference], names: Names) -> list[str]:

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.records import Message
+from mcap.writer import Writer
 
 from manipcli.record import compare
 from manipcli.record.compare import compare_logs, compared_with_itself
 from manipcli.record.compare_entries import compare_entries
 from manipcli.record.reading import open_recording
+from manipcli.report.comparison import counted
 
 T = 1203
 Rewrite = Callable[..., Path]
@@ -47,6 +49,29 @@ def test_the_same_log_in_other_chunks_is_the_same(log: Path, tmp_path: Path, rew
         assert found == compared_with_itself(log)
     assert found.messages == sum(one.messages[0] for one in found.topics) > 4 * T
     assert compare_entries(open_recording(log), open_recording(other)) == ()
+
+
+def test_what_is_no_ros_message_is_compared_by_its_bytes(tmp_path: Path) -> None:
+    def write(name: str, changed: int, encoding: str = "json") -> Path:
+        with (tmp_path / name).open("wb") as file:
+            writer = Writer(file)
+            writer.start(profile="", library="somebody")
+            channel = writer.register_channel("/foo", encoding, writer.register_schema("Foo", "jsonschema", b"{}"))
+            for k in range(10):
+                writer.add_message(channel, k, b'{"a": %d}' % (k + (k == changed)), k)
+            writer.finish()
+        return tmp_path / name
+
+    a = write("a.mcap", -1)
+    assert compare_logs(a, write("b.mcap", -1)).same
+    found = compare_logs(a, write("c.mcap", 7))
+    (topic,) = found.topics
+    assert (topic.different, topic.only, topic.why) == (1, [0, 0], "")
+    assert found.first is not None
+    assert (found.first.index, found.first.field) == (7, "(its bytes)")
+    (apart,) = compare_logs(a, write("d.mcap", -1, "cbor")).topics
+    assert "json/jsonschema in one log and as cbor/jsonschema in the other" in apart.why
+    assert counted(compare_logs(a, tmp_path / "d.mcap")) == "1 topic is not compared"
 
 
 def test_one_changed_double_is_named(log: Path, tmp_path: Path, rewrite_log: Rewrite) -> None:
