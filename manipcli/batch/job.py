@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 from manipcli.core.errors import Finding, Place
 from manipcli.report.run_report import RunReport
@@ -85,6 +87,13 @@ class Job:
     @property
     def page(self) -> Path | None:
         return None if self.settings.pages is None else self._beside(".html", self.settings.pages)
+
+    @property
+    def index(self) -> str:
+        """The link from its page to the one that leads to all; "" where no pages are written."""
+        if self.page is None or self.settings.pages is None:
+            return ""
+        return quote(os.path.relpath(self.settings.pages / "index.html", self.page.parent))
 
     @property
     def nominal(self) -> bool:

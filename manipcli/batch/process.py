@@ -210,14 +210,14 @@ class Process:
 
     def _with_page(self, report: CaseReport) -> CaseReport:
         """With the page about it that its own process did not write, where one is wanted."""
-        page = self.job.page
+        page, index = self.job.page, self.job.index
         if page is None:
             return report
         from manipcli.report.case_page import render_case_page
 
         try:
             page.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(page, render_case_page(report, page.parent).encode())
+            write_whole(page, render_case_page(report, page.parent, index=index).encode())
         except OSError as error:
             return replace(report, notes=(*report.notes, f"no page: {error}"))
         return replace(report, page=str(page))

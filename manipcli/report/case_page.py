@@ -17,8 +17,8 @@ LONGEST = 100_000
 """Bytes of the end of what it said that are shown."""
 
 
-def render_case_page(report: CaseReport, folder: Path) -> str:
-    """The page, which lies in `folder`. Picture and output are in it, the log is linked."""
+def render_case_page(report: CaseReport, folder: Path, *, index: str = "") -> str:
+    """The page, which lies in `folder`. Picture and output are in it, the log is linked, and the `index` of pages."""
     style = Markup(files("manipcli.report").joinpath("page", "report.css").read_text("utf-8"))
     head = element(
         "header",
@@ -42,7 +42,9 @@ def render_case_page(report: CaseReport, folder: Path) -> str:
         class_="why",
     )
     title = f"✗ {report.case.name} {report.outcome}"
-    return document(title, head, element("main", why, _picture(report), _said(report)), style=style, policy=POLICY)
+    back = element("nav", element("a", "All runs", href=index)) if index else None
+    body = element("main", why, _picture(report), _said(report))
+    return document(title, head, back, body, style=style, policy=POLICY)
 
 
 def _picture(report: CaseReport) -> Markup | None:

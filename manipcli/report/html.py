@@ -38,6 +38,7 @@ def render_page(page: RunPage) -> str:
         "files": sections.sources(page),
         "provenance": sections.provenance(page),
     }
+    back = element("a", "All runs", href=page.index) if page.index else None
     links = (element("a", word, href=f"#{name}") for name, word in _NAMES if shown[name])
     own = files("manipcli.report").joinpath("page")
     style, script = (Markup(own.joinpath(name).read_text("utf-8")) for name in ("report.css", "report.js"))
@@ -46,7 +47,7 @@ def render_page(page: RunPage) -> str:
     return document(
         title,
         sections.head(page),
-        element("nav", *links, aria_label="sections"),
+        element("nav", back, *links, aria_label="sections"),
         element("main", *shown.values()),
         element("script", script),
         style=style,

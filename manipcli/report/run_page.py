@@ -71,6 +71,7 @@ class RunPage:
         provenance: name and value of what is known of the origin: versions, seed, engine, period.
         hashes: SHA-256 of files, by name.
         notes: what is missing or unlike it was in the run, a sentence each.
+        index: where, from this page, the one is that leads to it and others; "" where there is none.
     """
 
     verdict: Verdict
@@ -88,6 +89,7 @@ class RunPage:
     provenance: tuple[tuple[str, str], ...] = ()
     hashes: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
+    index: str = ""
 
     @property
     def located_steps(self) -> tuple[tuple[StepOutcome, Written], ...]:

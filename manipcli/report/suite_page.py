@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from manipcli.replay.player import POLICY
 from manipcli.report.html_parts import mark, table
-from manipcli.report.markup import Markup, document, element, joined
+from manipcli.report.markup import Markup, document, element
 from manipcli.report.suite import CaseReport, Suite
 from manipcli.report.suite_text import beforehand, gist, render_summary
 
@@ -51,7 +51,7 @@ def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     more = [] if report.passed else [*others, *beforehand(report, whole=True), element("code", report.command)]
     return (
         mark(report.passed, report.outcome),
-        joined(name, element("div", report.case.task)) if report.case.task else name,
+        element("div", name, element("div", report.case.task) if report.case.task else None, class_="name"),
         "" if report.case.sample is None else str(report.case.sample),
         element("div", gist(report), *(element("div", line) for line in more), class_="whole"),
         f"{report.duration:.1f} s",

@@ -411,6 +411,12 @@ def test_no_two_cases_share_a_file(one: tuple[str, int | None], other: tuple[str
     assert of_a == of_b if one == other else not of_a & of_b
 
 
+def test_a_page_leads_back_to_the_index() -> None:
+    deep = Case("../a b/t.yaml", "t")
+    assert Job(deep, Path(), Settings(pages=Path("rep"))).index == "../../index.html"
+    assert Job(deep, Path(), Settings()).index == ""
+
+
 def test_the_command_that_does_it_again_can_be_pasted_into_a_shell() -> None:
     settings = Settings(overrides=("scene.cup.mass=80 g",), seed=4, package_path=(Path("p q"),), allow_outside=True)
     assert Job(Case("my tasks/a.yaml", "a", 17), Path("x"), settings).command() == (

@@ -207,6 +207,8 @@ def test_good_and_bad_tasks_with_everything_written(folder: Path, run_cli: Any) 
     assert (folder / "runs" / "test" / "late.png").read_bytes().startswith(b"\x89PNG")
     links = re.findall(r'href="([^"]+\.html)"', (folder / "pages" / "index.html").read_text())
     assert links == ["late.html", "good.html"]
+    for link in links:
+        assert '<a href="index.html">All runs</a>' in (folder / "pages" / link).read_text()
     root = parse(folder / "out.xml").getroot()
     assert (root.get("failures"), root.get("errors")) == ("1", "0")
 
