@@ -218,8 +218,26 @@ def _calm_together(load: Load, drafts: list[_Draft], wish: Wish) -> None:
             if min(draft.w for draft in drafts) < LEAST_FREQUENCY or is_stable(whole.scaled(MARGIN)):
                 break
             _, share = unstable_share(whole.scaled(MARGIN))
-            for k in np.flatnonzero(share > 0.25):
+            for k in np.flatnonzero(share >= min(0.25, share.max())):
                 drafts[k] = _softer(drafts[k], "other joints")
+
+
+def tightness(load: Load, tuned: Sequence[Tuned], wish: Wish) -> Array:
+    """(T,) how near these gains come to what the control step allows: the largest eigenvalue of M^-1 (2 D h + P h^2),
+    which is 4 where they are unstable, in one step of Euler and for one joint exactly."""
+    p, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "d"))
+    push = 2.0 * (d + load.damping) * wish.period + p * wish.period**2
+    # Of the same eigenvalues as M^-1 W, and symmetric: W^1/2 M^-1 W^1/2.
+    root = np.sqrt(push)
+    return np.asarray(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(load.mass) * root)[:, -1])
+
+
+def keeps_margin(load: Load, tuned: Sequence[Tuned], wish: Wish) -> bool:
+    """Whether all of these gains could be `MARGIN` times as large, in every posture."""
+    p, i, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "i", "d"))
+    late = np.array(load.latency)
+    loops = (Loop(mass, p, d, i, load.damping, wish.period, wish.substeps, late) for mass in load.mass)
+    return all(is_stable(loop.scaled(MARGIN)) for loop in loops)
 
 
 def _tuned(load: Load, k: int, controller: str, draft: _Draft, wish: Wish, step: float, left: float) -> Tuned:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,12 +14,13 @@ from manipcli.control.controller import ControllerOutput, FeedForward, JointStat
 from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Pid
-from manipcli.control.reflected import Postures, load_of
-from manipcli.control.tuning import StepAnswer, Tuned, Wish, tune_efforts, tune_velocity
+from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.tuning import StepAnswer, Tuned, Wish, keeps_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import EARTH_GRAVITY
+from manipcli.flow.extremes import climbed
 from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
 from manipcli.model.kinematics import Kinematics
@@ -44,6 +46,8 @@ WIDE: Final = 2.0
 """[rad or m] how far from the start a joint without limits is put."""
 HOPELESS: Final = 0.01
 """Of the bandwidth that is asked for: where less is stable, gains are of no use."""
+ROUNDS: Final = 12
+"""How often the gains are calmed at the posture in which they have the least margin."""
 RETURN: Final = 0.5
 """[s] at least that a joint has to come back before the next one steps."""
 
@@ -166,9 +170,28 @@ class _Tuner:
             return ()
         joints = [joint for _, joint, _ in loops]
         carried = np.array([each for _, _, each in loops])
-        found = load_of(self._robot, self._kinematics, joints, self._postures())
         steps = np.array([self._step_of(joint) for joint in joints])
-        tuned = tune_efforts([name for name, _, _ in loops], found, self._wish, steps=steps, carried=carried)
+        names = [name for name, _, _ in loops]
+
+        def load(q: Array) -> Load:
+            return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
+
+        def extreme(score: Callable[[Load], Array], starts: int) -> Array:
+            return climbed(self._robot, lambda q: score(load(q)), postures, *self._range(), starts=starts)
+
+        postures = self._postures().position
+        ends = [
+            extreme(score, 1)
+            for k in range(len(joints))
+            for score in (lambda one, k=k: one.held_inertia[:, k], lambda one, k=k: 1.0 / one.own_inertia[:, k])
+        ]
+        postures = np.vstack([postures, *ends])
+        for _ in range(ROUNDS):
+            tuned = tune_efforts(names, load(postures), self._wish, steps=steps, carried=carried)
+            tightest = extreme(partial(tightness, tuned=tuned, wish=self._wish), 3)
+            if keeps_margin(load(tightest[None]), tuned, self._wish):
+                break
+            postures = np.vstack([postures, tightest])
         self._refuse_hopeless(tuned)
         return tuned
 
@@ -224,12 +247,17 @@ class _Tuner:
         """The named ones, and some from the whole range of the joints."""
         start = self._start()
         rng = np.random.default_rng(0)
+        spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
+        return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+
+    def _range(self) -> tuple[Array, Array]:
+        """(n), (n) the least and the greatest of the joints."""
+        start = self._start()
         low, high = start - WIDE, start + WIDE
         for k, joint in enumerate(self._robot.moving_joints):
             low[k] = low[k] if joint.limits.lower is None else joint.limits.lower
             high[k] = high[k] if joint.limits.upper is None else joint.limits.upper
-        spread = [with_mimics(self._robot, q) for q in rng.uniform(low, high, (RANDOM_POSTURES, len(start)))]
-        return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+        return low, high
 
     def _start(self) -> Array:
         """`home`, if there is such a pose; other joints at zero, or as near to it as their limits let them."""

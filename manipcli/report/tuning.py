@@ -39,7 +39,8 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
     if simulated:
         lines.append("Simulated: the whole robot in the engine, with gravity, the other joints held by these gains.")
     lines.append(
-        f"Margin: all gains of the joint may grow by it at its smallest inertia; {MARGIN:g} is left to all together."
+        f"Margin: all gains of the joint may grow by it at its smallest inertia; {MARGIN:g} is left to all together, "
+        "in the tightest postures that were found."
     )
     weak = [one.joint for one in joints if one.interface == "effort" and one.damping < min(0.5, wish.damping)]
     if weak:
