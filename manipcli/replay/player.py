@@ -34,6 +34,7 @@ Reference = tuple[str, int, int]
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 """What a page of its own may do: nothing but itself."""
 LEVEL = 9
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(slots=True)
@@ -45,6 +46,9 @@ class _Pack:
 
     def add(self, values: npt.ArrayLike, kind: str) -> Reference:
         """`kind`: f float32, H uint16, I uint32, b int8."""
+        if kind == "f":
+            # What is larger than the browser's numbers is as large as they get.
+            values = np.clip(values, -_LARGEST, _LARGEST)
         array = np.ascontiguousarray(values, dtype={"f": "<f4", "H": "<u2", "I": "<u4", "b": "i1"}[kind])
         data = array.tobytes()
         reference = (kind, self.length, array.size)

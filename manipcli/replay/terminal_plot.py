@@ -80,7 +80,10 @@ def _unit(panel: Panel) -> str:
 
 def _field(chart: Chart, curves: Sequence[Curve], span: tuple[float, float], width: int, rows: int) -> list[Line]:
     """Curves over each other, with numbers at their left."""
-    low, high = span if span[1] > span[0] else (span[0] - 0.5, span[1] + 0.5)
+    low, high = span
+    if not high > low:
+        room = max(0.5, 1e-12 * abs(low))  # of a large number a half is nothing
+        low, high = low - room, high + room
     cells = np.zeros((rows, width), dtype=np.int64)
     owner = np.full((rows, width), -1)
     for k, curve in enumerate(curves):

@@ -16,6 +16,7 @@ _CUSTOMARY = {
     "m": ("mm", 1000.0),
     "m/s": ("mm/s", 1000.0),
 }
+_HUGE = 1e9
 _RATE = {"rad": "rad/s", "m": "m/s"}
 _EFFORT = {"rad": "N m", "m": "N"}
 
@@ -184,5 +185,7 @@ def _shown(value: float | None, unit: str) -> str:
 
 
 def _fixed(value: float, digits: int) -> str:
-    """Without the sign of what is rounded to zero."""
+    """Without the sign of what is rounded to zero; of what is no length or angle of this world, the power of ten."""
+    if abs(value) >= _HUGE:
+        return f"{value:.4g}"
     return f"{round(value, digits) + 0.0:.{digits}f}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -178,3 +179,16 @@ def test_several_logs_are_told_apart() -> None:
     assert head == ["log", "time", "a"]
     assert [row[0] for row in rows] == ["one"] * 3 + ["two"] * 3
     assert [float(row[2]) for row in rows] == [0.0, 0.001, 0.002, 1.0, 1.001, 1.002]
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0, -1.7e18, 1e300])
+def test_a_constant_is_a_line_however_large_it_is(value: float) -> None:
+    curve = Curve("c", "c", "", np.array([0.0, 1.0, 2.0]), np.full(3, value))
+    chart = Chart("log", (Panel("c", "c", "", (curve,)),), (), 0.0, 2.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        lines = [
+            "".join(piece.text for piece in line) for line in terminal_plot.render(chart, columns=80, colours=False)
+        ]
+    drawn = [line for line in lines if any(0x2800 < ord(letter) < 0x2900 for letter in line)]
+    assert len(drawn) == 1

@@ -6,6 +6,7 @@ import base64
 import json
 import re
 import time
+import warnings
 import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -157,6 +158,17 @@ def test_triangles_and_joints_are_those_of_the_run(playback: Playback) -> None:
     assert sorted(told["order"]) == list(range(len(drawing.frames)))
     for k, frame in enumerate(told["frames"]):
         assert place[frame.get("parent", 0)] <= place[k]
+
+
+def test_what_is_too_large_for_the_browser_is_as_large_as_its_numbers_get(playback: Playback) -> None:
+    effort = playback.effort.copy()
+    effort[3, 1] = 1e300
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        head, data, _ = _Elements(player_page(replace(playback, effort=effort))).scripts
+    (table,) = [one for one in json.loads(head)["curves"] if one["name"] == "joint effort"]
+    values = _array(table["values"], data).reshape(len(playback.times), -1)
+    assert np.isfinite(values[3]).all() and values[3].max() > 1e38
 
 
 def test_a_push_is_where_the_shapes_touch_and_towards_what_can_move(playback: Playback) -> None:
