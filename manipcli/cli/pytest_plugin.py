@@ -129,9 +129,6 @@ class TaskItem(pytest.Item):
         chosen = self.config.getoption("manipcli_logs") or FOLDER
         folder = Path(shown_path(self.config.invocation_params.dir / chosen))
         report = _run(self._case, self.path, _settings(self.config, folder))
-        tightest = report.tightest
-        if tightest is not None and tightest.margin is not None:
-            self.user_properties.append(("tightest", f"{tightest.name} {tightest.margin:.6g} {tightest.unit}".rstrip()))
         if not report.passed:
             raise TaskFailed(report)
         self.add_report_section("call", "margins", "\n".join(judged_lines(report)))

@@ -1,7 +1,8 @@
 """A verdict as JUnit XML, which continuous integration reads: a suite a task, a case a step and an expectation.
 
-There is no standard; what is written here is what the readers have in common (the schema of Ant's JUnit task, and
-`file` and `line`, by which GitLab, Jenkins and others point at a line). Times are simulated seconds.
+There is no standard; what is written here is what the readers have in common (the schema of Jenkins' xUnit plugin), and
+`file` and `line` of a case, by which GitLab and actions of GitHub point at a line, and which that schema does not know.
+Times are simulated seconds.
 """
 
 from __future__ import annotations
@@ -44,11 +45,11 @@ def render_junit(
         "tests": len(cases),
         "failures": sum(case.find("failure") is not None for case in cases),
         "errors": sum(case.find("error") is not None for case in cases),
-        "skipped": sum(case.find("skipped") is not None for case in cases),
     }
+    skipped = str(sum(case.find("skipped") is not None for case in cases))
     totals = {name: str(count) for name, count in counts.items()} | {"time": _seconds(verdict.simulated_time)}
     suites = Element("testsuites", {"name": "manipcli", **totals})
-    suite = SubElement(suites, "testsuite", {"name": _safe(verdict.task), **totals})
+    suite = SubElement(suites, "testsuite", {"name": _safe(verdict.task), **totals, "skipped": skipped})
     properties = SubElement(suite, "properties")
     seed = str(verdict.seed) if verdict.engine else ""  # without an engine the task could not be read
     told = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", seed), ("log", log))

@@ -210,7 +210,7 @@ def test_a_failure_tells_what_was_expected_and_how_to_see_it_again(project: pyte
     cases = {case.get("name"): case for case in parse(project.path / "out.xml").getroot().iter("testcase")}
     assert set(cases) == {"broken", "good", "late"}
     assert "duration: fails by" in str(cases["late"].findtext("failure"))
-    assert cases["good"].find("properties/property[@name='tightest']") is not None
+    assert not [case for case in cases.values() if case.find("properties") is not None]  # no schema has them
 
 
 @pytest.mark.slow

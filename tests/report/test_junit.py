@@ -36,7 +36,7 @@ FAILED = replace(
     text="step 'b' timeout: too slow",
 )  # fmt: skip
 ATTRIBUTES = {
-    "testsuites": {"name", "tests", "failures", "errors", "skipped", "time"},
+    "testsuites": {"name", "tests", "failures", "errors", "time"},
     "testsuite": {"name", "tests", "failures", "errors", "skipped", "time"},
     "properties": set(),
     "property": {"name", "value"},
