@@ -28,7 +28,7 @@ from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.flow.drives import drive_findings, driven_joints
-from manipcli.flow.grips import strained, too_soft, too_swift
+from manipcli.flow.grips import strained, too_light, too_soft, too_swift
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.flow.switches import active_in
@@ -71,6 +71,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
     found += too_swift(task)
     if plan is not None:
         found += strained(task, plan)
+        found += too_light(task, plan)
         found += too_soft(task, plan)
     rows = None if plan is None else _planned(task, plan)
     named = Postures.at_rest(named_postures(robot, start_position(task)))

@@ -96,3 +96,13 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
     assert float(felt[1]) == pytest.approx(5.0, rel=0.1)
     assert "felt" not in told_of([f"{gain}=840"])
     assert findings(load_task(pick, overrides=[f"{gain}=840"])) == ()
+
+
+@pytest.mark.slow
+def test_an_object_that_weighs_next_to_nothing_beside_the_grip_is_doubted(pick: Path) -> None:
+    """7 N are 75 times the weight of 9.5 g."""
+    assert findings(load_task(pick, overrides=["scene.block.mass=10 g"])) == ()
+    (found,) = findings(load_task(pick, overrides=["scene.block.mass=5 g"]))
+    assert (found.code, found.severity) == ("TASK239", "warning")
+    assert found.message.startswith("step 'pick_1': 7 N are 143 times what 'block' of 5 g weighs: it may creep")
+    assert (found.hint or "").startswith("a force below 3.68 N, or more mass")
