@@ -115,6 +115,9 @@ class Timeline:
         self._clock = clock
         self._current: PlaybackStep | None = None
         gui = server.gui
+        told = _judged(playback)
+        if told:
+            gui.add_markdown(told)
         self._caption = gui.add_markdown("")
         self._play = gui.add_button(PLAY)
         length = max(playback.end - playback.start, 1e-3)
@@ -165,6 +168,17 @@ class Timeline:
         name = self._playback.name if step is None else step.label
         what = f"**{_plain(name)}**" + (f" · {_plain(phase)}" if phase else "")
         return f"{what} — {now:.2f} of {self._playback.end:.2f} s"
+
+
+def _judged(playback: Playback) -> str:
+    """The verdict and why, and what is missing of the log, as Markdown."""
+    lines = []
+    if playback.verdict is not None:
+        word = playback.verdict.verdict
+        lines.append(f"**{'✓' if word == 'passed' else '✗'} {word}** {_plain(playback.verdict.text)}")
+    if playback.lost is not None:
+        lines.append(_plain(f"The log is not closed: {playback.lost}"))
+    return "\n\n".join([*lines, *(f"*{_plain(note)}*" for note in playback.notes)])
 
 
 def _plain(text: str) -> str:

@@ -177,6 +177,8 @@ def test_the_page_that_is_served_plays(browser: Page, playback: Playback) -> Non
         browser.open(replay.url)
         browser.wait_for("document.querySelector('canvas') !== null")
         start = _until(browser, _is_drawn)
+        assert playback.verdict is not None
+        browser.wait_for(f"document.body.innerText.includes({json.dumps(playback.verdict.text)})")
         chosen = playback.steps[2]
         assert browser.evaluate(f"{CLICK}({json.dumps(chosen.label)})")
         browser.wait_for(f"document.body.innerText.includes('{chosen.start:.2f} of')")
