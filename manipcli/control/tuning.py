@@ -5,6 +5,7 @@ d = 2 zeta I w - b; I is the largest inertia that the joint meets while the othe
 less. A joint that its friction slows down more than that, b > 2 I w, creeps after the reference at p / b: p = b w / 2.
 On a velocity interface the reference is followed with u = v + p e, p = w. Where it must be,
 
+- w is raised where the joint of a hand would press with less than all its effort, all the way through its travel;
 - w is lowered until the step asks for no more than what gravity leaves of the effort (or for no more than the
   velocity);
 - first zeta, down to `LEAST_DAMPING`, then w is lowered until all gains could be `MARGIN` times as large before the
@@ -145,7 +146,7 @@ class _Draft:
 
 
 def tune_efforts(
-    controllers: Sequence[str], load: Load, wish: Wish, *, steps: Array, carried: npt.NDArray[np.bool_]
+    controllers: Sequence[str], load: Load, wish: Wish, *, steps: Array, carried: npt.NDArray[np.bool_], pressing: Array
 ) -> tuple[Tuned, ...]:
     """Gains of all joints (k) on the effort interface.
 
@@ -155,18 +156,20 @@ def tune_efforts(
         wish: what is wanted.
         steps: (k) that do not saturate [rad or m].
         carried: (k) whether something else carries the weight, so that no integral is needed.
+        pressing: (k) the least p that is wanted, of joints that press on what they hold; 0 of others.
     """
     w = math.tau * wish.bandwidth
     inertia = load.held_inertia.max(axis=0)
     left = np.maximum(load.effort - np.abs(load.gravity).max(axis=0), 0.1 * load.effort)
     drafts = []
     for k in range(len(load.joints)):
-        draft = _Draft(float(inertia[k]), float(load.damping[k]), w, wish.damping, bool(carried[k]))
+        wanted = max(w, math.sqrt(float(pressing[k] / inertia[k])))
+        draft = _Draft(float(inertia[k]), float(load.damping[k]), wanted, wish.damping, bool(carried[k]))
         most = float(left[k] / steps[k])  # of p
         enough = math.sqrt(most / draft.inertia)
         if draft.friction:
             enough = min(enough, 2.0 * most / draft.friction)
-        if enough < w:
+        if enough < wanted:
             draft = replace(draft, w=enough, limit="effort")
         drafts.append(_calmed(load, k, draft, wish))
     _calm_together(load, drafts, wish)

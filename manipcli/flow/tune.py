@@ -172,6 +172,7 @@ class _Tuner:
         carried = np.array([each for _, _, each in loops])
         steps = np.array([self._step_of(joint) for joint in joints])
         names = [name for name, _, _ in loops]
+        pressing = np.array([self._pressing(name, joint) for name, joint, _ in loops])
 
         def load(q: Array) -> Load:
             return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
@@ -187,7 +188,7 @@ class _Tuner:
         ]
         postures = np.vstack([postures, *ends])
         for _ in range(ROUNDS):
-            tuned = tune_efforts(names, load(postures), self._wish, steps=steps, carried=carried)
+            tuned = tune_efforts(names, load(postures), self._wish, steps=steps, carried=carried, pressing=pressing)
             tightest = extreme(partial(tightness, tuned=tuned, wish=self._wish), 3)
             if keeps_margin(load(tightest[None]), tuned, self._wish):
                 break
@@ -239,6 +240,14 @@ class _Tuner:
                 )
             )
         return tuple(tuned)
+
+    def _pressing(self, controller: str, joint: str) -> float:
+        """p with which the joint of a hand gives its effort over its travel; 0 of others, and where one is unknown."""
+        spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
+        if not isinstance(spec, GripperSpec) or limits.lower is None or limits.upper is None:
+            return 0.0
+        effort = min((each for each in (limits.effort, spec.max_effort) if each), default=0.0)
+        return effort / (limits.upper - limits.lower) if limits.upper > limits.lower else 0.0
 
     def _step_of(self, joint: str) -> float:
         return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)

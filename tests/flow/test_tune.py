@@ -67,6 +67,23 @@ def test_gains_are_those_of_the_formulas(tmp_path: Path) -> None:
     assert one.predicted.overshoot == pytest.approx(math.exp(-math.pi * 0.7 / math.sqrt(1 - 0.49)), abs=0.005)
 
 
+@pytest.mark.parametrize(
+    ("bandwidth", "limit", "p"),
+    [(1.0, "", 40.0 / 4.0), (1.0, ", max_effort: 20", 20.0 / 4.0), (4.0, "", INERTIA * (2 * math.pi * 4.0) ** 2)],
+)
+def test_the_joint_of_a_hand_presses_with_its_effort_over_its_travel_at_least(
+    tmp_path: Path, bandwidth: float, limit: str, p: float
+) -> None:
+    robot, controllers = pendulum(tmp_path)
+    controllers.write_text(
+        f"controllers:\n  c: {{type: gripper, joints: [hinge], gains: {{hinge: {{p: 1}}}}{limit}}}\n"
+    )
+    (one,) = tune(robot, controllers, Wish(bandwidth, 1.0, 1e-3)).joints
+    assert one.p == pytest.approx(p, rel=5e-3)
+    assert one.d == pytest.approx(2.0 * math.sqrt(p * INERTIA), rel=5e-3)
+    assert one.frequency == pytest.approx(math.sqrt(p / INERTIA) / math.tau, rel=5e-3)
+
+
 def test_a_joint_whose_weight_nobody_carries_gets_an_integral_that_can(tmp_path: Path) -> None:
     control = "command_interface: effort, gains: {hinge: {p: 1}}"
     one = tuned(tmp_path, Wish(3.0, 1.0, 1e-3), axis="0 1 0", control=control)
