@@ -41,7 +41,10 @@ POINTING = 0.5
 
 
 class PlaceSpec(Model):
-    """Set down what is held: carry it above its place, lower it straight, let go, and withdraw, rising."""
+    """Set down what is held: carry it above its place, lower it straight, let go, and withdraw, rising.
+
+    It fails where the hand does not let go.
+    """
 
     object: str = Field(description="What is held and put down.")
     at: Literal["start"] | tuple[Length, Length] = Field(

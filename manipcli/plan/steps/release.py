@@ -19,7 +19,7 @@ from manipcli.spec.base import Model
 
 
 class ReleaseSpec(Model):
-    """The hand opens to a named pose and lets go."""
+    """The hand opens to a named pose and lets go; the step fails where something stops it, or it still holds."""
 
     posture: str = Field("open", description="The named pose that the hand opens to.")
 
