@@ -25,6 +25,7 @@ BODIES: dict[str, Any] = {
     "cup": {"cup": {"radius": 0.04, "height": 0.11, "wall": 0.01}, "mass": 0.15, "pose": {"xyz": [1, 0, 0.4]}},
     "ball": {"sphere": {"radius": 0.014}, "mass": 0.01, "inside": "cup"},
     "tray": {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [0.5, 0.5, 0]}, "fixed": True},
+    "dish": {"cup": {"radius": 0.1, "height": 0.06, "wall": 0.01}, "pose": {"xyz": [-1, 0, 0]}, "fixed": True},
     "stick": {"cylinder": {"radius": 0.01, "height": 0.2}, "mass": 0.1, "pose": {"xyz": [0, -1, 0.5]}},
 }
 FRAMES = {"drop": {"pose": {"xyz": [0, 0, 1]}}, "rim": {"parent": "cup", "pose": {"xyz": [0, 0, 0.11]}}}
@@ -155,6 +156,15 @@ def test_inside_a_round_hollow_is_the_depth_of_the_centre(p: tuple[float, float,
     assert margin("inside", ball_at(*p), object="ball", of="cup") == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("of", "deepest"), [("tray", (0.5, 0.5, 0.03)), ("cup", (1.0, 0.0, 0.46)), ("dish", (-1.0, 0.0, 0.035))]
+)
+def test_at_the_greatest_depth_of_a_hollow_the_relative_margin_is_one(of: str, deepest: tuple[float, ...]) -> None:
+    x, y, z = deepest
+    assert read("inside", ball_at(x, y, z), object="ball", of=of).relative == pytest.approx([1.0])
+    assert read("outside", ball_at(x, y, z), object="ball", of=of).relative == pytest.approx([-1.0])
+
+
 def test_inside_follows_a_container_that_is_carried_and_tilted() -> None:
     X_WC = Transform.of(xyz=(2.0, 1.0, 0.7), rpy=(0.3, 1.2, -0.4))
     held = X_WC.apply([0.012, 0.016, 0.05])
@@ -252,6 +262,13 @@ def test_above_is_the_gap_or_the_way_to_the_edge(pose: Transform, by: float, exp
     found = read("above", state(poses={"cup": pose}), object="cup", of="tray", by=by)
     assert found.margins == pytest.approx([expected], abs=1e-12)
     assert found.found(0).text == text
+
+
+@pytest.mark.parametrize("z", [0.01, 0.15, 0.9])
+def test_above_is_compared_to_half_of_the_lesser_side(z: float) -> None:
+    """Of a tray of 0.3 m by 0.2 m: with the centre over its middle, that far above is the most there is, 1."""
+    found = read("above", state(poses={"cup": Transform.of(xyz=(0.5, 0.5, 0.05 + z))}), object="cup", of="tray")
+    assert found.relative == pytest.approx([min(z / 0.1, 1.0)])
 
 
 def test_above_looks_at_what_is_lowest_of_what_lies() -> None:

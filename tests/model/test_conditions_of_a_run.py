@@ -139,6 +139,27 @@ def test_rests_on_is_the_share_of_the_weight() -> None:
     assert found.found(0).text == "'cube' presses on 'desk' with 19.6 N; at least 9.81 N of its weight of 19.6 N"
 
 
+@pytest.mark.parametrize("share", [0.5, 0.1, 1.0])
+def test_what_rests_on_nothing_is_its_whole_share_short(share: float) -> None:
+    wanted = share * 2.0 * 9.81
+    pressed = touching((0.5, [("cube", "desk", wanted)]), (0.75, [("cube", "desk", 3 * wanted)]))
+    found = read("rests_on", pressed, object="cube", of="desk", share=share)
+    assert found.relative[[0, 75]] == pytest.approx([-1.0, 2.0])
+
+
+def test_rests_on_adds_up_what_the_two_touch_with_and_nothing_else() -> None:
+    held = touching((0.0, [("cube", "desk", 3.0), *GRIP, ("desk", "cube", 4.0), ("desk", "robot/one", 50.0)]))
+    assert read("rests_on", held, object="cube", of="desk", share=0.25).margins[0] == pytest.approx(7.0 - 0.5 * 9.81)
+
+
+def test_a_weight_is_that_in_the_gravity_of_the_scene() -> None:
+    """On the moon, and on a table that is tilted: the size of the gravity counts."""
+    condition: Condition[Any] = CONDITIONS["rests_on"]
+    world = replace(WORLD, scene=replace(SCENE, gravity=frozen([0.6, 0.0, -0.8 * 2.0])))
+    found = condition.open(condition.spec(object="cube", of="desk"), world)(touching((0.0, [("cube", "desk", 3.0)])))
+    assert found.margins[0] == pytest.approx(3.0 - 0.5 * 2.0 * np.hypot(0.6, 1.6))
+
+
 def test_contact_force_sums_up_and_is_bounded_on_both_sides() -> None:
     moments = touching((0.0, [("cube", "desk", 19.6), *GRIP]), (0.5, GRIP))
     pair = {"pair": ["robot", "cube"]}
@@ -269,6 +290,16 @@ def test_tracking_errs_the_short_way_round_and_rests_while_nobody_is_active() ->
     assert found.idle == "no controller of joint 'j1' was active"
     assert read("tracking", moments, group="endless", within=0.05).margins[-1] == pytest.approx(0.03)
     assert read("tracking", moments, group="all", within=0.05).found(50).unit == "rad"
+
+
+def test_a_joint_on_its_reference_has_all_of_its_tolerance_left() -> None:
+    """Wherever that is; and beside it, what is left is the same on both sides."""
+    reference = np.ones((T, 3))
+    reference[50], reference[51] = 1.02, 0.98
+    moments = replace(still(position=np.ones((T, 3))), references=(Reference(ROBOT.joint_names, reference),))
+    for group in ("arm", "all", "endless"):
+        found = read("tracking", moments, group=group, within=0.05)
+        assert found.margins[[0, 50, 51]] == pytest.approx([0.05, 0.03, 0.03])
 
 
 def test_tracking_of_a_joint_without_a_controller_cannot_be_judged() -> None:

@@ -28,6 +28,7 @@ def gauge(spec: RestsOnSpec, world: World) -> Gauge:
     """The normal force between the two minus `share` m g [N], g the scene's gravity.
 
     Contacts are known by their normal force alone: what is pressed against a wall hard enough rests on it, too.
+    Where units differ, the margin is compared to that share.
     """
     weight = world.scene.body(spec.object).mass * float(np.linalg.norm(world.scene.gravity))
     wanted = spec.share * weight
