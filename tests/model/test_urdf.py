@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import time
+from itertools import pairwise
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
@@ -224,12 +227,43 @@ def test_thousands_of_links_and_of_mimics_are_read_in_no_time(tmp_path: Path) ->
     assert time.process_time() - began < 5.0
 
 
-def test_joints_come_depth_first_whatever_the_order_of_the_file(tmp_path: Path) -> None:
-    def fixed(name: str, parent: str, child: str) -> str:
-        return f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.permutations("abcdefg"), st.integers(0, 3), st.randoms(use_true_random=False))
+def test_links_of_the_smaller_tree_are_named_and_no_others(
+    tmp_path: Path, order: list[str], shape: int, random: Random
+) -> None:
+    """Two trees, of four links under a and three under e, in any order."""
+    parent = {"b": "a", "c": "ab"[shape % 2], "d": "abc"[shape % 3], "f": "e", "g": "ef"[shape // 2]}
+    joints = [_fixed(f"j{child}", above, child) for child, above in parent.items()]
+    random.shuffle(joints)
+    links = "".join(f'<link name="{name}"/>' for name in order)
+    (found,) = errors(tmp_path, f'<robot name="r">{links}{"".join(joints)}</robot>')
+    assert found.code == "URDF007"
+    named = found.message.split("not reached from 'a': ")[1]
+    assert sorted(re.findall(r"\b[a-g]\b", named)) == ["e", "f", "g"]
+    assert found.hint == "join 'e' to 'a' with a fixed joint, or delete it"
 
+
+@pytest.mark.parametrize("order", ["abcd", "dcba", "cadb"])
+def test_a_loop_is_told_parents_first(tmp_path: Path, order: str) -> None:
+    """The loop b -> c -> d -> b, with a hanging on it."""
+    parent = {"c": "b", "d": "c", "b": "d", "a": "c"}
+    links = "".join(f'<link name="{name}"/>' for name in order)
+    joints = "".join(_fixed(f"j{child}", parent[child], child) for child in order)
+    (found,) = errors(tmp_path, f'<robot name="r">{links}{joints}</robot>')
+    told = found.message.removeprefix("links form a loop: ").split(" -> ")
+    assert told[0] == told[-1]
+    assert sorted(told[1:]) == ["b", "c", "d"]
+    assert all(parent[child] == above for above, child in pairwise(told))
+
+
+def _fixed(name: str, parent: str, child: str) -> str:
+    return f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+
+
+def test_joints_come_depth_first_whatever_the_order_of_the_file(tmp_path: Path) -> None:
     links = "".join(f'<link name="{name}"/>' for name in "edcba")
-    joints = fixed("4", "c", "d") + fixed("3", "a", "c") + fixed("2", "b", "e") + fixed("1", "a", "b")
+    joints = _fixed("4", "c", "d") + _fixed("3", "a", "c") + _fixed("2", "b", "e") + _fixed("1", "a", "b")
     parts = read(tmp_path, f'<robot name="r">{links}{joints}</robot>')
     assert [joint.name for joint in parts.joints] == ["3", "4", "1", "2"]
     assert [link.name for link in parts.links] == ["a", "c", "d", "b", "e"]
