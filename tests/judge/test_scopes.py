@@ -285,3 +285,15 @@ def test_the_condition_itself_is_a_value_of_a_model() -> None:
         "always", "not", ["near"],
     )  # fmt: skip
     assert isinstance(spec.condition.members[0].body, Model)
+
+
+@pytest.mark.parametrize(("worst", "told"), [(40, ""), (90, "; broken at t = 0.400 s")])
+def test_a_watch_that_is_broken_at_its_worst_moment_tells_it_once(worst: int, told: str) -> None:
+    margins = np.where(np.arange(T) < 40, 0.5, -0.1)
+    margins[worst] = -0.3
+    task = {"task": "t", "robot": "r", "controllers": "c", "steps": [{"wait": "1 s"}], "watch": [{"always": NEAR}]}
+    (found,) = judge(
+        recording(margins), expect=task_spec().model_validate(task).watch, robot=ROBOT, scene=SCENE
+    ).expectations
+    assert (found.outcome, found.at, found.margin) == ("failed", TIMES[worst], pytest.approx(-0.3))
+    assert found.text.endswith(told) and found.text.count("broken at") == bool(told)
