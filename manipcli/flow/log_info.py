@@ -10,6 +10,7 @@ from manipcli.record import channels
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
 from manipcli.record.inventory import inventory
+from manipcli.record.namespaces import meant
 from manipcli.record.reading import open_recording
 from manipcli.report.log_info import LogInfo
 
@@ -44,6 +45,7 @@ def log_info(path: Path) -> LogInfo:
                 missing.append("the run did not come to its end: the log has no status and no verdict")
     else:
         missing.append("manipcli did not write it: it tells of no task, no steps and no verdict")
-        there = {topic.name for topic in found.topics if topic.messages}
+        known = meant({topic.name: topic.type for topic in found.topics})
+        there = {known[topic.name].usual for topic in found.topics if topic.messages and topic.name in known}
         missing += [f"there is no {topic}" for topic in COMMON if topic not in there]
     return LogInfo(inventory=found, ours=ours, steps=steps, missing=tuple(missing))

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform
 from manipcli.flow.log import URDF
-from manipcli.flow.log_info import COMMON
 from manipcli.model.located_xml import element_of, parse_document
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
@@ -136,9 +135,9 @@ def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, 
 def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
     start = found.start or 0.0
     taken = snapshot(path, found, start + time)
-    missing = [f"there is no {topic}" for topic in COMMON if topic not in {t.name for t in found.topics if t.messages}]
+    missing = [f"there is no {topic}" for topic in taken.lacks]
     missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
-    units = _units(taken.urdf.encode()) if taken.urdf else {}
+    units = {before + name: unit for before, urdf in taken.urdf.items() for name, unit in _units(urdf.encode()).items()}
     newest = [sample.time for sample in taken.joints.values()] + [sample.time for sample in taken.frames.values()]
     return Moment(
         log=str(path),

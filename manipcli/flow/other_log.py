@@ -5,7 +5,7 @@ What is missing is said and done without: joints that no `/joint_states` names a
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -24,11 +24,12 @@ from manipcli.model.packages import Unread
 from manipcli.model.robot import Joint, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.model.urdf import read_parts
-from manipcli.record import channels, schemas
+from manipcli.record import channels
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.columns import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
+from manipcli.record.namespaces import TYPES, meant
 from manipcli.record.scan import METADATA, Scan
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
@@ -38,13 +39,6 @@ LEAST_STEADY = 1e-6
 """[m], and of a quaternion's parts: a frame that moves by less stands still."""
 MAX_TIMES = 200_000
 """Of what is shown: more than an hour at the usual rate."""
-
-TYPES = {
-    channels.ROBOT_DESCRIPTION: schemas.STRING,
-    channels.JOINT_STATES: schemas.JOINT_STATE,
-    channels.TF: schemas.TF_MESSAGE,
-    channels.TF_STATIC: schemas.TF_MESSAGE,
-}
 
 
 def is_own(path: Path) -> bool:
@@ -111,19 +105,22 @@ class _Log:
         self.joints: dict[str, _Samples] = {}
         self.frames: dict[tuple[str, str], _Samples] = {}
         self.start, self.end = np.inf, -np.inf
-        wanted = {name for name, kind in TYPES.items() if name in topics.all and topics.all[name].type == kind}
-        self.lacks = [name for name in TYPES if name not in wanted and name != channels.TF_STATIC]
+        known = meant({name: topic.type for name, topic in topics.all.items()})
+        self.spaces = sorted({one.namespace for one in known.values() if one.namespace})
+        # Of several robots none is meant; of one alone, in whatever namespace, it is.
+        wanted = {name: one.usual for name, one in known.items() if not one.namespace or len(self.spaces) == 1}
+        self.lacks = [name for name in TYPES if name not in wanted.values() and name != channels.TF_STATIC]
         begin = self._first(topics, wanted)
         for topic, data, places in topics.messages(wanted):
             try:
                 for ns, reader in singly(data, places):
-                    self._take(topic, (ns - begin) / 1e9, reader)
+                    self._take(wanted[topic], (ns - begin) / 1e9, reader)
             except CdrError as error:
                 raise BadRecording(topics.path, f"{topic} cannot be read: {error}") from error
 
-    def _first(self, topics: Topics, wanted: Collection[str]) -> int:
+    def _first(self, topics: Topics, wanted: Mapping[str, str]) -> int:
         """[ns] when what moves begins: a description may be from long before."""
-        moving = [topics.all[name] for name in (channels.JOINT_STATES, channels.TF) if name in wanted]
+        moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
         return min((one.first for one in moving if one.count), default=topics.start)
 
     def _take(self, topic: str, time: float, reader: CdrReader) -> None:
@@ -181,7 +178,10 @@ def open_other(
     notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
     notes += [f"it has no {name} ({TYPES[name]})" for name in log.lacks]
     if not np.isfinite(log.start):
-        message = f"{path.name}: nothing to show: it has neither {channels.JOINT_STATES} nor {channels.TF}"
+        what = f"it has neither {channels.JOINT_STATES} nor {channels.TF}"
+        if len(log.spaces) > 1:
+            what = f"it tells of several robots, in {listed(log.spaces)}"
+        message = f"{path.name}: nothing to show: {what}"
         hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
         raise InvalidInput([Finding("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))

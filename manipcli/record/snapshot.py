@@ -7,17 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from manipcli.record import channels as topics
-from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.inventory import Inventory
+from manipcli.record.namespaces import TYPES, Meant, meant
 from manipcli.record.salvage import OpenChunk, Salvage
-
-_TYPES = {
-    topics.ROBOT_DESCRIPTION: schemas.STRING,
-    topics.JOINT_STATES: schemas.JOINT_STATE,
-    topics.TF: schemas.TF_MESSAGE,
-    topics.TF_STATIC: schemas.TF_MESSAGE,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +34,16 @@ class FrameSample:
 
 @dataclass(slots=True)
 class Snapshot:
-    """What was known at a moment, by name; `urdf`: /robot_description; `unread`: why messages were left out."""
+    """What was known at a moment, by name; of several robots, joints have their namespaces before their names.
+
+    `urdf`: each /robot_description, by what stands before the names of its joints; `lacks`: usual topics without a
+    message; `unread`: why messages were left out.
+    """
 
     joints: dict[str, JointSample] = field(default_factory=dict)
     frames: dict[str, FrameSample] = field(default_factory=dict)
-    urdf: str | None = None
+    urdf: dict[str, str] = field(default_factory=dict)
+    lacks: tuple[str, ...] = ()
     unread: dict[str, None] = field(default_factory=dict)
 
 
@@ -59,13 +57,16 @@ def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
 
     # A time since 1970 in nanoseconds has more digits than a double.
     limit = round(time * 1e9) + 512
-    taken = Snapshot()
-    names: dict[int, str] = {}
     types = {topic.name: topic.type for topic in found.topics}
+    known = meant(types)
+    told = {known[topic.name].usual for topic in found.topics if topic.messages and topic.name in known}
+    taken = Snapshot(lacks=tuple(usual for usual in TYPES if usual not in told and usual != topics.TF_STATIC))
+    several = len({one.namespace for one in known.values() if one.usual == topics.JOINT_STATES}) > 1
+    names: dict[int, str] = {}
     for piece in Salvage(path):
         if isinstance(piece, records.Channel):
             names[piece.id] = piece.topic
-            expected = _TYPES.get(piece.topic)
+            expected = TYPES.get(known[piece.topic].usual if piece.topic in known else piece.topic)
             if expected is not None and (types.get(piece.topic) != expected or piece.message_encoding != "cdr"):
                 del names[piece.id]
                 kind = f"{types.get(piece.topic) or 'an unknown type'}, {piece.message_encoding or 'no encoding'}"
@@ -73,25 +74,26 @@ def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
         elif isinstance(piece, OpenChunk) and piece.start_ns <= limit:
             for channel, places in piece.places.items():
                 topic = names.get(channel, "")
-                if topic not in _TYPES:
+                if topic not in known:
                     continue
                 for ns, start, length in zip(places.times, places.starts, places.lengths, strict=True):
                     if ns > limit:
                         continue
                     try:
-                        _take(taken, topic, int(ns), CdrReader(piece.data[start : start + length]))
+                        _take(taken, known[topic], several, int(ns), CdrReader(piece.data[start : start + length]))
                     except CdrError as error:
                         taken.unread[f"a message of {topic} {error}"] = None
     return taken
 
 
-def _take(taken: Snapshot, topic: str, ns: int, reader: CdrReader) -> None:
+def _take(taken: Snapshot, topic: Meant, several: bool, ns: int, reader: CdrReader) -> None:
     time = ns / 1e9
-    if topic == topics.ROBOT_DESCRIPTION:
-        taken.urdf = reader.text()
-    elif topic == topics.JOINT_STATES:
+    before = f"{topic.namespace.removeprefix('/')}/" if several and topic.namespace else ""
+    if topic.usual == topics.ROBOT_DESCRIPTION:
+        taken.urdf[before] = reader.text()
+    elif topic.usual == topics.JOINT_STATES:
         reader.header()
-        names = reader.texts()
+        names = [before + name for name in reader.texts()]
         values = [_doubles(reader) for _ in range(3)]
         for k, name in enumerate(names):
             known = taken.joints.get(name)

@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import matrix_from_quat
 from manipcli.flow.mesh_search import MeshSearch
+from manipcli.flow.moment import moment
 from manipcli.flow.replay import open_playback
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.model.robot import Mesh
@@ -238,21 +239,23 @@ def _foreign(
     joints: tuple[str, ...] = ("turn", "push"),
     tf: bool = True,
     gaps: bool = False,
+    spaces: tuple[str, ...] = ("",),
 ) -> Path:
     """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by.
-    With `gaps` the second joint comes late, and the first is NaN for a while."""
+    With `gaps` the second joint comes late, and the first is NaN for a while. `spaces`: before the names of topics."""
     message = TYPES.types
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start("ros2")
         ids: dict[str, int] = {}
 
-        def put(topic: str, kind: str, ns: int, content: object) -> None:
-            if topic not in ids:
-                schema = writer.register_schema(kind, "ros2msg", schema_text(kind).encode())
-                ids[topic] = writer.register_channel(topic, "cdr", schema)
+        def put(usual: str, kind: str, ns: int, content: object) -> None:
             data = bytes(TYPES.serialize_cdr(content, kind))
-            writer.add_message(ids[topic], log_time=ns, publish_time=ns, data=data)
+            for topic in (space + usual for space in spaces):
+                if topic not in ids:
+                    schema = writer.register_schema(kind, "ros2msg", schema_text(kind).encode())
+                    ids[topic] = writer.register_channel(topic, "cdr", schema)
+                writer.add_message(ids[topic], log_time=ns, publish_time=ns, data=data)
 
         def header(ns: int, frame: str) -> object:
             stamp = message["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
@@ -331,6 +334,25 @@ def test_what_a_log_does_not_say_is_no_curve(tmp_path: Path) -> None:
     np.testing.assert_allclose(shown.stance[~late, 1], 0.05, atol=1e-6)
     assert np.isfinite(shown.poses().position).all()
     assert any("shown as they were before" in note and "turn" in note and "push" in note for note in shown.notes)
+
+
+def test_a_robot_in_a_namespace_is_the_one_that_is_shown(tmp_path: Path) -> None:
+    whole = open_playback(_foreign(tmp_path / "bag.mcap"), rate=10.0)
+    path = _foreign(tmp_path / "space.mcap", spaces=("/cell/r1",))
+    shown = open_playback(path, rate=10.0)
+    np.testing.assert_array_equal(shown.position, whole.position)
+    assert shown.notes == whole.notes
+    assert moment(path, 5.5).joints == moment(tmp_path / "bag.mcap", 5.5).joints
+
+
+def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path: Path) -> None:
+    path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"))
+    joints = {joint.name: joint for joint in moment(path, 5.5).joints}
+    assert list(joints) == ["r1/turn", "r1/push", "r2/turn", "r2/push"]
+    assert [joint.unit for joint in joints.values()] == ["rad", "m", "rad", "m"]
+    assert joints["r2/turn"].position == pytest.approx(np.sin(0.5))
+    with pytest.raises(InvalidInput, match="several robots, in /r1"):
+        open_playback(path)
 
 
 def test_steps_that_never_began_are_counted(tmp_path: Path) -> None:
