@@ -225,27 +225,6 @@ def test_a_slow_controller_is_updated_at_its_own_rate_from_its_activation_on(act
     assert slow.periods == pytest.approx([4 * PERIOD] * len(slow.updates))
 
 
-def test_gravity_is_added_at_the_updates_of_a_slow_controller_whenever_it_was_activated():
-    class Gravity:
-        def serve(self, controllers):
-            self.served = controllers
-
-        def add(self, tick, position, velocity):
-            for controller, _, every, first in self.served:
-                if (tick - first) % every == 0:
-                    controller.output.command[:] += 5.0
-
-    slow = Spring("slow", feed_forward="gravity")
-    manager = ControllerManager(joints=JOINTS, period=PERIOD, feed_forward=Gravity())
-    manager.load(slow, update_rate=250.0)
-    manager.configure("slow")
-    for tick in range(12):
-        if tick == 3:
-            manager.switch(["slow"])
-        command = manager.update(tick * PERIOD, World())
-        assert command.effort.tolist() == ([6.0] * 3 if tick >= 3 else [0.0] * 3)
-
-
 @pytest.mark.parametrize(("rate", "ticks"), [(1000.0, 1), (500.0, 2), (100.0, 10), (1.0, 1000)])
 def test_an_update_rate_is_a_whole_fraction_of_the_control_rate(rate, ticks):
     assert ticks_between(rate, PERIOD) == ticks

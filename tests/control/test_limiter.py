@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from manipcli.control import JointLimiter, NotFinite, limit_effort, limit_position, limit_velocity
 from manipcli.control.command import JointCommand
@@ -100,6 +102,53 @@ def test_a_position_planned_to_the_limits_goes_through_as_it_is():
         limiter.apply(command, np.zeros(1), np.zeros(1), dt)
         assert command.position[0] == value
     assert limiter.saturations[0] == 0
+
+
+@pytest.mark.parametrize("acceleration", [None, 1e4])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_velocity_within_all_its_limits_stops_at_those_of_the_position(acceleration, way):
+    """0.1 m before the limit at 1 m/s: there after 100 ticks of 1 ms, and there to stay."""
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10, acceleration)]), JointCommand(1)
+    command.obey(["velocity"])
+    q, v = np.array([0.9 * way]), np.array([way])
+    for tick in range(400):
+        command.velocity[:] = way
+        limiter.apply(command, q, v, 0.001)
+        v = command.velocity.copy()
+        q = q + 0.001 * v
+        assert way * q[0] <= 1.0 + 1e-12
+        assert v[0] == way or tick >= 99
+    assert q[0] == pytest.approx(way)
+    assert 299 <= limiter.saturations[0] <= 301
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-100.0, 100.0))
+def test_no_velocity_leads_beyond_a_position_limit_within_a_tick(q, velocity):
+    """By closed form: it is cut to what is left of the way, and to nothing else."""
+    limiter, command = JointLimiter([JointLimits(-1.0, 1.0)]), JointCommand(1)
+    command.obey(["velocity"])
+    command.velocity[:] = velocity
+    limiter.apply(command, np.array([q]), np.zeros(1), DT)
+    assert command.velocity[0] == pytest.approx(min(max(velocity, (-1.0 - q) / DT), (1.0 - q) / DT), abs=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["velocity", "position"])
+def test_after_a_reset_a_command_is_limited_as_by_a_new_limiter(mode):
+    """From what is measured, and from nothing that was commanded before."""
+    limits = [JointLimits(-1, 1, 2, 10, 5)]
+    used, new, command = JointLimiter(limits), JointLimiter(limits), JointCommand(1)
+    command.obey([mode])
+    for _ in range(20):
+        getattr(command, mode)[:] = 0.9
+        used.apply(command, np.zeros(1), np.zeros(1), DT)
+    assert used.saturations[0] > 0
+    used.reset()
+    told = []
+    for limiter in (used, new):
+        getattr(command, mode)[:] = -0.9
+        limiter.apply(command, np.full(1, -0.2), np.zeros(1), DT)
+        told.append((getattr(command, mode)[0], limiter.saturations[0], limiter.saturated[0]))
+    assert told[0] == told[1]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

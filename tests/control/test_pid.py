@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from manipcli.control.pid import Pid
 from manipcli.core.errors import InvalidArgument
@@ -198,6 +200,16 @@ def test_errors_inside_the_deadband_are_not_integrated(compat):
     assert pid.i_term == pytest.approx([0.0])
     run(pid, [0.2])
     assert pid.i_term == pytest.approx([0.2])
+
+
+@pytest.mark.parametrize("compat", ["ros1", "ros2"])
+@given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=8), st.floats(0.0, 0.8))
+def test_opposite_errors_are_commanded_the_opposite(compat, errors, deadband):
+    """The deadband, too, has two sides."""
+    one, other = (Pid(p=2.0, i=3.0, d=0.5, error_deadband=deadband, compat=compat) for _ in range(2))
+    assert run(one, errors) == pytest.approx([-u for u in run(other, [-e for e in errors])])
+    assert one.i_term == pytest.approx(-other.i_term)
+    assert one.i_term == pytest.approx([3.0 * sum(e for e in errors if abs(e) > deadband)])
 
 
 def test_a_change_of_gain_makes_no_step():

@@ -93,3 +93,12 @@ def test_a_joint_beyond_its_limit_comes_back_but_goes_no_farther():
 def test_a_joint_without_limits_needs_none():
     samples = stop(transitions([JointLimits(acceleration=2.0), JointLimits(acceleration=1.0)]), [5.0, 0.0], [2.0, 2.0])
     assert samples[-1, POSITION] == pytest.approx([7.0, 2.0])
+
+
+def test_where_one_joint_says_a_deceleration_each_stops_by_its_own():
+    """v^2 / (2 a): of the others, a is their limit."""
+    constraints = ConstraintsSpec(joints={"a": JointConstraintSpec(max_deceleration_on_cancel=0.5)})
+    made = transitions([JointLimits(acceleration=4.0)] * 3, constraints=constraints)
+    rates = np.array([1.0, -2.0, 1.0])
+    samples = stop(made, [0.0, 0.0, 0.0], rates)
+    assert samples[-1, POSITION] == pytest.approx(rates * np.abs(rates) / (2 * np.array([0.5, 4.0, 4.0])))

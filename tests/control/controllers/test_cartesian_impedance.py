@@ -185,6 +185,33 @@ def test_a_pose_preempts_a_trajectory_and_a_trajectory_a_pose():
     assert second.status == "succeeded"
 
 
+def test_a_pose_is_forgotten_when_the_controller_is_deactivated():
+    """Displaced meanwhile, it holds where it is then; the pose before would pull with 90 N and more."""
+    arm, controller = Arm(BENT, 1e-3), make()
+    R, p, _ = arm.tool()
+    controller.set_pose(Transform(R=R, p=p))
+    arm.step(controller)
+    controller.deactivate(arm.time)
+    moved = BENT + 0.2
+    arm.q[arm.columns] = moved
+    output = controller.update(arm.time, 1e-3, arm.state)
+    np.testing.assert_allclose(output.command, 0.0, atol=1e-9)
+    np.testing.assert_allclose(output.position, moved)
+    # Neither the pose nor the posture that was held with it, which a new pose would hold again.
+    R, p, _ = arm.tool()
+    controller.set_pose(Transform(R=R, p=p))
+    np.testing.assert_allclose(controller.update(arm.time, 1e-3, arm.state).command, 0.0, atol=1e-9)
+
+
+def test_a_goal_that_a_pose_preempts_ends_at_the_time_of_the_pose():
+    arm, controller = Arm(BENT, 1e-3), make()
+    handle = controller.send_goal(line(BENT + 0.1))
+    for _ in range(8):
+        arm.step(controller)
+    controller.set_pose(Transform.identity())
+    assert handle.result.time == pytest.approx(0.007)
+
+
 def test_at_the_end_it_holds_as_the_joint_trajectory_controller_would():
     """References are the same, tick by tick."""
     arm, controller = Arm(BENT, 1e-3), make()

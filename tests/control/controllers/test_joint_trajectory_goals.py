@@ -327,6 +327,55 @@ def test_speed_scales_the_reference_as_time_does():
         assert output.command == pytest.approx(0.5 * whole.sample(s + 0.5 * PERIOD)[1])
 
 
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_a_goal_that_replaces_another_begins_with_its_velocity_and_acceleration_at_any_speed(speed):
+    """Real ones: as those of a controller whose goal is not replaced."""
+    new, same = made("position", "velocity", "acceleration"), made("position", "velocity", "acceleration")
+    for controller in (new, same):
+        run(controller, 1)
+        controller.set_speed_scaling(speed)
+        controller.send_goal(to(at(1.0, 1.0, 0.0, 0.0)))
+        run(controller, 20, first=1)
+    new.send_goal(to(at(2.0, 1.0, 0.0, 0.0)))
+    replaced, going_on = (controller.update(21 * PERIOD, PERIOD, state()) for controller in (new, same))
+    assert abs(going_on.acceleration[0]) > 0.5
+    np.testing.assert_allclose(replaced.rows[:3], going_on.rows[:3])
+
+
+def test_after_a_cancel_no_error_changes_the_way_to_rest():
+    """The path tolerance was that of the goal."""
+    joints = {"j": JointConstraintSpec(trajectory=0.1, max_deceleration_on_cancel=2.0)}
+    controller = made(constraints=ConstraintsSpec(joints=joints))
+    run(controller, 1)
+    handle = controller.send_goal(to(at(10.0, 10.0)))
+    run(controller, 9, first=1)
+    handle.cancel()
+    rows = run(controller, 100, first=10, measured=state(-3.0))
+    assert rows[-1, 1] - rows[0, 1] == pytest.approx(1.0 / (2 * 2.0))
+    assert np.diff(rows[:50, 2]) / PERIOD == pytest.approx(-2.0)
+    assert (handle.status, handle.result.code) == ("canceled", ErrorCode.SUCCESSFUL)
+
+
+def test_a_continuous_joint_goes_the_short_way_beside_others_that_do_not():
+    """In a goal of all joints, and in one that leaves some out."""
+    joints, there = ("j", "wheel", "k"), {"j": 3.0, "wheel": -3.1, "k": 3.0}
+    for names in (joints, joints[:2]):
+        controller = JointTrajectoryController(
+            name="arm", joints=joints, command_interfaces=("position",), allow_partial_joints_goal=True,
+            types=["revolute", "continuous", "revolute"],
+        )  # fmt: skip
+        now = JointState(np.array([-3.1, 3.1, -3.1]), np.zeros(3), np.zeros(3))
+        controller.update(0.0, PERIOD, now)
+        handle = controller.send_goal(to(TrajectoryPoint([there[name] for name in names], 0.1), names=names))
+        for k in range(1, 12):
+            output = controller.update(k * PERIOD, PERIOD, now)
+        held = 3.0 if "k" in names else -3.1
+        assert output.position == pytest.approx([3.0, 2 * math.pi - 3.1, held])
+        now = JointState(np.array([3.0, -3.1, held]), np.zeros(3), np.zeros(3))
+        controller.update(12 * PERIOD, PERIOD, now)
+        assert handle.feedback().error == pytest.approx([0.0, 0.0, 0.0])
+
+
 def test_feedback_tells_the_next_point_and_both_states():
     controller = made()
     run(controller, 1)
