@@ -179,8 +179,10 @@ def test_a_hand_that_never_comes_to_an_end_is_given_up(
         engine.state.velocity[1:] = 1.0 if engine.tick % 40 < 20 else -1.0
 
     session = session_of(scripted(swing))
-    end = Executor(session).run(close(), until=None, deadline=None)
+    handles: list[Any] = []
+    end = Executor(session, told=lambda _, one: handles.append(one)).run(close(), until=None, deadline=None)
     assert end.outcome == "timeout"
+    assert [handle.status for handle in handles] == ["canceled"]
     assert session.time == pytest.approx(0.2 + 2.0, abs=0.002)
     assert "misses it by 0.9" in end.text
 
@@ -226,6 +228,29 @@ def test_a_joint_that_fails_takes_the_rest_of_the_motion_with_it(session_of: Ses
     both = Motion("both", move().trajectory, close().grip, 0.5)
     assert executor.run(both, until=None, deadline=None).outcome == "failed"
     assert [handle.status for handle in handles] == ["aborted", "canceled"]
+
+
+def test_a_controller_that_fails_stops_the_motions_of_the_others(session_of: SessionOf) -> None:
+    """The hand has no goal; the arm, which would go on moving, is canceled and comes to rest."""
+    session = session_of()
+    hand = session.manager.serving(("knuckle", "tip"))
+    update = hand.update
+
+    def broken(time: float, *measured: Any, **more: Any) -> Any:
+        if time >= 0.25:
+            raise ZeroDivisionError
+        return update(time, *measured, **more)
+
+    hand.update = broken  # type: ignore[method-assign]
+    handles: list[Any] = []
+    executor = Executor(session, told=lambda _, handle: handles.append(handle))
+    end = executor.run(move(), until=None, deadline=None)
+    assert end.outcome == "failed"
+    assert "controller 'hand' failed" in end.text
+    assert [handle.status for handle in handles] == ["canceled"]
+    executor.hold(0.2)
+    assert session.engine.read().velocity[0] == 0.0
+    assert session.engine.read().position[0] < 0.4
 
 
 def test_a_motion_for_which_there_is_no_controller_is_refused(session_of: SessionOf) -> None:

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.control.controller import ControllerOutput
+from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
-from manipcli.model.robot import Mimic
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Actuator, Inertial, Mimic, TransmissionTag
 from manipcli.model.state import Contact
 from manipcli.simulate.session import BODY_SPEED, FALLEN, RUNAWAY_SPEED, SLOW, Session
 
@@ -85,6 +88,19 @@ def test_commands_are_cut_at_the_limits_and_counted(session_of: SessionOf, scrip
     assert session.saturations[0] == 9
 
 
+def test_cuts_before_the_start_are_not_counted(session_of: SessionOf, scripted: Any) -> None:
+    def pull_away(engine: Any) -> None:
+        engine.state.position[0] = -1.5 if 0 < engine.tick < 10 else 0.0
+
+    session = session_of(scripted(pull_away))
+    ticks(session, 10)
+    assert session.saturations[0] == 9
+    session.restart_clock(Seen())
+    assert not session.saturations.any()
+    ticks(session, 1)
+    assert not session.saturations.any()
+
+
 @pytest.mark.parametrize(("ideal", "counted"), [(False, [9, 0, 0]), (True, [0, 0, 0])])
 def test_cuts_of_hands_and_of_engines_without_efforts_are_not_counted(
     session_of: SessionOf, scripted: Any, ideal: bool, counted: list[int]
@@ -99,6 +115,41 @@ def test_cuts_of_hands_and_of_engines_without_efforts_are_not_counted(
     ticks(session, 10)
     assert np.all(engine.written[-1] == 100.0)
     assert session.saturations.tolist() == counted
+
+
+def test_a_slow_controller_drives_geared_joints_alike_at_every_tick(session_of: SessionOf, scripted: Any) -> None:
+    """100 Hz in a loop of 1 kHz: what the gear takes is taken off what it wrote once, not off what is left of it."""
+
+    class Pushes:
+        name, joints, interfaces, role = "push", ("slide",), ("effort",), None
+        feed_forward, senses_contact = "none", False
+        output = ControllerOutput.of(1, 1)
+
+        def update(self, time: float, period: float, measured: Any, *, contact_force: Any = None) -> Any:
+            self.output.command[:] = 10.0 + round(time / period)
+            return self.output
+
+        def deactivate(self, time: float, reason: str = "") -> None: ...
+
+    other, engine = session_of(), scripted()
+    engine.state.velocity[0] = 1.0  # fast enough for all of the friction
+    inertial = Inertial(1.0, Transform.identity(), frozen(np.eye(3)))
+    motor = Actuator("m", efficiency=0.8, coulomb_friction=0.05)
+    geared = TransmissionTag("t", "SimpleTransmission", ("slide",), (1.0,), (0.0,), ("m",), (10.0,))
+    manager = ControllerManager(joints=other.robot.joint_names, period=other.period)
+    manager.load(Pushes(), update_rate=100.0)  # type: ignore[arg-type]
+    manager.configure("push")
+    assert manager.switch(["push"]).ok
+    session = Session(
+        robot=replace(
+            other.robot, actuators=(motor,), transmissions=(geared,),
+            links=tuple(replace(link, inertial=inertial) for link in other.robot.links),
+        ),
+        scene=other.scene, engine=engine, manager=manager, period=other.period,
+    )  # fmt: skip
+    ticks(session, 30)
+    wanted = np.repeat([10.0, 11.0, 12.0], 10)
+    np.testing.assert_allclose([effort[0] for effort in engine.written], wanted * 0.8 - 0.5)
 
 
 @pytest.mark.parametrize(
@@ -153,8 +204,14 @@ def test_a_body_that_leaves_the_plausible_is_named(
     assert caught.value.time == pytest.approx(0.02)
 
 
-def test_a_joint_feels_what_touches_the_links_that_it_moves_last(session_of: SessionOf, scripted: Any) -> None:
-    """A fixed link counts for the joint before it; a touch between two links of the robot is no touch."""
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_joint_feels_what_touches_the_links_that_it_moves_last(
+    session_of: SessionOf, scripted: Any, mirrored: bool
+) -> None:
+    """A fixed link counts for the joint before it; a touch between two links of the robot is no touch.
+
+    Which body of a contact is told first makes no difference.
+    """
     engine = scripted()
     engine.touching = (
         Contact("block", "robot/pad", 2.0, 0.0),
@@ -164,6 +221,8 @@ def test_a_joint_feels_what_touches_the_links_that_it_moves_last(session_of: Ses
         Contact("block", "robot/base", 4.0, 0.0),
         Contact("block", "floor", 7.0, 0.0),
     )
+    if mirrored:
+        engine.touching = tuple(one._replace(a=one.b, b=one.a) for one in engine.touching)
     felt: list[list[float]] = []
     session = session_of(engine)
     update = session.manager.update
