@@ -22,9 +22,9 @@ PERIOD = 1e-3
 JOINTS = ("a", "b", "c")
 
 
-def limits(jerk: float = np.inf) -> MotionLimits:
+def limits(jerk: float | tuple[float, ...] = np.inf) -> MotionLimits:
     wide = np.full(3, 9.0)
-    return MotionLimits(JOINTS, -wide, wide, np.array([1.0, 1.5, 2.0]), np.array([5.0, 8.0, 10.0]), np.full(3, jerk))
+    return MotionLimits(JOINTS, -wide, wide, np.array([1.0, 1.5, 2.0]), np.array([5.0, 8.0, 10.0]), np.zeros(3) + jerk)
 
 
 def line(count: int) -> Array:
@@ -77,6 +77,21 @@ def test_jerk_limit_costs_time_and_leaves_the_path() -> None:
     assert free.duration < smooth.duration < 1.5 * free.duration
     for q in smooth.positions[::100]:
         assert np.min(np.linalg.norm(free.positions - q, axis=1)) < 0.003
+
+
+@pytest.mark.parametrize("jerk", [(20.0, 800.0, 1000.0), (500.0, 16.0, 1000.0), (500.0, np.inf, 20.0)])
+def test_one_joint_of_little_jerk_costs_little_more_than_it_must(jerk: tuple[float, ...]) -> None:
+    """The oracle is the exact time of the same line; where not the slowest joint is that of the least jerk, a third."""
+    exact = rest_to_rest(line(2)[0], line(2)[1], limits(jerk), period=PERIOD).duration
+    motion = retime(joint_path(JOINTS, line(30)), limits(jerk), period=PERIOD)
+    verify(motion, limits(jerk))
+    assert np.all(np.abs(np.diff(motion.accelerations, axis=0)) / PERIOD <= np.array(jerk) * (1.0 + 1e-6))
+    assert exact <= motion.duration < 1.35 * exact
+
+
+def test_without_a_jerk_limit_it_sets_off_with_all_its_acceleration() -> None:
+    motion = retime(joint_path(JOINTS, line(30)), limits(), period=PERIOD)
+    assert np.max(np.abs(motion.accelerations[0]) / limits().acceleration) > 0.99
 
 
 def test_wished_duration() -> None:
