@@ -14,6 +14,7 @@ from manipcli.model.state import WorldState
 from manipcli.simulate.session import Session
 
 RATE, ACCELERATION = np.array([0.7, -0.3]), np.array([2.0, 1.0])
+Q, V = np.array([0.4, -1.1]), np.array([0.6, -0.9])
 DAMPING = (0.5, 4.0)
 
 
@@ -87,10 +88,9 @@ class Standing:
 
 @pytest.mark.parametrize("wants", ["gravity", "inverse_dynamics"])
 def test_inverse_dynamics_also_overcomes_the_damping_of_the_joints_at_the_reference_velocity(wants):
-    q = np.array([0.4, -1.1])
     model = robot()
     kinematics = Kinematics(model)
-    engine = Standing(q)
+    engine = Standing(Q)
     law = ModelFeedForward(model, kinematics)
     manager = ControllerManager([Echo(wants)], joints=model.joint_names, period=0.001, feed_forward=law)
     session = Session(
@@ -101,7 +101,49 @@ def test_inverse_dynamics_also_overcomes_the_damping_of_the_joints_at_the_refere
         period=0.001,
     )
     session.tick()
-    expected = kinematics.gravity(q).copy()
+    expected = kinematics.gravity(Q).copy()
     if wants == "inverse_dynamics":
-        expected += kinematics.mass_matrix(q) @ ACCELERATION + np.array(DAMPING) * RATE
+        expected += kinematics.mass_matrix(Q) @ ACCELERATION + np.array(DAMPING) * RATE
     np.testing.assert_allclose(engine.written, expected, rtol=1e-9)
+
+
+class Half(Echo):
+    """Commands one joint; its reference is as `Echo`'s."""
+
+    def __init__(self, joint, feed_forward, interface="effort"):
+        self.name, self.joints, self.interfaces, self.feed_forward = joint, (joint,), (interface,), feed_forward
+        self.output = ControllerOutput.of(1, 1)
+        self.output.velocity[:] = RATE["ab".index(joint)]
+        self.output.acceleration[:] = ACCELERATION["ab".index(joint)]
+
+
+def fed(law, *halves):
+    """The efforts of both joints that the law adds."""
+    law.serve([(half, slice("ab".index(half.name), "ab".index(half.name) + 1), 1, 0) for half in halves])
+    for half in halves:
+        half.output.command[:] = 0.0
+    law.add(0, Q, V)
+    return {half.name: half.output.command[0] for half in halves}
+
+
+def test_after_a_switch_nothing_is_left_of_the_acceleration_that_was_wanted_before():
+    """Joints of which nobody wants an acceleration now are taken not to accelerate."""
+    model = robot()
+    kinematics = Kinematics(model)
+    law = ModelFeedForward(model, kinematics)
+    both = kinematics.inverse_dynamics(Q, V, ACCELERATION) + DAMPING * RATE
+    found = fed(law, Half("a", "inverse_dynamics"), Half("b", "inverse_dynamics"))
+    assert found == pytest.approx(dict(zip("ab", both, strict=True)))
+    alone = kinematics.inverse_dynamics(Q, V, np.array([0.0, ACCELERATION[1]])) + np.array([0.0, DAMPING[1] * RATE[1]])
+    found = fed(law, Half("a", "gravity"), Half("b", "inverse_dynamics"))
+    assert found == pytest.approx(dict(zip("ab", alone, strict=True)))
+
+
+@pytest.mark.parametrize("interface", ["position", "velocity"])
+def test_nothing_is_added_to_what_is_no_effort(interface):
+    model = robot()
+    kinematics = Kinematics(model)
+    law = ModelFeedForward(model, kinematics)
+    found = fed(law, Half("a", "gravity", interface), Half("b", "gravity"))
+    assert found == pytest.approx({"a": 0.0, "b": kinematics.gravity(Q)[1]})
+    assert fed(law, Half("a", "inverse_dynamics", interface)) == {"a": 0.0}

@@ -6,9 +6,13 @@ import pytest
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.controllers.joint_state_broadcaster import JointStateBroadcaster
+from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
 from manipcli.model.state import WorldState
+from manipcli.spec.load import load_controllers_text
 
 PERIOD = 0.001
 
@@ -29,6 +33,21 @@ def test_joint_states_are_those_of_the_last_update():
     assert (state.time, state.names) == (0.25, ("c", "a"))
     assert (state.position.tolist(), state.velocity.tolist(), state.effort.tolist()) == ([3, 1], [], [9, 7])
     assert not state.position.flags.writeable
+
+
+@pytest.mark.parametrize(("written", "joints"), [("", ("a", "b")), (", joints: [b]", ("b",))])
+def test_of_a_file_it_tells_the_joints_that_are_stated_else_all(written, joints):
+    spec = load_controllers_text(f"controllers: {{one: {{type: joint_state_broadcaster{written}}}}}", "c.yaml").spec
+    links = tuple(Link(name, None, (), ()) for name in ("base", "a_link", "b_link"))
+    hinges = tuple(
+        Joint(name, "revolute", "base", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits())
+        for name in ("a", "b")
+    )
+    robot = RobotModel("r", "base", links, hinges, (), (), (), Transform.identity(), "")
+    manager = build_controllers(spec, robot, PERIOD)
+    manager.update(0.0, world(np.array([1.0, 2]), np.zeros(2), np.zeros(2)))
+    state = manager["one"].state
+    assert (state.names, state.position.tolist()) == (joints, [1.0, 2.0] if len(joints) == 2 else [2.0])
 
 
 def test_a_broadcaster_may_be_slower_than_the_loop():

@@ -41,6 +41,17 @@ def test_what_it_is_told_is_commanded_until_it_is_told_otherwise_or_deactivated(
     assert controller.update(0.3, PERIOD, measured()).command.tolist() == held
 
 
+@pytest.mark.parametrize("told", [None, [0.4, -2.0]])
+def test_a_position_is_its_own_reference(told):
+    """What an ideal engine moves to, and a log shows."""
+    controller = make("position")
+    if told is not None:
+        controller.set_command(told)
+    for position in (HERE, [9.0, 9.0]):
+        output = controller.update(0.0, PERIOD, measured(position))
+        assert output.position.tolist() == (HERE.tolist() if told is None else told)
+
+
 def test_a_velocity_is_a_reference_one_period_ahead():
     """What makes an ideal engine move at the commanded velocity."""
     controller = make("velocity")

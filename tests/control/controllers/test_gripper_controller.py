@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from manipcli.control.action import ErrorCode
-from manipcli.control.controller import JointState
-from manipcli.control.controllers.gripper import GripperController, GripperGoal
+from manipcli.control.controller import Fit, JointState
+from manipcli.control.controllers.gripper import GripperController, GripperGoal, build
 from manipcli.core.errors import InvalidArgument
-from manipcli.spec.controllers import GainsSpec
+from manipcli.core.geometry import Transform, frozen
+from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
+from manipcli.spec.controllers import GainsSpec, GripperSpec
 
 JOINTS = ("thumb_1", "thumb_2", "finger_1", "finger_2")
 FINGERS = ((0, 1), (2, 3))
@@ -279,6 +281,26 @@ def test_contact_is_allowed_where_stalling_is_not():
     handle = controller.send_goal(GripperGoal(target=np.array([1.5, 0.1, 1.5, 0.1]), force=3.0))
     hand.run(controller, 1.5)
     assert (handle.status, handle.result.stalled) == ("succeeded", True)
+
+
+@pytest.mark.parametrize(
+    ("interface", "asked", "expected"),
+    [("effort", True, "gravity"), ("effort", False, "none"), ("position", True, "none"), ("position", False, "none")],
+)
+def test_gravity_is_asked_for_where_it_is_wanted_and_commanded_as_an_effort(interface, asked, expected):
+    joints = tuple(
+        Joint(
+            name, "revolute", "palm", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits(0, 1, 1, 1)
+        )
+        for name in JOINTS
+    )
+    links = tuple(Link(name, None, (), ()) for name in ("palm", *(joint.child for joint in joints)))
+    robot = RobotModel("hand", "palm", links, joints, (), (), (), Transform.identity(), "")
+    spec = GripperSpec(
+        type="gripper", joints=JOINTS, command_interface=interface, gravity_compensation=asked,
+        gains={joint: GainsSpec(p=1.0) for joint in JOINTS},
+    )  # fmt: skip
+    assert build("hand", spec, Fit(robot, kinematics=None, compat=None)).feed_forward == expected
 
 
 def test_on_the_position_interface_it_commands_its_reference():
