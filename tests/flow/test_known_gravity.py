@@ -75,10 +75,10 @@ def test_at_rest_controllers_hold_the_slope_of_the_potential_under_the_stated_gr
 
 
 def test_what_is_set_is_known_and_what_is_drawn_is_not(tmp_path: Path) -> None:
-    vary = "vary: {simulation.gravity: {choice: [[0, 0, -3]]}}\n"
-    drawn = _task(tmp_path, vary, "simulation.gravity=[0,0,-1.62]", sample=0)
+    moon, vary = "simulation: {gravity: [0, 0, -1.62]}\n", "vary: {simulation.gravity: {choice: [[0, 0, -3]]}}\n"
+    drawn = _task(tmp_path, moon + vary, sample=0)
     assert drawn.true.scene.gravity.tolist() == [0.0, 0.0, -3.0]
-    stated = _task(tmp_path, "", "simulation.gravity=[0,0,-1.62]")
+    stated = _task(tmp_path, moon)
     np.testing.assert_array_equal(_held(drawn), _held(stated))
     planned = plan_task(drawn).planner.kinematics
     np.testing.assert_array_equal(_held(drawn, planned), _held(stated))
