@@ -189,6 +189,21 @@ def test_efforts_and_soft_limits_stop_a_thrown_joint_before_its_hard_limit():
     assert q[0] == pytest.approx(0.8, abs=1e-3)
 
 
+@pytest.mark.parametrize("beside", [0, 1])
+@given(st.sampled_from([0.3, 1.0, 3.0]), st.floats(-0.99, 0.99), st.floats(-1.0, 1.0), st.sampled_from([-1.0, 1.0]))
+def test_an_effort_is_cut_just_above_what_the_velocity_leaves_of_it(beside, fastest, share, beyond, way):
+    """kv (v_max - v) in the direction of v_max; and nothing of a joint beside it that has no such law."""
+    kv, v, n = 5.0, share * fastest, 1 + beside
+    limits = [JointLimits(None, None, fastest, 100, soft=SoftLimits(k_velocity=kv)), JointLimits()][:n]
+    limiter, command = JointLimiter(limits), JointCommand(n)
+    command.obey(["effort"] * n)
+    most = kv * (fastest - v)
+    command.effort[:] = wanted = way * (most + beyond)
+    limiter.apply(command, np.zeros(n), np.full(n, way * v), DT)
+    assert command.effort == pytest.approx([way * (most + min(beyond, 0.0)), wanted][:n], abs=1e-12)
+    assert limiter.saturations.tolist() == (command.effort != wanted).tolist()
+
+
 @pytest.mark.parametrize(
     "limits",
     [JointLimits(1, -1), JointLimits(velocity=-2), JointLimits(effort=math.nan), JointLimits(lower=math.nan, upper=1)],
