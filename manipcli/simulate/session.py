@@ -91,7 +91,6 @@ class Session:
         self._motors = MotorLimits(robot, pressing=hands)
         self._counted = np.array([not engine.ideal and name not in hands for name in robot.joint_names])
         self._obeyed = -1
-        self._asked = np.zeros(len(robot.joint_names))
         if engine.ideal:
             manager.keep_references()
         for controller in manager.controllers:
@@ -171,16 +170,12 @@ class Session:
         return state
 
     def _drive(self, command: JointCommand, state: WorldState) -> None:
-        """Writes what the actuators make of the command. What the controllers wrote stays: a slow one relies on it."""
-        actuation, effort = self.actuation, command.effort
-        applied = actuation.apply(effort, state.position, state.velocity)
-        if applied is effort:
-            self.engine.write(command)
-            return
-        self._asked[:] = effort
-        effort[:] = applied
+        """Writes what the actuators make of the command; the manager writes all of it anew at the next tick."""
+        effort = command.effort
+        applied = self.actuation.apply(effort, state.position, state.velocity)
+        if applied is not effort:
+            effort[:] = applied
         self.engine.write(command)
-        effort[:] = self._asked
 
     def _touch(self, state: WorldState) -> None:
         """What touches, and the force on what each joint moves.
