@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mcap.records import Message
 from mcap.writer import Writer
 
@@ -72,6 +75,79 @@ def test_what_is_no_ros_message_is_compared_by_its_bytes(tmp_path: Path) -> None
     (apart,) = compare_logs(a, write("d.mcap", -1, "cbor")).topics
     assert "json/jsonschema in one log and as cbor/jsonschema in the other" in apart.why
     assert counted(compare_logs(a, tmp_path / "d.mcap")) == "1 topic is not compared"
+
+
+def _timed(path: Path, times: Iterable[int], changed: Collection[int] = (), size: int = 8, chunk: int = 100) -> Path:
+    """A log of nothing but bytes at these times [ns]; some of them others than usual."""
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=chunk)
+        writer.start(profile="", library="somebody")
+        channel = writer.register_channel("/foo", "json", writer.register_schema("Foo", "jsonschema", b"{}"))
+        for time in times:
+            writer.add_message(channel, time, (b"b" if time in changed else b"a") * size, time)
+        writer.finish()
+    return path
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.integers(0, 30), min_size=1, max_size=25),
+    st.lists(st.integers(0, 30), min_size=1, max_size=25),
+    st.sets(st.integers(0, 30), max_size=3),
+)
+def test_messages_are_paired_by_their_times(
+    tmp_path: Path, one: list[int], other: list[int], changed: set[int]
+) -> None:
+    """Against the multisets of times, however many only one log has in a row, and wherever chunks begin."""
+    a, b = _timed(tmp_path / "a.mcap", sorted(one)), _timed(tmp_path / "b.mcap", sorted(other), changed)
+    left, right = Counter(one), Counter(other)
+    unlike = {time: count for time, count in (left & right).items() if time in changed}
+    lonely = (left - right, right - left)
+    for found, only in ((compare_logs(a, b), lonely), (compare_logs(b, a), lonely[::-1])):
+        (topic,) = found.topics
+        assert (topic.different, topic.only) == (sum(unlike.values()), [each.total() for each in only])
+        first = min((*unlike, *only[0], *only[1]), default=None)
+        assert (None if found.first is None else found.first.time) == (None if first is None else first / 1e9)
+
+
+def test_what_only_one_log_has_is_met_in_as_few_steps_in_either(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a = _timed(tmp_path / "a.mcap", (0, 5000), chunk=1 << 20)
+    b = _timed(tmp_path / "b.mcap", range(5001), chunk=1 << 20)
+    alone = compare._Merge._alone
+    met: list[int] = []
+
+    def spied(self: Any, name: str, side: int, block: Any) -> None:
+        met.append(len(block))
+        alone(self, name, side, block)
+
+    monkeypatch.setattr(compare._Merge, "_alone", spied)
+    for first, second in ((a, b), (b, a)):
+        met.clear()
+        compare_logs(first, second)
+        assert met == [4999]
+
+
+def test_what_comes_after_the_end_of_the_other_log_does_not_wait_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two hundred chunks, of which not even three are kept."""
+    long = _timed(tmp_path / "long.mcap", range(200), size=10_000, chunk=10_000)
+    short = _timed(tmp_path / "short.mcap", range(3), size=10_000, chunk=10_000)
+    kept: list[int] = []
+    size = compare._Side.size.fget
+
+    def spied(self: Any) -> int:
+        kept.append(size(self))
+        return kept[-1]
+
+    monkeypatch.setattr(compare._Side, "size", property(spied))
+    for a, b, side in ((long, short, 0), (short, long, 1)):
+        kept.clear()
+        (topic,) = compare_logs(a, b).topics
+        assert topic.only[side] == 197
+        assert 10_000 < max(kept) < 30_000
 
 
 def test_one_changed_double_is_named(log: Path, tmp_path: Path, rewrite_log: Rewrite) -> None:
