@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,8 @@ from manipcli.batch.baseline import (
 from manipcli.cli.app import main
 from manipcli.core.errors import InvalidInput
 from manipcli.pipeline import run_task
+from manipcli.report import step_measures
+from manipcli.report.step_measures import StepMeasures
 from manipcli.spec.baseline import ToleranceSpec
 
 ROOT = Path(__file__).parents[2]
@@ -170,7 +173,7 @@ expect:
 """
 
 
-def test_what_a_run_took_is_measured(tmp_path: Path) -> None:
+def test_what_a_run_took_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "nod.yaml").write_text(TASK)
     log = tmp_path / "nod.mcap"
     report = run_task(tmp_path / "nod.yaml", log=log)
@@ -181,6 +184,11 @@ def test_what_a_run_took_is_measured(tmp_path: Path) -> None:
     assert found["steps", "move_1"].value == step.ended - step.started > 0.1
     assert found["duration",].value == report.verdict.simulated_time
     assert found["margins", "duration"] == Measure(20.0 - report.verdict.simulated_time, "s")
+    nothing = StepMeasures("s", "move", "done", None, None, None, None, None, "", None)
+    for works, energy in (((3.0, None, 4.5, 0.25), Measure(7.75, "J")), ((None,), None)):
+        steps = tuple(replace(nothing, work=work) for work in works)
+        monkeypatch.setattr(step_measures, "step_measures", lambda *_, steps=steps: steps)
+        assert measured(report.verdict, log).get(("energy",)) == energy, "that of all steps together"
 
 
 @pytest.mark.slow
