@@ -1,7 +1,8 @@
 """Messages to columns of numbers: where messages stand in a chunk, and the numbers of all of them at once.
 
-All messages of a channel in a chunk normally have one length and one layout; then each run of doubles is gathered with
-one numpy index over all messages. Messages of different lengths are taken one by one through the same code.
+All messages of a channel in a chunk normally have one length, and the same bytes where names and counts stand, so one
+layout; then each run of doubles is gathered with one numpy index over all messages. Others are taken one by one through
+the same code.
 """
 
 from __future__ import annotations
@@ -182,26 +183,64 @@ class Columns:
 
     def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, Layout]]:
         """The messages in groups of one layout each."""
-        first, last = (self._layout(data, places, k) for k in (0, -1))
-        if first == last and (places.lengths == places.lengths[0]).all():
+        reader = _Decided(_message(data, places, 0))
+        first = self._parse(reader)
+        if (places.lengths == places.lengths[0]).all() and all(
+            _equal(data, places.starts + start, end - start) for start, end in reader.decided
+        ):
             yield places, first
             return
         for k in range(len(places.times)):
             one = Places(places.times[k : k + 1], places.starts[k : k + 1], places.lengths[k : k + 1])
-            yield one, self._layout(data, places, k)
+            yield one, self._parse(CdrReader(_message(data, places, k)))
 
-    def _layout(self, data: bytes, places: Places, k: int) -> Layout:
-        start = int(places.starts[k])
-        return self._parse(CdrReader(memoryview(data)[start : start + int(places.lengths[k])]))
+
+class _Decided(CdrReader):
+    """Keeps in mind where what decides the layout stands, counts and texts: [begin, end) each, few and long."""
+
+    def __init__(self, data: memoryview) -> None:
+        super().__init__(data)
+        self.decided: list[tuple[int, int]] = []
+
+    def u32(self) -> int:
+        value = super().u32()
+        self._keep(self.offset - 4)
+        return value
+
+    def text(self) -> str:
+        value = super().text()
+        self._keep(self.decided[-1][1])  # where its length ends
+        return value
+
+    def _keep(self, begin: int) -> None:
+        if self.decided and begin - self.decided[-1][1] < 4:  # nothing between them but what aligns
+            begin = self.decided.pop()[0]
+        self.decided.append((begin, self.offset))
+
+
+def _message(data: bytes, places: Places, k: int) -> memoryview:
+    start = int(places.starts[k])
+    return memoryview(data)[start : start + int(places.lengths[k])]
+
+
+def _rows(data: bytes, starts: Int, size: int) -> npt.NDArray[np.void]:
+    """(T) rows of `size` bytes, at least one, that begin at `starts`."""
+    kind = np.dtype((np.void, size))
+    every = np.ndarray((len(data) - size + 1,), dtype=kind, buffer=data, strides=(1,))
+    return every[starts]
+
+
+def _equal(data: bytes, starts: Int, size: int) -> bool:
+    """Whether as many bytes are the same at all of `starts`."""
+    rows = _rows(data, starts, size).view(np.uint8).reshape(len(starts), size)
+    return bool((rows == rows[0]).all())
 
 
 def _gather(data: bytes, starts: Int, count: int) -> Array:
     """(T, count) doubles that begin at `starts`."""
     if count == 0:
         return np.zeros((len(starts), 0))
-    kind = np.dtype((np.void, 8 * count))
-    runs = np.ndarray((len(data) - kind.itemsize + 1,), dtype=kind, buffer=data, strides=(1,))
-    return runs[starts].view("<f8").reshape(len(starts), count)
+    return _rows(data, starts, 8 * count).view("<f8").reshape(len(starts), count)
 
 
 def singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
@@ -241,8 +280,7 @@ def controller_state_layout(reader: CdrReader) -> Layout:
     points = []
     for _ in range(4):
         points.append([reader.doubles() for _ in range(4)])
-        reader.u32()
-        reader.u32()
+        reader.skip(8, 4)  # its time
     reference, feedback, _, output = points
     command = next((run for run in output if run[1]), output[0])
     return Layout(names, (reference[0], reference[1], feedback[0], command))

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.records import Chunk, MessageIndex
+from mcap.records import Chunk, Message, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import ExitCode
 from manipcli.model.state import WorldState
@@ -234,6 +235,58 @@ def test_a_single_flipped_bit_is_noticed_anywhere(small: tuple[Any, Path], tmp_p
         except BadRecording:
             continue
         assert recording.lost is not None, f"bit {position % 8} of byte {position}"
+
+
+def _other_name(message: Any) -> None:
+    names = message.joint_names if hasattr(message, "joint_names") else message.name
+    names[0], names[1] = names[1], names[0]
+
+
+def _narrow(message: Any) -> None:
+    where = message.reference if hasattr(message, "reference") else message
+    field = "positions" if hasattr(where, "positions") else "position"
+    setattr(where, field, getattr(where, field)[:-1])
+
+
+@pytest.mark.parametrize("every", [True, False])
+@pytest.mark.parametrize(
+    ("topic", "change", "told"),
+    [
+        ("/joint_states", _other_name, "names other joints"),
+        ("/joint_states", _narrow, "another number of values than of names"),
+        ("/arm/controller_state", _other_name, "names other joints"),
+        ("/arm/controller_state", _narrow, "another number of values than of names"),
+    ],
+)
+def test_a_message_of_other_joints_or_widths_is_refused_with_its_topic(
+    small: tuple[Any, Path],
+    tmp_path: Path,
+    rewrite_log: Callable[..., Path],
+    topic: str,
+    change: Callable[[Any], None],
+    told: str,
+    every: bool,
+) -> None:
+    """Whether one says so or all of a chunk do."""
+    schemas = {}
+    with small[1].open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        for channel in summary.channels.values():
+            schemas[channel.topic] = summary.schemas[channel.schema_id]
+    schema = schemas[topic]
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(schema.data.decode(), schema.name))
+
+    def rewritten(where: str, one: Message) -> bytes:
+        if where != topic or not (every or one.log_time == 15_000_000):
+            return one.data
+        message = store.deserialize_cdr(one.data, schema.name)
+        change(message)
+        return bytes(store.serialize_cdr(message, schema.name))
+
+    with pytest.raises(BadRecording, match=f"{topic} .*{told}"):
+        read_recording(rewrite_log(small[1], tmp_path / "other.mcap", message=rewritten))
 
 
 def test_a_damaged_chunk_is_named_by_place_and_time(small: tuple[Any, Path], tmp_path: Path) -> None:
