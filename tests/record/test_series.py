@@ -302,7 +302,7 @@ def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
                 refused += 1
                 continue
             assert all(leaf.offset + int(leaf.code[-1]) <= len(bad) for leaf in result.leaves)
-            read += 1
+            read += bool(result.leaves)
     assert read > 50 and refused > 50
 
 
