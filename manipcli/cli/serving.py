@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 def stay(page: LocalServer, *, open_: bool) -> None:
     """Tells the address, with `open_` shows it in a browser, and returns when the user ends it."""
-    console.result(page.url)
-    console.talk("Ctrl-C ends it")
-    if open_:
-        import webbrowser
+    try:  # from the moment at which the address is told
+        console.result(page.url)
+        console.talk("Ctrl-C ends it")
+        if open_:
+            import webbrowser
 
-        webbrowser.open(page.url)
-    try:
+            webbrowser.open(page.url)
         page.wait()
     except KeyboardInterrupt:
         console.talk("")
