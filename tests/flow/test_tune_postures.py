@@ -36,7 +36,7 @@ def test_a_mode_in_which_many_joints_share_alike_is_calmed_too() -> None:
         damping=np.zeros(n), effort=np.full(n, 1e3), latency=(0,) * n,
     )  # fmt: skip
     wish = Wish(60.0, 1.0, H)
-    found = tune_efforts(["c"] * n, load, wish, steps=np.full(n, 0.02), carried=np.full(n, True))
+    found = tune_efforts(["c"] * n, load, wish, steps=np.full(n, 0.02), carried=np.full(n, True), pressing=np.zeros(n))
     p, d = (np.array([getattr(one, key) for one in found]) for key in ("p", "d"))
     assert {one.limited_by for one in found} == {"other joints"}
     assert largest(mass, MARGIN * p, MARGIN * d, np.zeros(n)) < 1.0
