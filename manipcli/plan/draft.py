@@ -227,8 +227,10 @@ class Draft:
         self._motions.append(Motion("close", trajectory=None, grip=grip, duration=duration))
         self._now = replace(self._now, position=closed, carried=carried, closed=True)
 
-    def open(self, posture: str, *, around: str | None = None) -> None:
+    def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """The hand to a pose; what it held stays where it is. It may touch that, or the body that it is `around`.
+
+        With `must_arrive` the step fails where something stops the hand.
 
         Raises:
             NotPlannable: no gripper controller moves the hand, or something else than the object is in its way.
@@ -242,7 +244,7 @@ class Draft:
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)
-        self._add("open", None, replace(grip, must_arrive=True), allowed=allowed)
+        self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
 
     def dwell(self, label: str, duration: float, *, awaits: bool = False) -> None:
         """Hold still for `duration` [s]."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -129,6 +130,20 @@ def test_a_hand_that_holds_takes_nothing_else(bench: Make, story: Story) -> None
     assert refusal.hint == "`place` 'cup' first"
     assert arm.refused("grasp", {"object": "ball"}).cause == refusal.cause
     assert arm.refused("pick", {"object": "cup"}).cause == "'cup' is in the hand already"
+
+
+def test_a_hand_that_opens_to_back_off_need_not_open_all_the_way(bench: Make, story: Story) -> None:
+    """What stops it there is in the way of a `release` and of a `place`; `pick` goes on and takes its object."""
+    arm = bench()
+    around = story.steps["pick"][1].end
+    for verb, spec, before, must in (
+        ("pick", {"object": "cup", "grasp": GRASP}, replace(around, carried=None, closed=False), False),
+        ("release", {}, around, True),
+        ("place", {"object": "cup"}, story.steps["place"][0], True),
+    ):
+        arm.now = before
+        opening = next(motion for motion in arm.plan(verb, spec).motions if motion.label == "open")
+        assert opening.grip.must_arrive is must, verb
 
 
 @pytest.mark.slow

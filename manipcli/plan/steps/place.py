@@ -94,7 +94,7 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         if isinstance(down, NotPlannable):
             raise NotPlannable(down.cause, hint=down.hint)
         draft = down.copy()
-        draft.open(spec.posture)
+        draft.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(draft.now)
         draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
         planned = draft.plan()

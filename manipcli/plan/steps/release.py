@@ -27,7 +27,7 @@ class ReleaseSpec(Model):
 def plan(spec: ReleaseSpec, planner: Planner, situation: Situation) -> StepPlan:
     """One motion of the hand."""
     draft = Draft(planner, situation)
-    draft.open(spec.posture)
+    draft.open(spec.posture, must_arrive=True)
     return draft.plan()
 
 
