@@ -29,7 +29,7 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.columns import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
-from manipcli.record.namespaces import TYPES, meant
+from manipcli.record.namespaces import TYPES, meant, namespaces
 from manipcli.record.scan import METADATA, Scan
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
@@ -106,10 +106,12 @@ class _Log:
         self.frames: dict[tuple[str, str], _Samples] = {}
         self.start, self.end = np.inf, -np.inf
         known = meant({name: topic.type for name, topic in topics.all.items()})
-        self.spaces = sorted({one.namespace for one in known.values() if one.namespace})
+        self.spaces = namespaces(known.values())
         # Of several robots none is meant; of one alone, in whatever namespace, it is.
         wanted = {name: one.usual for name, one in known.items() if not one.namespace or len(self.spaces) == 1}
-        self.lacks = [name for name in TYPES if name not in wanted.values() and name != channels.TF_STATIC]
+        self.unshown = [name for name in known if name not in wanted]
+        there = {one.usual for one in known.values()}
+        self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
         begin = self._first(topics, wanted)
         for topic, data, places in topics.messages(wanted):
             try:
@@ -177,10 +179,10 @@ def open_other(
     log = _Log(topics)
     notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
     notes += [f"it has no {name} ({TYPES[name]})" for name in log.lacks]
+    several = f"it tells of several robots, in {listed(log.spaces)}" if len(log.spaces) > 1 else ""
+    notes += [f"{several}: what {listed(log.unshown)} say is not shown"] if several else []
     if not np.isfinite(log.start):
-        what = f"it has neither {channels.JOINT_STATES} nor {channels.TF}"
-        if len(log.spaces) > 1:
-            what = f"it tells of several robots, in {listed(log.spaces)}"
+        what = several or f"it has neither {channels.JOINT_STATES} nor {channels.TF}"
         message = f"{path.name}: nothing to show: {what}"
         hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
         raise InvalidInput([Finding("REPLAY002", message, hint=hint)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -40,3 +40,8 @@ def meant(types: Mapping[str, str]) -> dict[str, Meant]:
             if name.endswith(usual) and types[name] == kind:
                 found[name] = Meant(usual, name.removesuffix(usual))
     return found
+
+
+def namespaces(known: Iterable[Meant]) -> tuple[str, ...]:
+    """Those that tell of robots; more than one are several robots."""
+    return tuple(sorted({one.namespace for one in known if one.namespace}))

@@ -9,7 +9,7 @@ from pathlib import Path
 from manipcli.record import channels as topics
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.inventory import Inventory
-from manipcli.record.namespaces import TYPES, Meant, meant
+from manipcli.record.namespaces import TYPES, Meant, meant, namespaces
 from manipcli.record.salvage import OpenChunk, Salvage
 
 
@@ -34,7 +34,8 @@ class FrameSample:
 
 @dataclass(slots=True)
 class Snapshot:
-    """What was known at a moment, by name; of several robots, joints have their namespaces before their names.
+    """What was known at a moment, by name; of several robots, joints and frames have their namespaces before their
+    names.
 
     `urdf`: each /robot_description, by what stands before the names of its joints; `lacks`: usual topics without a
     message; `unread`: why messages were left out.
@@ -61,7 +62,7 @@ def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
     known = meant(types)
     told = {known[topic.name].usual for topic in found.topics if topic.messages and topic.name in known}
     taken = Snapshot(lacks=tuple(usual for usual in TYPES if usual not in told and usual != topics.TF_STATIC))
-    several = len({one.namespace for one in known.values() if one.usual == topics.JOINT_STATES}) > 1
+    several = len(namespaces(known.values())) > 1
     names: dict[int, str] = {}
     for piece in Salvage(path):
         if isinstance(piece, records.Channel):
@@ -100,15 +101,17 @@ def _take(taken: Snapshot, topic: Meant, several: bool, ns: int, reader: CdrRead
             if known is None or known.time <= time:
                 taken.joints[name] = JointSample(time, *(run[k] if k < len(run) else None for run in values))
     else:
-        for child, frame in _frames(reader, time):
+        for child, frame in _frames(reader, before, time):
             known_frame = taken.frames.get(child)
             if known_frame is None or known_frame.time <= time:
                 taken.frames[child] = frame
 
 
-def _frames(reader: CdrReader, time: float) -> Iterator[tuple[str, FrameSample]]:
+def _frames(reader: CdrReader, before: str, time: float) -> Iterator[tuple[str, FrameSample]]:
     for _ in range(reader.count(64)):
-        parent, child = reader.header(), reader.text()
+        names = [name.lstrip("/") for name in (reader.header(), reader.text())]
+        # Who published it may have put the namespace there already.
+        parent, child = (before + name.removeprefix(before) for name in names)
         yield child, FrameSample(time, parent, tuple(reader.f64() for _ in range(7)))
 
 

@@ -240,16 +240,18 @@ def _foreign(
     tf: bool = True,
     gaps: bool = False,
     spaces: tuple[str, ...] = ("",),
+    one_tf: bool = False,
 ) -> Path:
     """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by.
-    With `gaps` the second joint comes late, and the first is NaN for a while. `spaces`: before the names of topics."""
+    With `gaps` the second joint comes late, and the first is NaN for a while. `spaces`: before the names of topics, but
+    with `one_tf` not before `/tf`; the base of the n-th stands at x = 1 + n."""
     message = TYPES.types
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start("ros2")
         ids: dict[str, int] = {}
 
-        def put(usual: str, kind: str, ns: int, content: object) -> None:
+        def put(usual: str, kind: str, ns: int, content: object, spaces: tuple[str, ...] = spaces) -> None:
             data = bytes(TYPES.serialize_cdr(content, kind))
             for topic in (space + usual for space in spaces):
                 if topic not in ids:
@@ -287,12 +289,14 @@ def _foreign(
                 # Rx(0.3) then the turn about (0, 0.6, 0.8): Hamilton's product by hand.
                 y, z, w = 0.6 * np.sin(a), 0.8 * np.sin(a), np.cos(a)
                 q = (s * w, c * y - s * z, c * z + s * y, c * w)
-                transforms = [
-                    transform(ns, "map", "base", (1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0)),
-                    transform(ns, "base", "upper", (0.0, 0.0, 0.1), q),
-                    transform(ns, "base", "camera", (t, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
-                ]
-                put("/tf", "tf2_msgs/msg/TFMessage", ns, message["tf2_msgs/msg/TFMessage"](transforms))
+                for n, space in enumerate(("",) if one_tf else spaces):
+                    transforms = [
+                        transform(ns, "map", "base", (1.0 + n, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0)),
+                        transform(ns, "base", "upper", (0.0, 0.0, 0.1), q),
+                        transform(ns, "base", "camera", (t, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+                    ]
+                    kind = "tf2_msgs/msg/TFMessage"
+                    put("/tf", kind, ns, message[kind](transforms), (space,))
         writer.finish()
     return path
 
@@ -351,8 +355,23 @@ def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path
     assert list(joints) == ["r1/turn", "r1/push", "r2/turn", "r2/push"]
     assert [joint.unit for joint in joints.values()] == ["rad", "m", "rad", "m"]
     assert joints["r2/turn"].position == pytest.approx(np.sin(0.5))
+    poses = {pose.name: pose for pose in moment(path, 5.5).poses}
+    frames = {"base": "map", "upper": "base", "camera": "base"}
+    tree = {f"{robot}/{child}": f"{robot}/{parent}" for robot in ("r1", "r2") for child, parent in frames.items()}
+    assert {name: pose.parent for name, pose in poses.items()} == tree
+    assert [poses[f"{robot}/base"].pose.p[0] for robot in ("r1", "r2")] == [1.0, 2.0]
     with pytest.raises(InvalidInput, match="several robots, in /r1"):
         open_playback(path)
+
+
+def test_a_replay_of_what_several_robots_share_says_that_it_shows_none_of_them(tmp_path: Path) -> None:
+    path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"), one_tf=True)
+    shown = open_playback(path, rate=10.0)
+    assert shown.robot is None
+    assert {body.name for body in shown.scene.bodies} == {"base", "upper", "camera"}  # type: ignore[union-attr]
+    assert not [note for note in shown.notes if "/joint_states (" in note]
+    assert any("several robots, in /r1, /r2" in note and "/r2/joint_states" in note for note in shown.notes)
+    assert [pose.name for pose in moment(path, 5.5).poses] == ["base", "upper", "camera"]
 
 
 def test_steps_that_never_began_are_counted(tmp_path: Path) -> None:
