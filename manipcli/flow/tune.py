@@ -3,36 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from manipcli.control.controller import ControllerOutput, FeedForward, JointState
-from manipcli.control.feed_forward import ModelFeedForward
-from manipcli.control.manager import ControllerManager
-from manipcli.control.pid import Pid
 from manipcli.control.reflected import Load, Postures, load_of
-from manipcli.control.tuning import StepAnswer, Tuned, Wish, keeps_margin, tightness, tune_efforts, tune_velocity
+from manipcli.control.tuning import Tuned, Wish, keeps_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.core.units import EARTH_GRAVITY
 from manipcli.flow.extremes import climbed
 from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
+from manipcli.flow.simulated_steps import simulated_answers
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.hand import with_mimics
-from manipcli.simulate.engine import EngineSettings
-from manipcli.simulate.engines import ENGINES
-from manipcli.simulate.quiet import stdout_to_stderr
-from manipcli.simulate.session import Session
 from manipcli.spec import load
-from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface, JointTrajectorySpec, Role
+from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.resolved import as_written
@@ -48,8 +39,6 @@ HOPELESS: Final = 0.01
 """Of the bandwidth that is asked for: where less is stable, gains are of no use."""
 ROUNDS: Final = 12
 """How often the gains are calmed at the posture in which they have the least margin."""
-RETURN: Final = 0.5
-"""[s] at least that a joint has to come back before the next one steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +87,7 @@ def tune(
             raise InvalidInput([Finding("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
     found = tuple(one for one in everything if not joints or one.joint in joints)
     if simulated:
-        found = tuner.tried(everything, [one.joint for one in found])
+        found = simulated_answers(robot, file.spec, everything, [one.joint for one in found], wish, tuner.start())
     return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
 
 
@@ -168,33 +157,32 @@ class _Tuner:
     def _of_efforts(self, loops: list[tuple[str, str, bool]]) -> tuple[Tuned, ...]:
         if not loops:
             return ()
+        names = [name for name, _, _ in loops]
         joints = [joint for _, joint, _ in loops]
         carried = np.array([each for _, _, each in loops])
         steps = np.array([self._step_of(joint) for joint in joints])
-        names = [name for name, _, _ in loops]
         pressing = np.array([self._pressing(name, joint) for name, joint, _ in loops])
-
-        def load(q: Array) -> Load:
-            return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
-
-        def extreme(score: Callable[[Load], Array], starts: int) -> Array:
-            return climbed(self._robot, lambda q: score(load(q)), postures, *self._range(), starts=starts)
-
         postures = self._postures().position
-        ends = [
-            extreme(score, 1)
-            for k in range(len(joints))
-            for score in (lambda one, k=k: one.held_inertia[:, k], lambda one, k=k: 1.0 / one.own_inertia[:, k])
-        ]
-        postures = np.vstack([postures, *ends])
+        heaviest = [self._extreme(joints, partial(_inertia, k), postures) for k in range(len(joints))]
+        lightest = [self._extreme(joints, partial(_lightness, k), postures) for k in range(len(joints))]
+        postures = np.vstack([postures, *heaviest, *lightest])
         for _ in range(ROUNDS):
-            tuned = tune_efforts(names, load(postures), self._wish, steps=steps, carried=carried, pressing=pressing)
-            tightest = extreme(partial(tightness, tuned=tuned, wish=self._wish), 3)
-            if keeps_margin(load(tightest[None]), tuned, self._wish):
+            met = self._load(joints, postures)
+            tuned = tune_efforts(names, met, self._wish, steps=steps, carried=carried, pressing=pressing)
+            tight = partial(tightness, tuned=tuned, wish=self._wish)
+            tightest = self._extreme(joints, tight, postures, starts=3)
+            if keeps_margin(self._load(joints, tightest[None]), tuned, self._wish):
                 break
             postures = np.vstack([postures, tightest])
         self._refuse_hopeless(tuned)
         return tuned
+
+    def _load(self, joints: list[str], q: Array) -> Load:
+        return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
+
+    def _extreme(self, joints: list[str], score: Callable[[Load], Array], postures: Array, *, starts: int = 1) -> Array:
+        """(n) the posture in which the score of what these joints meet is largest, uphill from `postures` (T, n)."""
+        return climbed(self._robot, lambda q: score(self._load(joints, q)), postures, *self._range(), starts=starts)
 
     def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
         """Raises InvalidInput where what is stable is next to nothing."""
@@ -202,19 +190,19 @@ class _Tuner:
         hint = (
             "a shorter `--period`, less latency of the actuators, or masses and moments that are nearer to each other"
         )
-        hopeless = [
-            Finding(
-                "TUNE003",
-                f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
-                f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "
-                f"{one.least:.2g} {unit} at least",
-                self._file.place("controllers", one.controller, "gains", one.joint),
-                hint,
-            )
-            for one in tuned
-            for unit in ("kg" if self._robot.joint(one.joint).type == "prismatic" else "kg m2",)
-            if one.limited_by in ("control step", "other joints") and one.frequency < HOPELESS * self._wish.bandwidth
-        ]
+        hopeless = []
+        for one in tuned:
+            if one.limited_by not in ("control step", "other joints"):
+                continue
+            if one.frequency < HOPELESS * self._wish.bandwidth:
+                unit = "kg" if self._robot.joint(one.joint).type == "prismatic" else "kg m2"
+                message = (
+                    f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
+                    f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "
+                    f"{one.least:.2g} {unit} at least"
+                )
+                place = self._file.place("controllers", one.controller, "gains", one.joint)
+                hopeless.append(Finding("TUNE003", message, place, hint))
         if hopeless:
             raise InvalidInput(hopeless)
 
@@ -254,21 +242,21 @@ class _Tuner:
 
     def _postures(self) -> Postures:
         """The named ones, and some from the whole range of the joints."""
-        start = self._start()
+        start = self.start()
         rng = np.random.default_rng(0)
         spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
         return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
 
     def _range(self) -> tuple[Array, Array]:
         """(n), (n) the least and the greatest of the joints."""
-        start = self._start()
+        start = self.start()
         low, high = start - WIDE, start + WIDE
         for k, joint in enumerate(self._robot.moving_joints):
             low[k] = low[k] if joint.limits.lower is None else joint.limits.lower
             high[k] = high[k] if joint.limits.upper is None else joint.limits.upper
         return low, high
 
-    def _start(self) -> Array:
+    def start(self) -> Array:
         """`home`, if there is such a pose; other joints at zero, or as near to it as their limits let them."""
         robot = self._robot
         q = np.zeros(len(robot.joint_names))
@@ -280,106 +268,15 @@ class _Tuner:
                 q[robot.indices(pose.joints)] = pose.positions
         return with_mimics(robot, q)
 
-    def tried(self, proposals: tuple[Tuned, ...], joints: Sequence[str]) -> tuple[Tuned, ...]:
-        """These joints step and come back, one after the other, while all others hold."""
-        robot, wish = self._robot, self._wish
-        start = self._start()
-        holders = [
-            _Holder(name, [one for one in proposals if one.controller == name], self._file.spec, robot, start)
-            for name in dict.fromkeys(one.controller for one in proposals)
-        ]
-        member = ENGINES["pybullet"]
-        refused = member.refuses(robot)
-        if refused:
-            raise InvalidInput(refused)
-        settings = EngineSettings(wish.period / wish.substeps, wish.substeps, start)
-        gravity = np.array(EARTH_GRAVITY)
-        with stdout_to_stderr():
-            engine = member.open(robot, Scene(bodies=(), frames=(), gravity=gravity), settings)
-            try:
-                manager = ControllerManager(
-                    holders,
-                    joints=robot.joint_names,
-                    period=wish.period,
-                    following=[joint.name for joint in robot.moving_joints if joint.mimic is not None],
-                    feed_forward=ModelFeedForward(robot, self._kinematics),
-                )
-                session = Session(
-                    robot=robot,
-                    scene=Scene(bodies=(), frames=(), gravity=gravity),
-                    engine=engine,
-                    manager=manager,
-                    period=wish.period,
-                )
-                for _ in range(round(RETURN / wish.period)):
-                    session.tick()
-                answers = {
-                    one.joint: _stepped(session, holder, one)
-                    for holder in holders
-                    for one in holder.tuned
-                    if one.joint in joints
-                }
-            finally:
-                engine.close()
-        return tuple(replace(one, simulated=answers[one.joint]) for one in proposals if one.joint in joints)
+
+def _inertia(k: int, load: Load) -> Array:
+    """(T,) of a joint whose others stand."""
+    return load.held_inertia[:, k]
 
 
-class _Holder:
-    """Holds joints with proposed gains at a reference that can be stepped: what their controller does with it."""
-
-    role: Role = "other"
-    senses_contact = False
-
-    def __init__(self, name: str, tuned: list[Tuned], spec: ControllersSpec, robot: RobotModel, start: Array) -> None:
-        own = spec.controllers[name]
-        self.name, self.tuned = name, tuned
-        self.joints = tuple(one.joint for one in tuned)
-        self.interfaces: tuple[Interface, ...] = (tuned[0].interface,)
-        weightless = getattr(own, "gravity_compensation", False) or getattr(own, "inverse_dynamics", False)
-        self.feed_forward: FeedForward = "gravity" if weightless else "none"
-        clamp = np.array([np.inf if one.i_clamp is None else one.i_clamp for one in tuned])
-        self._pid = Pid(
-            p=[one.p for one in tuned],
-            i=[one.i for one in tuned],
-            d=[one.d for one in tuned],
-            i_min=-clamp,
-            i_max=clamp,
-        )
-        self.output = ControllerOutput.of(len(tuned), 1)
-        self.reference = self.output.position
-        self.reference[:] = start[robot.indices(self.joints)]
-        self.measured = self.reference.copy()
-
-    def update(
-        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
-    ) -> ControllerOutput:
-        self.measured[:] = measured.position
-        error = self.reference - measured.position
-        self.output.command[:] = self._pid.update(error, period, -measured.velocity)
-        return self.output
-
-    def deactivate(self, time: float, reason: str = "") -> None:
-        self._pid.reset()
-
-
-def _stepped(session: Session, holder: _Holder, one: Tuned) -> StepAnswer:
-    """The joint steps, away from its nearer limit, and comes back."""
-    k = holder.joints.index(one.joint)
-    limits = session.robot.joint(one.joint).limits
-    before = float(holder.reference[k])
-    beyond = limits.upper is not None and before + 2.0 * one.predicted.size > limits.upper
-    size = -one.predicted.size if beyond else one.predicted.size
-    rest = float(session.state.position[session.robot.joint_names.index(one.joint)])
-    count = len(one.predicted.times)
-    share = np.zeros(count)
-    holder.reference[k] += size
-    for tick in range(count):
-        session.tick()
-        share[tick] = (float(holder.measured[k]) - rest) / size
-    holder.reference[k] = before
-    for _ in range(max(count, round(RETURN / session.period))):
-        session.tick()
-    return StepAnswer(abs(size), one.predicted.times, share)
+def _lightness(k: int, load: Load) -> Array:
+    """(T,) the inverse of what the effort of a joint alone moves."""
+    return np.asarray(1.0 / load.own_inertia[:, k])
 
 
 def _with_gains(spec: ControllersSpec, tuned: Sequence[Tuned]) -> ControllersSpec:
