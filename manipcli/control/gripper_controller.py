@@ -203,7 +203,7 @@ class GripperController:
 
         Args:
             measured: (n) of the controller's joints.
-            contact_force: (n) [N] on what each joint moves, up to the next joint; None: contact is not sensed.
+            contact_force: (n) [N], see `Controller.update`; None: contact is not sensed.
         """
         self._time = time
         self._measured = measured.position
@@ -311,10 +311,15 @@ class GripperController:
             self._end_motion()
 
     def _winds_up(self, f: int) -> bool:
-        """Whether a finger will be pushed harder: a reference is on its way, and its effort not at its maximum."""
+        """Whether a finger will be pushed harder: a reference is on its way, and its effort not at its maximum.
+
+        Where positions are commanded nobody here knows the effort: a reference on its way is enough.
+        """
         for j in self._fingers[f]:
-            way, push, most = self._target[j] - self._reference[j], self._command[j], self._effort[j]
-            if (way > REACHED and push < most) or (way < -REACHED and push > -most):
+            way = self._target[j] - self._reference[j]
+            if abs(way) <= REACHED:
+                continue
+            if self._pid is None or math.copysign(1.0, way) * self._command[j] < self._effort[j]:
                 return True
         return False
 

@@ -125,17 +125,30 @@ def test_a_finger_that_cannot_press_as_hard_as_asked_says_what_it_felt():
     assert "asked" not in reached
 
 
-def test_stall_takes_its_time():
-    """From when the finger gives all that it may: at once here, where the reference's speed alone asks for 0.2 N m."""
-    controller = make(stall_time=0.05, max_effort=0.2)
-    frozen = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
-    handle = controller.send_goal(GripperGoal(target=np.ones(4)))
-    for k in range(50):
-        controller.update(k * PERIOD, PERIOD, frozen)
+@pytest.mark.parametrize(
+    ("settings", "at", "target", "stalls"),
+    [
+        ({"stall_time": 0.05, "max_effort": 0.2}, 0.0, 1.0, 0.05),
+        ({"speed": 1.0, "max_effort": 0.2}, 0.3, 0.0, 0.2 + 0.1 / 3.0),
+        ({"speed": 1.0, "max_effort": None}, 0.3, 0.0, 0.5),
+        ({"speed": 1.0, "max_effort": None, "interface": "position", "gains": {}}, 0.3, 0.0, 0.5),
+    ],
+    ids=["closes with all it may", "opens with all it may", "opens by effort", "opens by position"],
+)
+def test_a_stall_takes_its_time(settings, at, target, stalls):
+    """From when nothing pushes harder: at 0.2 N m, which the reference's speed asks for at once where that is 2 rad/s,
+    and with the 0.1 / 3 rad of its way where it is 1 rad/s; else when the reference has gone all its way."""
+    controller = make(**settings)
+    stuck = JointState(position=np.full(4, at), velocity=np.zeros(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=np.full(4, target)))
+    ticks = round(stalls / PERIOD)
+    for k in range(ticks - 3):
+        controller.update(k * PERIOD, PERIOD, stuck)
     assert handle.active
-    for k in range(50, 53):
-        controller.update(k * PERIOD, PERIOD, frozen)
+    for k in range(ticks - 3, ticks + 3):
+        controller.update(k * PERIOD, PERIOD, stuck)
     assert handle.result.fingers == ("stalled", "stalled")
+    assert f"stalled {abs(target - at):g} before the target" in handle.result.text
 
 
 def test_a_finger_has_not_stalled_as_long_as_its_reference_winds_it_up():
@@ -158,19 +171,6 @@ def test_a_finger_that_pressed_opens_from_where_it_is():
     hand.run(controller, 0.5)  # 0.3 rad at 0.8 rad/s take 0.375 s
     assert handle.result.fingers == ("reached", "reached")
     assert hand.q == pytest.approx(np.zeros(4), abs=0.02)
-
-
-def test_a_finger_that_cannot_open_stalls_when_its_reference_is_there():
-    controller = make(speed=1.0, max_effort=None)
-    stuck = JointState(position=np.full(4, 0.3), velocity=np.zeros(4), effort=np.zeros(4))
-    handle = controller.send_goal(GripperGoal(target=np.zeros(4)))
-    for k in range(490):
-        controller.update(k * PERIOD, PERIOD, stuck)
-    assert handle.active
-    for k in range(490, 510):
-        controller.update(k * PERIOD, PERIOD, stuck)
-    assert handle.result.fingers == ("stalled", "stalled")
-    assert "stalled 0.3 before the target" in handle.result.text
 
 
 def test_a_firmer_grip_goes_on_from_the_one_before():
