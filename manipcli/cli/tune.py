@@ -64,7 +64,7 @@ def tune(
 ) -> ExitCode:
     """Propose gains, and show how the joints answer a step with them.
 
-    As much of the bandwidth and damping as is stable at the control period in all postures, and as efforts allow.
+    As much of bandwidth and damping as is stable at the control period in all postures looked at, and as efforts allow.
     """  # fmt: skip
     if write is not None and write.exists() and not force:
         message = f"'{write}' exists"

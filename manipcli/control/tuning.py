@@ -235,12 +235,12 @@ def tightness(load: Load, tuned: Sequence[Tuned], wish: Wish) -> Array:
     return np.asarray(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(load.mass) * root)[:, -1])
 
 
-def keeps_margin(load: Load, tuned: Sequence[Tuned], wish: Wish) -> bool:
-    """Whether all of these gains could be `MARGIN` times as large, in every posture."""
+def least_margin(load: Load, tuned: Sequence[Tuned], wish: Wish) -> float:
+    """By what factor all of these gains may grow in every posture; 0 where they are unstable in one."""
     p, i, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "i", "d"))
     late = np.array(load.latency)
     loops = (Loop(mass, p, d, i, load.damping, wish.period, wish.substeps, late) for mass in load.mass)
-    return all(is_stable(loop.scaled(MARGIN)) for loop in loops)
+    return min(gain_margin(loop) for loop in loops)
 
 
 def _tuned(load: Load, k: int, controller: str, draft: _Draft, wish: Wish, step: float, left: float) -> Tuned:

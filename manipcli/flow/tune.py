@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from manipcli.control.reflected import Load, Postures, load_of
-from manipcli.control.tuning import Tuned, Wish, keeps_margin, tightness, tune_efforts, tune_velocity
+from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
@@ -74,7 +74,7 @@ def tune(
         simulated: also let every joint of the whole robot step in the engine, under gravity.
 
     Raises:
-        InvalidInput: a file cannot be used, a joint has no loop, or nothing has gains.
+        InvalidInput: a file cannot be used, a joint has no loop, nothing has gains, or none are stable.
     """
     _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
     file = load.load_controllers(controllers_path)
@@ -171,10 +171,13 @@ class _Tuner:
             tuned = tune_efforts(names, met, self._wish, steps=steps, carried=carried, pressing=pressing)
             tight = partial(tightness, tuned=tuned, wish=self._wish)
             tightest = self._extreme(joints, tight, postures, starts=3)
-            if keeps_margin(self._load(joints, tightest[None]), tuned, self._wish):
+            margin = least_margin(self._load(joints, tightest[None]), tuned, self._wish)
+            if margin >= MARGIN:
                 break
             postures = np.vstack([postures, tightest])
         self._refuse_hopeless(tuned)
+        if margin < MARGIN:
+            self._tell_margin(margin)
         return tuned
 
     def _load(self, joints: list[str], q: Array) -> Load:
@@ -183,6 +186,15 @@ class _Tuner:
     def _extreme(self, joints: list[str], score: Callable[[Load], Array], postures: Array, *, starts: int = 1) -> Array:
         """(n) the posture in which the score of what these joints meet is largest, uphill from `postures` (T, n)."""
         return climbed(self._robot, lambda q: score(self._load(joints, q)), postures, *self._range(), starts=starts)
+
+    def _tell_margin(self, margin: float) -> None:
+        """Notes that less than `MARGIN` is left; raises InvalidInput where these gains are unstable (0)."""
+        there = f"in a posture that was found last, after {ROUNDS} rounds of calming all gains"
+        if margin < 1.0:
+            hint = "a shorter `--period`, or less `--bandwidth`"
+            message = f"no gains were found that are stable in all postures: these are unstable {there}"
+            raise InvalidInput([Finding("TUNE003", message, self._file.place("controllers"), hint)])
+        self.notes += (f"But {there}, all of them together may grow by {margin:.2g} alone, not by {MARGIN:g}.",)
 
     def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
         """Raises InvalidInput where what is stable is next to nothing."""

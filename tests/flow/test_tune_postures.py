@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from manipcli.control.reflected import Load
 from manipcli.control.tuning import MARGIN, Wish, tune_efforts
+from manipcli.core.errors import InvalidInput
 from manipcli.flow.extremes import climbed
 from manipcli.flow.load import load_task
 from manipcli.flow.tune import tune
@@ -53,6 +55,24 @@ def test_the_top_of_a_hill_is_found() -> None:
 
     found = climbed(robot, score, np.zeros((1, n)), np.full(n, -1.0), np.full(n, 0.5))
     assert found[free] == pytest.approx(np.clip(top, -1.0, 0.5)[free], abs=0.01)
+
+
+def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After one round the iiwa's are not calm where they are tightest."""
+    files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
+    monkeypatch.setattr("manipcli.flow.tune.ROUNDS", 1)
+    (note,) = (one for one in tune(*files, Wish(20.0, 1.0, H)).notes if "may grow" in one)
+    found = re.fullmatch(r"But in a posture .* all of them together may grow by ([\d.]+) alone, not by 2\.", note)
+    assert found is not None
+    assert 1.0 <= float(found[1]) <= MARGIN
+
+
+def test_gains_that_are_unstable_somewhere_are_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
+    monkeypatch.setattr("manipcli.flow.tune.ROUNDS", 1)
+    monkeypatch.setattr("manipcli.control.tuning.MARGIN", 0.9)
+    with pytest.raises(InvalidInput, match="these are unstable in a posture that was found last"):
+        tune(*files, Wish(20.0, 1.0, H))
 
 
 @pytest.mark.slow
