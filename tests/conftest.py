@@ -63,6 +63,33 @@ def pour_run(run_cli: RunCli, tmp_path_factory: pytest.TempPathFactory) -> PourR
     return PourRun(ran, folder / "runs" / "pour.mcap")
 
 
+Pendulum = Callable[..., Path]
+
+
+@pytest.fixture
+def pendulum(tmp_path: Path) -> Pendulum:
+    """Writes `robot.yaml`, 1 kg that hangs 0.25 m below a `hinge` of 20 N m, and gives its folder.
+
+    `robot` is written at the end of that file, `urdf` at that of the description.
+    """
+
+    def write(robot: str, *, urdf: str = "") -> Path:
+        (tmp_path / "pendulum.urdf").write_text(
+            """<robot name="pendulum"><link name="base"/>
+<link name="arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
+<inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="3" effort="20"/></joint>"""
+            f"{urdf}</robot>"
+        )
+        (tmp_path / "robot.yaml").write_text(
+            f"robot: pendulum\ndescription: pendulum.urdf\ngroups: {{all: {{joints: [hinge]}}}}\n{robot}"
+        )
+        return tmp_path
+
+    return write
+
+
 Rewrite = Callable[..., Path]
 
 

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from manipcli.cli.app import main
 
-URDF = """<robot name="pendulum"><link name="base"/>
-<link name="arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
-<inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" velocity="3" effort="20"/></joint></robot>"""
-ROBOT = """robot: pendulum
-description: pendulum.urdf
-groups: {all: {joints: [hinge]}}
-poses: {zero: {all: [0]}, up: {all: [0.2]}}
+ROBOT = """poses: {zero: {all: [0]}, up: {all: [0.2]}}
 tool: {link: arm}
 limits: {hinge: {acceleration: 10}}
 """
@@ -36,17 +29,16 @@ arm:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    (tmp_path / "pendulum.urdf").write_text(URDF)
-    (tmp_path / "robot.yaml").write_text(ROBOT)
-    (tmp_path / "c.yaml").write_text(ROS)
+def folder(pendulum: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = pendulum(ROBOT)
+    (folder / "c.yaml").write_text(ROS)
     for name, to in (("good", "up"), ("far", "{hinge: 3}")):
-        (tmp_path / f"{name}.yaml").write_text(
+        (folder / f"{name}.yaml").write_text(
             f"task: {name}\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\n"
-            f"simulation: {{engine: kinematic}}\nsteps: [{{move: {{to: {to}}}}}]\n"
+            f"simulation: {{settle: 0}}\nsteps: [{{move: {{to: {to}}}}}]\n"
         )
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    monkeypatch.chdir(folder)
+    return folder
 
 
 @pytest.mark.parametrize(("task", "codes"), [("good.yaml", ["CTRL214", "CTRL150"]), ("far.yaml", ["CTRL214"])])
@@ -80,3 +72,14 @@ def test_a_suite_has_them_too(folder: Path, capsys: pytest.CaptureFixture[str]) 
     (case,) = json.loads(capsys.readouterr().out)["cases"]
     assert [one["code"] for one in case["warnings"]] == ["CTRL214", "CTRL150"]
     assert [one["code"] for one in case["run"]["errors"]] == ["CTRL214", "CTRL150"]
+
+
+def test_gains_that_nothing_feels_are_not_doubted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The engine without physics makes references come true."""
+    kinematic = ["--set", "simulation.engine=kinematic", "--format", "json"]
+    assert main(["run", "good.yaml", *kinematic]) == 0
+    assert [one["code"] for one in json.loads(capsys.readouterr().out)["errors"]] == ["CTRL214"]
+    (folder / "good.yaml").write_text((folder / "good.yaml").read_text().replace("settle: 0", "engine: kinematic"))
+    main(["check", "good.yaml", "--format", "json"])
+    codes = [one["code"] for one in json.loads(capsys.readouterr().out)["findings"] if one["severity"] == "warning"]
+    assert codes == ["CTRL214"]

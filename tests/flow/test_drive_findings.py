@@ -12,18 +12,10 @@ from manipcli.core.errors import Finding
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 
-URDF = """<robot name="pendulum"><link name="base"/>
-<link name="arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
-<inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" velocity="3" effort="20"/></joint>
-<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
+TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
 <joint name="hinge"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>
-<actuator name="motor"><mechanicalReduction>50</mechanicalReduction></actuator></transmission></robot>"""
-ROBOT = """robot: pendulum
-description: pendulum.urdf
-groups: {all: {joints: [hinge]}}
-poses: {zero: {all: [0]}, up: {all: [1.2]}}
+<actuator name="motor"><mechanicalReduction>50</mechanicalReduction></actuator></transmission>"""
+ROBOT = """poses: {zero: {all: [0]}, up: {all: [1.2]}}
 tool: {link: arm}
 limits: {hinge: {acceleration: 10}}
 actuators: {motor: {effort: 1, MORE}}
@@ -34,17 +26,16 @@ NEEDED = 9.81 * 0.25 * 0.932
 
 
 @pytest.fixture
-def found(tmp_path: Path) -> Found:
+def found(pendulum: Callable[..., Path]) -> Found:
     def of(controller: str, *overrides: str, more: str = "rotor_inertia: 2e-5") -> tuple[Finding, ...]:
-        (tmp_path / "pendulum.urdf").write_text(URDF)
-        (tmp_path / "robot.yaml").write_text(ROBOT.replace("MORE", more))
-        (tmp_path / "c.yaml").write_text(
+        folder = pendulum(ROBOT.replace("MORE", more), urdf=TRANSMISSION)
+        (folder / "c.yaml").write_text(
             f"controllers:\n  c: {{type: joint_trajectory, joints: [hinge], {controller}}}\n"
         )
-        (tmp_path / "task.yaml").write_text(
+        (folder / "task.yaml").write_text(
             "task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{move: {to: up}}]\n"
         )
-        return gain_findings(load_task(tmp_path / "task.yaml", overrides=overrides))
+        return gain_findings(load_task(folder / "task.yaml", overrides=overrides))
 
     return of
 

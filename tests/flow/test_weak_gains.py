@@ -15,29 +15,19 @@ from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
 from manipcli.record.reading import read_recording
 
-URDF = """<robot name="pendulum"><link name="base"/>
-<link name="arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
-<inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" velocity="3" effort="20"/></joint></robot>"""
-ROBOT = """robot: pendulum
-description: pendulum.urdf
-groups: {all: {joints: [hinge]}}
-poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}
-"""
+POSES = "poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}"
 WEIGHT = 1.0 * 9.80665 * 0.25 * math.sin(1.2)
 """[N m]"""
 Written = Callable[..., Path]
 
 
 @pytest.fixture
-def written(tmp_path: Path) -> Written:
+def written(pendulum: Written) -> Written:
     def of(gains: str, *, more: str = "", start: str = "up", steps: str = "{wait: 1 s}") -> Path:
-        (tmp_path / "pendulum.urdf").write_text(URDF)
-        (tmp_path / "robot.yaml").write_text(ROBOT)
+        folder = pendulum(POSES)
         head = "controllers:\n  c: {type: joint_trajectory, joints: [hinge], command_interface: effort"
-        (tmp_path / "c.yaml").write_text(f"{head}, gains: {{hinge: {{{gains}}}}}{more}}}\n")
-        task = tmp_path / "task.yaml"
+        (folder / "c.yaml").write_text(f"{head}, gains: {{hinge: {{{gains}}}}}{more}}}\n")
+        task = folder / "task.yaml"
         task.write_text(f"task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: {start}\nsteps: [{steps}]\n")
         return task
 
