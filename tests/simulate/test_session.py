@@ -204,6 +204,19 @@ def test_a_body_that_leaves_the_plausible_is_named(
     assert caught.value.time == pytest.approx(0.02)
 
 
+def listened(session: Session) -> list[list[float]]:
+    """The contact forces that its manager is told from now on, tick by tick."""
+    told: list[list[float]] = []
+    update = session.manager.update
+
+    def listening(time: float, state: Any, contact_force: Any) -> Any:
+        told.append(contact_force.tolist())
+        return update(time, state, contact_force)
+
+    session.manager.update = listening  # type: ignore[method-assign]
+    return told
+
+
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_joint_feels_what_touches_the_links_that_it_moves_last(
     session_of: SessionOf, scripted: Any, mirrored: bool
@@ -223,15 +236,8 @@ def test_a_joint_feels_what_touches_the_links_that_it_moves_last(
     )
     if mirrored:
         engine.touching = tuple(one._replace(a=one.b, b=one.a) for one in engine.touching)
-    felt: list[list[float]] = []
     session = session_of(engine)
-    update = session.manager.update
-
-    def listening(time: float, state: Any, contact_force: Any) -> Any:
-        felt.append(contact_force.tolist())
-        return update(time, state, contact_force)
-
-    session.manager.update = listening  # type: ignore[method-assign]
+    felt = listened(session)
     ticks(session, 3)
     assert felt == [[0.0, 0.5, 3.0]] * 3
     engine.touching = ()
@@ -257,14 +263,7 @@ def test_a_joint_feels_what_those_that_mimic_it_do(
         robot=replace(other.robot, joints=joints), scene=other.scene, engine=engine, manager=other.manager,
         period=other.period,
     )  # fmt: skip
-    told: list[list[float]] = []
-    update = session.manager.update
-
-    def listening(time: float, state: Any, contact_force: Any) -> Any:
-        told.append(contact_force.tolist())
-        return update(time, state, contact_force)
-
-    session.manager.update = listening  # type: ignore[method-assign]
+    told = listened(session)
     ticks(session, 1)
     assert told == [felt]
 
