@@ -270,9 +270,6 @@ def format_quantity(value: float, dimension: Dimension) -> str:
     return f"{value!r} {symbol}" if symbol else repr(value)
 
 
-NOTHING: Final = 1e-300
-"""What is less than this is 0, with a sign at most."""
-
 _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1.0, "m", 1.0), (1e-3, "mm", 1e3), (0.0, "um", 1e6)),
     "rad": ((0.0, "deg", 180.0 / math.pi),),
@@ -288,7 +285,7 @@ def readable(value: float, symbol: str, *, digits: int = 3) -> str:
     """`value` in the SI unit `symbol`, for people: `readable(0.0042, "m")` is `4.2 mm`; angles in degrees."""
     if not math.isfinite(value):
         return f"{value:g} {symbol}".rstrip()
-    if abs(value) < NOTHING:
+    if value == 0.0:
         return f"0 {symbol}".rstrip()  # never -0
     for least, shown, factor in _READABLE.get(symbol, ()):
         if abs(value) >= least:

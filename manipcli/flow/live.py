@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.controller import Controller, ControllerOutput
-from manipcli.core.units import NOTHING, readable
 from manipcli.flow.log import recorded
 from manipcli.model.condition import World
 from manipcli.model.conditions import CONDITIONS
@@ -66,8 +65,7 @@ class Probe:
         if not self._last.applies[-1]:
             return self._word + self._last.idle
         found = self._last.found(len(self._last.margins) - 1)
-        by = f" by {readable(-found.margin, found.unit)}" if found.margin < -NOTHING and found.unit else ""
-        return f"it fails{by}: {self._word}{found.text}"
+        return f"it fails{found.lacking}: {self._word}{found.text}"
 
     def look(self, moments: Moments, start: int) -> None:
         """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""

@@ -207,7 +207,7 @@ _STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": 
 def _missed(one: ExpectationOutcome) -> str:
     if one.outcome == "not_evaluated":
         return "was never evaluated"
-    return f"fails by {quantity(abs(one.margin), one.unit)}" if one.margin else "fails"
+    return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
 
 
 def _before_or_after(verdict: Verdict) -> bool:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.core.units import NOTHING, readable
 from manipcli.flow.live import Live, Probe
 from manipcli.judge.expectation import ROUNDING, labels
 from manipcli.model.moments import Moments
@@ -79,8 +78,7 @@ def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Read
         return None
     tick = int(np.argmax(bad))
     found, time = answer.found(tick), float(moments.times[tick])
-    by = f" by {readable(-found.margin, found.unit)}" if found.margin < -NOTHING else ""
-    return Broken(k, f"'{name}' is broken at t = {time:.3f} s{by}: {found.text}")
+    return Broken(k, f"'{name}' is broken at t = {time:.3f} s{found.lacking}: {found.text}")
 
 
 def _during(steps: Sequence[str], moments: Moments) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

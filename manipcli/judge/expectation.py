@@ -21,7 +21,7 @@ from manipcli.model.condition import Condition, Problem, Setting, World
 from manipcli.model.conditions.step_done import StepDoneSpec
 from manipcli.model.formula import absent, opened, problems, scopes
 from manipcli.model.moments import Moments
-from manipcli.model.reading import Extreme, Measured, NotEvaluated, Reading, never
+from manipcli.model.reading import EDGE, Extreme, Measured, NotEvaluated, Reading, never
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
@@ -227,15 +227,16 @@ def _undone(condition: ConditionSpec, step: str, steps: Sequence[str]) -> tuple[
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:
-    """The outcome of an expectation called `name`: met from a margin of zero on."""
+    """The outcome of an expectation called `name`: met from a margin of zero on, or missed by `EDGE` at least."""
     if isinstance(found, NotEvaluated):
         return ExpectationOutcome(
             name=name, outcome="not_evaluated", margin=None, unit=found.unit, at=None, text=found.reason
         )
+    passed = found.margin >= 0.0
     return ExpectationOutcome(
         name=name,
-        outcome="passed" if found.margin >= 0.0 else "failed",
-        margin=found.margin,
+        outcome="passed" if passed else "failed",
+        margin=found.margin if passed else min(found.margin, -EDGE),
         unit=found.unit,
         at=found.at,
         text=found.text,

@@ -8,6 +8,7 @@ from typing import Literal
 from manipcli.core.errors import Finding
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
+from manipcli.model.reading import EDGE
 
 VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]
@@ -50,7 +51,7 @@ class StepOutcome:
 
 @dataclass(frozen=True, slots=True)
 class ExpectationOutcome:
-    """How one expectation was met. `margin` in `unit` is positive when met; `at` [s] is its worst moment."""
+    """How one expectation was met. `margin` in `unit` is below 0 when it is not; `at` [s] is its worst moment."""
 
     name: str
     outcome: ExpectationWord
@@ -58,6 +59,15 @@ class ExpectationOutcome:
     unit: str
     at: float | None
     text: str = ""
+
+    @property
+    def distance(self) -> float:
+        """How much in `unit` was to spare, or by how much it is missed; 0 where there is nothing to tell a reader.
+
+        So it is with what never touched, and with what has no unit.
+        """
+        size = abs(self.margin or 0.0)
+        return size if self.unit and size > EDGE else 0.0
 
 
 @dataclass(frozen=True, slots=True)

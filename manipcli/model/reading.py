@@ -3,7 +3,8 @@
     all: the least of the members,  any: the greatest,  not: the opposite;  always: the least over time,
     eventually: the greatest over time          (Donze and Maler, Robust satisfaction of temporal logic, 2010)
 
-A margin of 0 is met; its opposite is not, so that of a condition and its `not` exactly one holds.
+A margin of 0 is met; its opposite is not, so that of a condition and its `not` exactly one holds: what is met by less
+than `EDGE` counts there as met by that.
 
 Margins in one unit compare as they are. Where units differ, as a tilt's and a distance's do, margins compare by
 themselves over the tolerance that each was compared to; signs come first in either order. What is told is the margin of
@@ -12,7 +13,6 @@ the deciding member at the deciding moment, in its own unit.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -21,12 +21,16 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array
+from manipcli.core.units import readable
 
 Mask = npt.NDArray[np.bool_]
 Pick = Literal["least", "greatest"]
 
-EDGE: Final = sys.float_info.min
-"""Minus this, the least normal number, is the opposite of a margin of 0; readable text calls it 0."""
+EDGE: Final = 1e-9
+"""Least amount, in the SI unit of a margin, by which a condition is missed: the opposite of 0 is minus this.
+
+The numbers of `--format json` are rounded to as much, and keep their sign.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,11 @@ class Measured:
     unit: str
     at: float | None
     text: str = ""
+
+    @property
+    def lacking(self) -> str:
+        """` by 3 mm`, how far it is from holding; "" where there is nothing to tell."""
+        return f" by {readable(-self.margin, self.unit)}" if self.unit and self.margin < -EDGE else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,14 +125,19 @@ def greatest(readings: Sequence[Reading]) -> Reading:
 
 
 def opposite(of: Reading, *, word: str = "not ") -> Reading:
-    """`not`: the same margin with the other sign, 0 counting as above 0; `word` is said before what was found."""
+    """`not`: the same margin with the other sign, and -`EDGE` at most where `of` holds; `word` is said before what was
+    found."""
 
     def found(k: int) -> Measured:
         one = of.found(k)
-        return replace(one, margin=-one.margin if one.margin else -EDGE, text=f"{word}{one.text}")
+        return replace(one, margin=float(_negated(np.asarray(one.margin))), text=f"{word}{one.text}")
 
-    margins, relative = (np.where(one == 0.0, -EDGE, -one) for one in (of.margins, of.relative))
-    return replace(of, margins=margins, relative=relative, found=found)
+    return replace(of, margins=_negated(of.margins), relative=_negated(of.relative), found=found)
+
+
+def _negated(margins: Array) -> Array:
+    # Never rising, so that `not` of `all` stays `any` of `not`s.
+    return np.where(margins >= 0.0, -np.maximum(margins, EDGE), -margins)
 
 
 def never(of: Reading) -> Reading:

@@ -98,7 +98,7 @@ def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str
     margin = "" if one.margin is None else f"margin {one.margin:+z.9g} {one.unit}".rstrip()
     when = "" if one.at is None else f"at {one.at:.3f} s"
     if one.outcome == "failed":
-        size = f" by {quantity(abs(one.margin), one.unit)}" if one.margin else ""
+        size = f" by {quantity(one.distance, one.unit)}" if one.distance else ""
         _add(case, "failure", f"expectation '{one.name}' fails{size}: {one.text}", "failed", [margin, when])
     elif one.outcome == "not_evaluated":
         excused = verdict.verdict == "error" or _steps_failed(verdict)

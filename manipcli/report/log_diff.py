@@ -203,9 +203,9 @@ def _expectations(a: LogSide, b: LogSide) -> str:
 
 def _met(one: ExpectationOutcome) -> str:
     word = one.outcome.replace("_", " ")
-    if not one.margin:
+    if not one.distance:
         return word
-    return f"{word}, {quantity(abs(one.margin), one.unit)} {'to spare' if one.outcome == 'passed' else 'beyond'}"
+    return f"{word}, {quantity(one.distance, one.unit)} {'to spare' if one.outcome == 'passed' else 'beyond'}"
 
 
 def _side_object(side: LogSide) -> Json:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from manipcli.core.units import NOTHING
-
 _CUSTOMARY = {
     "m": ("mm", 1e3),
     "rad": ("deg", 180.0 / math.pi),
@@ -22,7 +20,7 @@ def quantity(value: float, unit: str) -> str:
     if not math.isfinite(value):
         return "unlimited" if value > 0 else str(value)
     name, scale = (unit, 1.0) if unit == "m" and abs(value) >= 1.0 else _CUSTOMARY.get(unit, (unit, 1.0))
-    number = value * scale if abs(value) >= NOTHING else 0.0
+    number = value * scale
     size = abs(number)
     digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:z.2g}"
     return f"{digits} {name}".rstrip()

@@ -108,7 +108,7 @@ class CaseReport:
         """
         judged = self.run.verdict.expectations if self.run is not None else ()
         known = [one for one in judged if one.margin is not None]
-        return min(known, key=lambda one: (one.outcome == "passed", not one.margin, one.margin), default=None)
+        return min(known, key=lambda one: (one.outcome == "passed", not one.distance, one.margin), default=None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,12 +36,12 @@ def gist(report: CaseReport) -> str:
     if report.passed:
         if tightest is None:
             return "nothing expected" if report.run is not None and not report.run.verdict.expectations else ""
-        if not tightest.margin:
+        if not tightest.distance:
             return ""
-        return f"{tightest.name}: {quantity(tightest.margin, tightest.unit)} to spare"
+        return f"{tightest.name}: {quantity(tightest.distance, tightest.unit)} to spare"
     cause = report.troubles[0].message if report.troubles else report.text
-    if tightest is not None and tightest.outcome == "failed" and tightest.margin and cause.startswith(tightest.name):
-        return f"{tightest.name}: fails by {quantity(abs(tightest.margin), tightest.unit)}"
+    if tightest is not None and tightest.outcome == "failed" and tightest.distance and cause.startswith(tightest.name):
+        return f"{tightest.name}: fails by {quantity(tightest.distance, tightest.unit)}"
     return cause
 
 
@@ -78,7 +78,7 @@ def judged_lines(report: CaseReport) -> list[str]:
     if report.run is None:
         return []
     return [
-        f"{PASS} {one.name}" + (f": {quantity(one.margin, one.unit)} to spare" if one.margin else "")
+        f"{PASS} {one.name}" + (f": {quantity(one.distance, one.unit)} to spare" if one.distance else "")
         for one in report.run.verdict.expectations
         if one.outcome == "passed"
     ]

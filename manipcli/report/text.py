@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import number_of, one_line
-from manipcli.core.units import NOTHING
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport
@@ -167,11 +166,9 @@ def _margin(expectation: ExpectationOutcome) -> str:
         return f"was never evaluated{detail}"
     passed = expectation.outcome == "passed"
     when = "" if expectation.at is None else f" ({'tightest' if passed else 'worst'} at {expectation.at:.2f} s)"
-    if (
-        expectation.margin is None or abs(expectation.margin) < NOTHING
-    ):  # none, or none to spare: 0 N between what never touched
+    if not expectation.distance:
         return f"{'passes' if passed else 'fails'}{when}{detail}"
-    size = quantity(abs(expectation.margin), expectation.unit)
+    size = quantity(expectation.distance, expectation.unit)
     return f"{f'passes with {size} to spare' if passed else f'fails by {size}'}{when}{detail}"
 
 

@@ -99,7 +99,7 @@ def by_hand(formula: Node | Leaf, k: int) -> tuple[float, str, bool]:
     members = [by_hand(one, k) for one in formula.members]
     applies = all(one[2] for one in members)
     if formula.word == "not":
-        return -members[0][0] or -EDGE, members[0][1], applies
+        return -members[0][0] or -EDGE, members[0][1], applies  # no other is as small
     mixed = len(units_of(formula)) > 1
     pick = min if formula.word == "all" else max
     margin, unit, _ = pick(members, key=lambda one: order(one[0], one[1], mixed))
@@ -168,7 +168,16 @@ def test_of_a_condition_without_room_and_its_not_exactly_one_is_met() -> None:
         assert (one.order >= 0.0).tolist() == [met]
         assert (one.relative >= 0.0).tolist() == [met]
         assert (one.found(0).margin >= 0.0) is met
-        assert one.found(0).margin == pytest.approx(0.0, abs=1e-300)
+        assert one.found(0).margin == one.margins[0] == pytest.approx(0.0, abs=EDGE)
+
+
+@given(st.lists(st.floats(-3 * EDGE, 3 * EDGE), min_size=2, max_size=4))
+def test_also_beside_the_edge_not_of_all_is_any_of_nots(margins: list[float]) -> None:
+    members = [reading(np.array([one]), TIMES[:1], unit="N", scale=1.0, say=str) for one in margins]
+    every, against = opposite(least(members)), greatest([opposite(one) for one in members])
+    assert every.margins.tolist() == against.margins.tolist() == [every.found(0).margin]
+    assert (every.margins[0] >= 0.0) == (min(margins) < 0.0)
+    assert abs(every.margins[0]) >= (EDGE if min(margins) >= 0.0 else 0.0)
 
 
 def test_signs_come_before_sizes_where_units_differ() -> None:

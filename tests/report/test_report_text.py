@@ -64,7 +64,7 @@ def test_a_pass_with_nothing_to_spare_is_a_pass() -> None:
     assert "passes: never touched" in render_verdict(replace(PASSED, expectations=(outcome,)), "x")
     against = ExpectationOutcome("not", "failed", -EDGE, "N", None, "not never touched")
     assert "fails: not never touched" in render_verdict(replace(PASSED, expectations=(against,)), "x")
-    assert quantity(-EDGE, "N") == readable(-EDGE, "N") == "0 N"
+    assert readable(-0.0, "N") == "0 N"
 
 
 def test_a_failure_begins_with_its_first_cause() -> None:
