@@ -20,7 +20,6 @@ from manipcli.flow.load import Task
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Actuator, RobotModel
-from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers import GainsSpec, Interface, JointTrajectorySpec
 
 RINGING: Final = 0.5
@@ -42,9 +41,7 @@ class Driven:
 
 
 def driven_joints(task: Task, active: Collection[str]) -> tuple[Driven, ...]:
-    """Those of these controllers to which no effort is added; none where the engine makes references come true."""
-    if ENGINES[task.spec.simulation.engine].physics != "full":
-        return ()
+    """Those of these controllers to which no effort is added."""
     period = task.spec.simulation.control_period
     found = []
     for name, spec in task.controllers.controllers.items():

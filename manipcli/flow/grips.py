@@ -17,7 +17,6 @@ from manipcli.flow.plan import Plan
 from manipcli.plan.hand import fingers, moved_links, with_mimics
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation
-from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers import GainsSpec, GripperSpec
 
 ENOUGH: Final = 1.01
@@ -70,8 +69,6 @@ def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
     Its solver stops after a number of iterations, each of which carries an impulse from one finger through the object
     to the other: of two that are heavy beside what is between them, an error of their forces is left, and moves it.
     """
-    if ENGINES[task.spec.simulation.engine].physics != "full":
-        return
     for k, step in enumerate(plan.steps):
         carried = step.plan.end.carried
         for grip in (motion.grip for motion in step.plan.motions):
