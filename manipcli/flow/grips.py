@@ -11,7 +11,7 @@ import numpy as np
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits, told_apart
-from manipcli.core.units import EARTH_GRAVITY, readable
+from manipcli.core.units import readable
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
 from manipcli.plan.hand import fingers, moved_links, with_mimics
@@ -21,9 +21,9 @@ from manipcli.spec.controllers import GainsSpec, GripperSpec
 
 ENOUGH: Final = 1.01
 """A force that is asked beyond this share of what there is is not met."""
-LIGHT: Final = 75.0
-"""A force so many times the weight lets an object creep: measured with two hands, by 0.2 to 0.5 mm in a carry of 4 s at
-50 times, by 1 to 4 mm at 100 times, and by a centimetre at 700 to 1000 times."""
+LIGHT: Final = 740.0
+"""[N/kg] A force so large for the mass lets an object creep: measured with two hands, by 0.2 to 0.5 mm in a carry of
+4 s at 500 N/kg, by 1 to 4 mm at 1000 N/kg, and by a centimetre at 7000 to 10000 N/kg."""
 NUDGE: Final = 1e-4
 """[rad or m] by which a finger is moved to see how its parts move."""
 
@@ -64,7 +64,7 @@ def strained(task: Task, plan: Plan) -> Iterator[Finding]:
 
 
 def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
-    """Grasps of objects that weigh next to nothing beside the force, by which the engine lets them creep.
+    """Grasps of objects of next to no mass beside the force, by which the engine lets them creep, whatever gravity is.
 
     Its solver stops after a number of iterations, each of which carries an impulse from one finger through the object
     to the other: of two that are heavy beside what is between them, an error of their forces is left, and moves it.
@@ -75,11 +75,10 @@ def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
             if carried is None or grip is None or grip.force is None:
                 continue
             mass = task.scene.body(carried.body).mass
-            weight = mass * abs(EARTH_GRAVITY[2])
-            if grip.force > LIGHT * weight:
-                message = f"step '{step.id}': {grip.force:.3g} N are {grip.force / weight:.0f} times what "
-                message += f"'{carried.body}' of {readable(mass, 'kg')} weighs: it may creep in the hand by millimetres"
-                hint = f"a force below {digits(LIGHT * weight)} N, or more mass: the contact solver of the engine "
+            if grip.force > LIGHT * mass:
+                message = f"step '{step.id}': {grip.force:.3g} N are much for '{carried.body}' of "
+                message += f"{readable(mass, 'kg')}: it may creep in the hand by millimetres"
+                hint = f"a force below {digits(LIGHT * mass)} N, or more mass: the contact solver of the engine "
                 hint += "leaves errors that move light things between heavy ones"
                 yield Finding("TASK239", message, task.file.place("steps", k), hint, "warning")
 

@@ -95,10 +95,12 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
 
 
 @pytest.mark.slow
-def test_an_object_that_weighs_next_to_nothing_beside_the_grip_is_doubted(pick: Path) -> None:
-    """7 N are 75 times the weight of 9.5 g."""
-    assert gain_findings(load_task(pick, overrides=["scene.block.mass=10 g"])) == ()
-    (found,) = gain_findings(load_task(pick, overrides=["scene.block.mass=5 g"]))
+@pytest.mark.parametrize("gravity", ["[0, 0, -9.81]", "[0, 0, -1.62]", "[0, 0, 0]"])
+def test_an_object_of_next_to_no_mass_beside_the_grip_is_doubted(pick: Path, gravity: str) -> None:
+    """7 N on 10 g are 700 N/kg, on 5 g 1400; an error of the contact solver moves it so, be it heavy or not."""
+    there = f"simulation.gravity={gravity}"
+    assert gain_findings(load_task(pick, overrides=[there, "scene.block.mass=10 g"])) == ()
+    (found,) = gain_findings(load_task(pick, overrides=[there, "scene.block.mass=5 g"]))
     assert (found.code, found.severity) == ("TASK239", "warning")
-    assert found.message.startswith("step 'pick_1': 7 N are 143 times what 'block' of 5 g weighs: it may creep")
-    assert (found.hint or "").startswith("a force below 3.68 N, or more mass")
+    assert found.message == ("step 'pick_1': 7 N are much for 'block' of 5 g: it may creep in the hand by millimetres")
+    assert (found.hint or "").startswith("a force below 3.7 N, or more mass")
