@@ -24,6 +24,7 @@ from manipcli.flow.recorded_task import recorded_task
 from manipcli.flow.sample import load_task
 from manipcli.flow.verify import compared, refused_as_unlike
 from manipcli.flow.vocabulary import meanings
+from manipcli.judge.steps import RunStatus
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.record.faults import RecordingFailed
 from manipcli.record.reading import open_recording
@@ -179,13 +180,13 @@ def _recorded(
     replanning = Stopwatch()
     recorder = open_log(task, plan, manager, where, overwrite=overwrite, embed_meshes=embed_meshes)
     try:
-        status, cause = "complete", ""
+        status, cause = RunStatus.COMPLETE, ""
         try:
             simulate(task, plan, manager, recorder, progress, replanning)
         except SimulationFailed as failure:
-            status, cause = "failed", str(failure)
+            status, cause = RunStatus.FAILED, str(failure)
         except KeyboardInterrupt:
-            status, cause = "interrupted", "interrupted by the user"
+            status, cause = RunStatus.INTERRUPTED, "interrupted by the user"
         recorder.metadata("run", run_metadata(task, status=status, cause=cause))
         simulated = time.perf_counter()
         verdict = judge_log(recorder.partial_path, being_written=True, doing=_told(progress))

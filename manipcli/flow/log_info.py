@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.judge.steps import COMPLETE, left_out, step_outcomes
+from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import StepOutcome
 from manipcli.record import channels
 from manipcli.record.contents import RECORD
@@ -34,8 +34,8 @@ def log_info(path: Path) -> LogInfo:
             missing += [] if found.faults else [error.cause]
         else:
             status = recording.metadata.get("run", {}).get("status", "")
-            lacks = left_out(recording) if status == COMPLETE and recording.lost is None else ""
-            steps = step_outcomes(recording, interrupted=bool(lacks) or status not in (COMPLETE, "failed"))
+            lacks = left_out(recording) if status == RunStatus.COMPLETE and recording.lost is None else ""
+            steps = step_outcomes(recording, interrupted=bool(lacks) or status not in ENDED)
             if recording.lost is not None:
                 missing = [recording.lost]
             missing += [lacks] if lacks else []

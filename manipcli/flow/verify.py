@@ -10,6 +10,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.judge.cuts import ACTUATORS, JOINTS
+from manipcli.judge.steps import RunStatus
 from manipcli.record.compare import compare_logs, compared_with_itself
 from manipcli.record.compare_entries import compare_entries
 from manipcli.record.reading import open_recording
@@ -40,7 +41,7 @@ def compared(
         began: of the verification, by `perf_counter`.
     """
     second = open_recording(again)
-    interrupted = recording.metadata.get("run", {}).get("status") == "interrupted"
+    interrupted = recording.metadata.get("run", {}).get("status") == RunStatus.INTERRUPTED
     cut = recording.lost or ("the run was interrupted" if interrupted else "")
     same = filecmp.cmp(log, again, shallow=False)
     messages = compared_with_itself(log) if same else compare_logs(log, again, exact=True, open_end=bool(cut))

@@ -10,7 +10,7 @@ from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.expectation import Seams
-from manipcli.judge.steps import COMPLETE, left_out, step_outcomes
+from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.robot import RobotModel
@@ -20,9 +20,6 @@ from manipcli.spec.condition import ExpectationSpec
 
 RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
-
-_JUDGED = (COMPLETE, "failed")
-"""Values of `status` of a run that came to its own end, whether it went well or not."""
 
 
 def judge(
@@ -53,7 +50,7 @@ def judge(
     examined = examine(
         recording, expect, robot=robot, scene=scene, seam=seam, physics=run.get("physics", "") == "full", steps=steps
     )
-    cause = run.get("cause", "") if status == "failed" else _broken_after_all(recording)
+    cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     word, text = _verdict(errors, cause, steps, examined.outcomes)
     return Verdict(
         task=run.get("task", ""),
@@ -87,14 +84,14 @@ def _drawn(recording: Recording) -> Drawn | None:
 def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
     """Why the recording is not that of a run which came to its end."""
     errors = []
-    if status == "interrupted":
+    if status == RunStatus.INTERRUPTED:
         errors.append(Finding(INTERRUPTED, "the run was interrupted"))
-    elif status not in _JUDGED:
+    elif status not in ENDED:
         what = f"status '{status}'" if status else "no status"
         errors.append(Finding("RUN103", f"the run did not come to its end: the log has {what}"))
     if recording.lost is not None:
         errors.append(Finding("RUN104", f"the log is incomplete: {recording.lost}"))
-    elif status == COMPLETE and left_out(recording):
+    elif status == RunStatus.COMPLETE and left_out(recording):
         errors.append(Finding("RUN104", f"the log is incomplete: {left_out(recording)}"))
     return tuple(errors)
 

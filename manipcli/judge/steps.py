@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
+from enum import StrEnum
 from itertools import pairwise
 from typing import Any, get_args
 
@@ -15,8 +16,17 @@ PLAN_FILE = "plan.json"
 """The attachment with the planned steps: `{"steps": [{"id", "verb", "planned_duration"}, ...]}`."""
 
 
-COMPLETE = "complete"
-"""Status, in the metadata of the log, of a run that came to its own end, whether its steps went well or not."""
+class RunStatus(StrEnum):
+    """How a run ended, in the metadata of its log: at its own end, whether its steps went well or not; because the
+    simulation could not go on; because somebody stopped it."""
+
+    COMPLETE = "complete"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+
+
+ENDED = (RunStatus.COMPLETE, RunStatus.FAILED)
+"""Of a run that nobody stopped."""
 
 
 def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutcome, ...]:
