@@ -24,14 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array
+from manipcli.model.damping import implicit_damping
 
 MARGINAL: Final = 1e-9
 """A pole this near to the unit circle counts as outside of it."""
 SLOW: Final = 1e-6
 """An integral that does less than this share of its stiffness in a tick, i h < SLOW p, has its pole at 1 but for
 rounding."""
-STIFF: Final = 0.5
-"""Damping of a joint is stiff where its share in a step is above this; explicit Euler runs away from 2 on."""
 MOST_GAIN: Final = 1e6
 """A margin that is larger is not looked for."""
 
@@ -88,15 +87,6 @@ class Loop:
         return replace(self, p=self.p * gains, d=self.d * gains, i=self.i * gains)
 
 
-def damping_share(mass: Array, damping: Array, step: float) -> Array:
-    """(n) bounds of the share of velocities that viscous `damping` (n) takes away in a step [s] of explicit Euler.
-
-    The row sums of |s B^1/2 M^-1 B^1/2|, none of whose eigenvalues is above the largest (Gershgorin).
-    """
-    root = np.sqrt(damping)
-    return np.asarray(step * np.abs(root[:, None] * np.linalg.inv(mass) * root).sum(axis=1))
-
-
 def transition(loop: Loop) -> Array:
     """A (m, m): x = (q, v, z, efforts on their way) at the next tick; z of joints with an integral gain."""
     n = len(loop.p)
@@ -140,8 +130,7 @@ def _held(loop: Loop) -> tuple[Array, Array]:
         whole = expm(flow * loop.period)
         return whole[: 2 * n, : 2 * n], whole[: 2 * n, 2 * n :]
     s = loop.period / loop.substeps
-    late = np.where(damping_share(loop.mass, loop.damping, s) > STIFF, s * loop.damping, 0.0)
-    damped = np.linalg.inv(loop.mass + np.diag(late))
+    damped = np.linalg.inv(loop.mass + np.diag(implicit_damping(loop.mass, loop.damping, s)))
     v_v, v_u = eye - s * damped * loop.damping, s * damped
     step = np.block([[eye, s * v_v], [np.zeros((n, n)), v_v]])
     push = np.vstack([s * v_u, v_u])

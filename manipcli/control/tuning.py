@@ -28,6 +28,7 @@ import numpy.typing as npt
 from manipcli.control.reflected import Load
 from manipcli.control.stability import Loop, gain_margin, is_stable, poles, transition, unstable_share
 from manipcli.core.geometry import Array
+from manipcli.model.damping import implicit_damping
 
 MARGIN: Final = 2.0
 """All gains together could be so much larger."""
@@ -345,6 +346,7 @@ def step_answer(loop: Loop, step: float, *, effort: float, i_clamp: float | None
     clamp = math.inf if i_clamp is None else i_clamp
     substeps = loop.substeps or 50
     s = loop.period / substeps
+    moved = inertia + float(implicit_damping(loop.mass, loop.damping, s)[0])
     slowest = float(np.abs(poles(loop)).max())
     rate = -math.log(slowest) / loop.period if 0.0 < slowest < 1.0 else 0.0
     count = _ticks(max(rate, 1.0), loop.period)
@@ -358,7 +360,7 @@ def step_answer(loop: Loop, step: float, *, effort: float, i_clamp: float | None
         z = min(max(z + i * loop.period * error, -clamp), clamp)
         u = min(max(waiting.pop(0), -effort), effort)
         for _ in range(substeps):
-            v += s * (u - damping * v) / (inertia + s * damping)  # as in `stability.py`
+            v += s * (u - damping * v) / moved
             q += s * v
     return StepAnswer(step, np.asarray(np.arange(count) * loop.period, dtype=np.float64), share)
 

@@ -1,6 +1,6 @@
-"""The rotors of actuators in Bullet, whose joints know no inertia of their own, and damping that is stiff.
+"""Flywheels in Bullet: the rotors of actuators, as its joints know no inertia of their own, and damping that is stiff.
 
-Each is a flywheel that stands fixed in the world, geared one to one to its joint: it takes part in what the joint
+Each rotor is a flywheel that stands fixed in the world, geared one to one to its joint: it takes part in what the joint
 accelerates and in nothing else, no weight and no gyroscopic effect, and being a constraint it is stable whatever its
 inertia.
 
@@ -21,8 +21,8 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.stability import STIFF, damping_share
 from manipcli.core.geometry import Array, frozen
+from manipcli.model.damping import STIFF, damping_share
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
@@ -53,7 +53,9 @@ def stiff_damping(robot: RobotModel, step: float) -> Array:
     return frozen(np.where(share > STIFF, damping, 0.0))
 
 
-def add_rotors(p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int], *, step: float) -> None:
+def add_flywheels(
+    p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int], *, step: float
+) -> None:
     """Gears a flywheel to every joint with reflected inertia or stiff damping.
 
     Args:
