@@ -27,8 +27,6 @@ from manipcli.plan.verify import verify
 GRAZE = 1e-4
 """[m] by which a finger that withdraws may come nearer than it was: rounding, and the arm's own curve."""
 
-HIGHER = "take the object where the closing fingers have room, as higher: `grasp: {height: ...}` of `pick`"
-
 
 class Draft:
     """The motions of one step. What refuses one is told with its label, unless the step has no other."""
@@ -195,10 +193,17 @@ class Draft:
             verify(trajectory, limits)
         self._add(label, trajectory, None)
 
-    def close(self, posture: str, *, force: float, must_hold: bool, body: str | None) -> None:
+    def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:
         """The hand towards a posture until each finger meets `force` [N]; `body` is held from then on.
 
         The fingers are predicted to stop where the first link of each touches the body.
+
+        Args:
+            posture: named.
+            force: at which a finger stops.
+            must_hold: whether it fails where it holds nothing.
+            body: what it closes on, if that is said.
+            roomier: how the body can be taken where fingers have more room: the hint where something is in their way.
 
         Raises:
             NotPlannable: no gripper controller moves the hand, or it `must_hold` the body and would not touch it.
@@ -220,7 +225,10 @@ class Draft:
                 hint="move the hand to the object first, or close it further",
             )
         stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
-        self._refuse_collision("close", None, stopped, planner.hand_contacts(body))
+        try:
+            self._refuse_collision("close", None, stopped, planner.hand_contacts(body))
+        except NotPlannable as refusal:
+            raise NotPlannable(refusal.cause, hint=roomier or refusal.hint) from refusal
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
@@ -326,8 +334,7 @@ class Draft:
         hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
         if hit is not None:
             when = f"at t = {hit.time:.2f} s of '{label}'"
-            refusal = self._planner.refusal(self._now, hit, "would come", when)
-            raise NotPlannable(refusal.cause, hint=HIGHER) if label == "close" else refusal
+            raise self._planner.refusal(self._now, hit, "would come", when)
 
     def _swept(self, trajectory: JointTrajectory | None, grip: Grip | None) -> tuple[Array, Array]:
         """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""

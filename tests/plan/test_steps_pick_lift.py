@@ -165,6 +165,22 @@ def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) 
     assert "`grasp: {height: ...}`" in refusal.hint
 
 
+def test_only_a_pick_speaks_of_its_height_where_closing_fingers_have_no_room(bench: Make) -> None:
+    """A plate between the block and an open finger; what a plain grasp can do about it is to come from elsewhere."""
+    table = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    block = "  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
+    plate = "  plate: {box: {size: [4 cm, 4 mm, 5 cm]}, pose: {xyz: [0.5, -0.122, 0.225]}, fixed: true}\n"
+    spec = {"object": "block", "approach": {"from": "top", "yaw": 0}}
+    clear, narrow = bench("panda", scene=table + block), bench("panda", scene=table + block + plate)
+    refusal = narrow.refused("pick", spec)
+    assert "'plate'" in refusal.cause and "of 'close'" in refusal.cause
+    assert "`grasp: {height: ...}`" in refusal.hint
+    narrow.now, _ = clear.at(clear.now, clear.plan("pick", spec), "close")
+    refusal = narrow.refused("grasp", {"object": "block"})
+    assert "'plate'" in refusal.cause and "of 'close'" in refusal.cause
+    assert refusal.hint == "no way around is searched for: `move` to a pose from which the way is free"
+
+
 def test_a_cup_behind_a_wall_names_the_wall_and_the_motion(bench: Make) -> None:
     wall = "  wall: {box: {size: [2 cm, 0.8, 0.15]}, pose: {xyz: [0.62, 0, 0.475]}, fixed: true}\n"
     desk = "\n  desk: {box: {size: [0.6, 1.0, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}\n"

@@ -36,6 +36,7 @@ SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 
 _OTHERWISE = "say from where and how high it is taken: `approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`"
+_HIGHER = "take the object where the closing fingers have room, as higher: `grasp: {height: ...}`"
 _AIM = (
     "the tool's +z has to point to the object, and the arm cannot turn it so: "
     "see `tool: {link: ..., pose: {rpy: ...}}` in the robot file"
@@ -111,6 +112,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
             force=spec.grasp.force,
             must_hold=spec.grasp.until == "contact",
             body=spec.object,
+            roomier=_HIGHER,
         )
         planned = draft.plan()
         return replace(planned, motions=(*before.motions, *planned.motions))
