@@ -74,7 +74,7 @@ def _cut(loop: Held, gravity: Array, units: tuple[str, str]) -> tuple[str, str, 
         takes = float((sign * gravity).max())
         if bound is not None and takes > sign * bound + WEIGHTLESS:
             message = f"holding against gravity takes up to {sign * takes:.3g} {units[1]}, its {key} is {digits(bound)}"
-            return "CTRL155", message, f"it will sink; {CARRY}, or another clamp does"
+            return "CTRL159", message, f"it will sink; {CARRY}, or another clamp does"
     return None
 
 

@@ -44,7 +44,7 @@ def told(task: Path) -> list[Finding]:
         ("p: 20, d: 2", "CTRL156", f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity"),
         ("p: 1, d: 0.1", "CTRL156", f"kp 1 gives way by {WEIGHT:.2g} rad under"),
         ("d: 12", "CTRL156", f"without kp nothing holds {WEIGHT:.3g} N m of gravity; it sinks"),
-        ("p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9", "CTRL155", f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1"),
+        ("p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9", "CTRL159", f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1"),
         (
             "p: 5, d: 1, i: 20, i_clamp: 1",
             "CTRL156",
