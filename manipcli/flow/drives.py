@@ -16,6 +16,7 @@ from manipcli.control.stability import largest_velocity_gain, velocity_loop_pole
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits, listed, told_apart
+from manipcli.flow.doubt import Doubt
 from manipcli.flow.load import Task
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.kinematics import Kinematics
@@ -59,9 +60,9 @@ def driven_joints(task: Task, active: Collection[str]) -> tuple[Driven, ...]:
     return tuple(found)
 
 
-def drive_findings(
+def drive_doubts(
     task: Task, drives: tuple[Driven, ...], kinematics: Kinematics, postures: Postures, *, planned: bool
-) -> Iterator[Finding]:
+) -> Iterator[Doubt]:
     """Warnings about joints that are commanded by position or velocity, over the postures in which they will be."""
     period = task.spec.simulation.control_period
     load = load_of(task.robot, kinematics, [one.joint for one in drives], postures)
@@ -74,7 +75,7 @@ def drive_findings(
             limit=float(load.effort[k]),
         )  # fmt: skip
         if finding is not None:
-            yield finding
+            yield Doubt(one.joint, finding)
     yield from _left_out(task, drives, postures.velocity)
 
 
@@ -95,7 +96,7 @@ def too_weak(
     return None
 
 
-def _rings(one: Driven, gains: GainsSpec, period: float) -> Iterator[Finding]:
+def _rings(one: Driven, gains: GainsSpec, period: float) -> Iterator[Doubt]:
     """A velocity loop that diverges, or turns round every tick."""
     if gains.p == 0.0:
         return
@@ -119,10 +120,10 @@ def _rings(one: Driven, gains: GainsSpec, period: float) -> Iterator[Finding]:
         hint = f"p is unstable above {digits(most)}; stay below half of that"
     else:
         return
-    yield Finding("CTRL157", message, one.place, hint, "warning")
+    yield Doubt(one.joint, Finding("CTRL157", message, one.place, hint, "warning"))
 
 
-def _left_out(task: Task, drives: tuple[Driven, ...], velocity: Array) -> Iterator[Finding]:
+def _left_out(task: Task, drives: tuple[Driven, ...], velocity: Array) -> Iterator[Doubt]:
     """What is said of actuators and does not act, as their joints are not commanded by effort; one a controller.
 
     Args:
@@ -155,7 +156,8 @@ def _left_out(task: Task, drives: tuple[Driven, ...], velocity: Array) -> Iterat
         if fast:
             message += f"; the plan turns {listed(fast, most=3)} per second"
             hint += ", or narrow the velocities of the joints (robot file, limits)"
-        yield Finding("CTRL158", message, task.robot_file.place("actuators", own[0].name), hint, "warning")
+        place = task.robot_file.place("actuators", own[0].name)
+        yield Doubt("", Finding("CTRL158", message, place, hint, "warning"))
 
 
 _WORDS: Final = ("velocity limit", "friction", "latency")

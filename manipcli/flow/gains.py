@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -27,7 +28,8 @@ from manipcli.control.stability import (
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
-from manipcli.flow.drives import drive_findings, driven_joints
+from manipcli.flow.doubt import Doubt
+from manipcli.flow.drives import drive_doubts, driven_joints
 from manipcli.flow.grips import strained, too_light, too_soft, too_swift
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
@@ -78,26 +80,21 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         found += too_light(task, plan)
         found += too_soft(task, plan)
     kinematics = Kinematics(robot, gravity=task.scene.gravity)
-    rows = None if plan is None else _planned(task, plan)
+    samples = None if plan is None else _planned(task, plan)
     named = Postures.at_rest(named_postures(robot, start_position(task)))
     told: set[tuple[str, Place | None, str]] = set()
     for active, (loops, drives) in shifts.items():
-        postures = named if rows is None else _while(rows, [there == active for there in in_steps])
-        new: list[Finding] = []
+        postures = named if samples is None else _while(samples, [there == active for there in in_steps])
+        doubts: list[Doubt] = []
         if loops:
             load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-            new += _findings(task, loops, load, planned=plan is not None)
+            doubts += _doubts(task, loops, load, planned=plan is not None)
         if drives:
-            new += drive_findings(task, drives, kinematics, postures, planned=plan is not None)
+            doubts += drive_doubts(task, drives, kinematics, postures, planned=plan is not None)
         # Who stays while others change is looked at again: each doubt about each of its joints is told once.
-        found += [one for one in new if _about(one) not in told]
-        told.update(map(_about, new))
+        found += [doubt.finding for doubt in doubts if doubt.what not in told]
+        told.update(doubt.what for doubt in doubts)
     return tuple(found)
-
-
-def _about(finding: Finding) -> tuple[str, Place | None, str]:
-    """What is doubted, and of what; without the numbers."""
-    return finding.code, finding.place, finding.message.partition(":")[0]
 
 
 def named_postures(robot: RobotModel, start: Array) -> Array:
@@ -110,15 +107,21 @@ def named_postures(robot: RobotModel, start: Array) -> Array:
     return np.array(rows)
 
 
-Row = tuple[int, Array, Array, Array]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sample:
+    """All joints (n) in a motion of a step: 1 + its index, or 0 before the first of them."""
+
+    step: int
+    position: Array
+    velocity: Array
+    acceleration: Array
 
 
-def _planned(task: Task, plan: Plan) -> tuple[Row, ...]:
-    """Samples of all motions, the other joints as they are then: 1 + the step's index, or 0 before the first of them;
-    positions, velocities and accelerations (n)."""
+def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
+    """Samples of all motions, the other joints as they are then."""
     robot = task.robot
     here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
-    rows: list[Row] = [(0, here, still, still)]
+    samples = [_Sample(0, here, still, still)]
     for k, step in enumerate(plan.steps, 1):
         for motion in step.plan.motions:
             if motion.trajectory is None:
@@ -126,20 +129,23 @@ def _planned(task: Task, plan: Plan) -> tuple[Row, ...]:
             at = robot.indices(motion.trajectory.names)
             times = np.linspace(0.0, float(motion.trajectory.times[-1]), PER_MOTION)
             for q, v, a in zip(*motion.trajectory.sample(times), strict=True):
-                row = (here.copy(), still.copy(), still.copy())
-                row[0][at], row[1][at], row[2][at] = q, v, a
-                rows.append((k, with_mimics(robot, row[0]), row[1], row[2]))
-            here = rows[-1][1]
+                position, velocity, acceleration = here.copy(), still.copy(), still.copy()
+                position[at], velocity[at], acceleration[at] = q, v, a
+                samples.append(_Sample(k, with_mimics(robot, position), velocity, acceleration))
+            here = samples[-1].position
         here = np.array(step.plan.end.position)
-        rows.append((k, here, still, still))
-    return tuple(rows)
+        samples.append(_Sample(k, here, still, still))
+    return tuple(samples)
 
 
-def _while(rows: tuple[Row, ...], there: list[bool]) -> Postures:
-    """Those of the steps in which they are `there`; as in the rows, the first is the time before all steps."""
-    chosen = [row for row in rows if there[row[0]]]
-    position, velocity, acceleration = (np.array([row[part] for row in chosen]) for part in (1, 2, 3))
-    return Postures(position, velocity, acceleration)
+def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Postures:
+    """Those of the steps in which they are `there`; as in the samples, the first is the time before all steps."""
+    chosen = [one for one in samples if there[one.step]]
+    return Postures(
+        np.array([one.position for one in chosen]),
+        np.array([one.velocity for one in chosen]),
+        np.array([one.acceleration for one in chosen]),
+    )
 
 
 def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
@@ -163,7 +169,7 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
     return tuple(found)
 
 
-def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -> Iterator[Finding]:
+def _doubts(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -> Iterator[Doubt]:
     where = f"{'planned' if planned else 'named'} postures"
     simulation = task.spec.simulation
     substeps = round(simulation.control_period / simulation.step)
@@ -191,7 +197,7 @@ def _findings(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool)
             sound = False
         if finding is not None:
             code, message, hint = finding
-            yield Finding(code, message, loop.place, hint, "warning")
+            yield Doubt(loop.joint, Finding(code, message, loop.place, hint, "warning"))
         yield from weak(task.robot, loop, load, k, planned=planned)
     if sound:
         yield from _together(task, loops, load, substeps)
@@ -247,7 +253,7 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     return "CTRL153", message, f"kd {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
 
 
-def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Finding]:
+def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Doubt]:
     """Loops that are stable one by one and not together, at the postures in which they are tightest."""
     period = task.spec.simulation.control_period
     if any(loop.ticks != 1 for loop in loops):
@@ -266,7 +272,7 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"
         )
-        yield Finding("CTRL154", message, loops[worst[0]].place, "lower their kd", "warning")
+        yield Doubt("", Finding("CTRL154", message, loops[worst[0]].place, "lower their kd", "warning"))
         return
 
 

@@ -17,6 +17,7 @@ from manipcli.control.reflected import Load
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
+from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import too_weak
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import GainsSpec
@@ -43,7 +44,7 @@ class Held:
     place: Place
 
 
-def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Finding]:
+def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Doubt]:
     """Too little effort for gravity or for the plan; gains and clamps too weak to stand where it shall.
 
     Args:
@@ -57,14 +58,14 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) ->
     needed = float(np.abs(load.needed[:, k]).max()) if planned else 0.0
     finding = too_weak(robot, loop.joint, loop.place, weight=weight, needed=needed, limit=limit)
     if finding is not None:
-        yield finding
+        yield Doubt(loop.joint, finding)
     if loop.weightless or weight <= WEIGHTLESS:
         return
     units = ("m", "N") if robot.joint(loop.joint).type == "prismatic" else ("rad", "N m")
     told = _cut(loop, gravity, units) or _sags(loop, np.clip(gravity, -limit, limit), units)
     if told is not None:
         code, message, hint = told
-        yield Finding(code, f"{loop.joint}: {message}", loop.place, hint, "warning")
+        yield Doubt(loop.joint, Finding(code, f"{loop.joint}: {message}", loop.place, hint, "warning"))
 
 
 def _cut(loop: Held, gravity: Array, units: tuple[str, str]) -> tuple[str, str, str] | None:
