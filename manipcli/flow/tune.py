@@ -14,7 +14,7 @@ from manipcli.control.reflected import Load, Postures, load_of
 from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, told_apart
 from manipcli.flow.extremes import climbed
 from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
@@ -194,7 +194,8 @@ class _Tuner:
             hint = "a shorter `--period`, or less `--bandwidth`"
             message = f"no gains were found that are stable in all postures: these are unstable {there}"
             raise InvalidInput([Finding("TUNE003", message, self._file.place("controllers"), hint)])
-        self.notes += (f"But {there}, all of them together may grow by {margin:.2g} alone, not by {MARGIN:g}.",)
+        left, wanted = told_apart(margin, MARGIN, form=".2g")
+        self.notes += (f"But {there}, all of them together may grow by {left} alone, not by {wanted}.",)
 
     def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
         """Raises InvalidInput where what is stable is next to nothing."""

@@ -62,9 +62,9 @@ def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> N
     files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
     monkeypatch.setattr("manipcli.flow.tune.ROUNDS", 1)
     (note,) = (one for one in tune(*files, Wish(20.0, 1.0, H)).notes if "may grow" in one)
-    found = re.fullmatch(r"But in a posture .* all of them together may grow by ([\d.]+) alone, not by 2\.", note)
+    found = re.fullmatch(r"But in a posture .* all of them together may grow by ([\d.]+) alone, not by 2[.0]*", note)
     assert found is not None
-    assert 1.0 <= float(found[1]) <= MARGIN
+    assert 1.0 <= float(found[1]) < MARGIN
 
 
 def test_gains_that_are_unstable_somewhere_are_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
