@@ -60,10 +60,11 @@ at: from that of the step with `at: STEP` and `during`, else from that of the ru
 
 `all: [...]`, `any: [...]` and `not: {...}` combine conditions, however deep. Margins combine as in the robust semantics
 of signal temporal logic: the least for `all` and over time, the greatest for `any` and with `eventually`, the opposite
-for `not` and with `never`. A margin of exactly 0 is met and its opposite is not: of a condition and its `not` exactly
-one holds. What fails has a margin of at most -1e-9 (N, m, rad, ...), also where it is missed by nothing, as `not` of
-what never touched. What is reported is the margin of the deciding condition at the deciding moment, in its own unit,
-and its text: which object, where, how far.
+for `not` and with `never`. A margin of exactly 0 is met and its opposite is not: at each moment exactly one of a
+condition and its `not` holds. Over many ticks both can fail, where it held at some of them and not at others;
+that it once did not hold is `eventually: {not: {...}}`. What fails has a margin of at most -1e-9 (N, m, rad, ...), also
+where it is missed by nothing, as `not` of what never touched. What is reported is the margin of the deciding condition
+at the deciding moment, in its own unit, and its text: which object, where, how far.
 
 Margins in one unit compare as they are. In a combination whose units differ, each is compared after division by its own
 tolerance (`within`, `below`, ...; where a condition has none, its section says by what), so that 1 is all of the

@@ -24,7 +24,9 @@ class AboveSpec(Model):
     object: str = Field(description="A body of the scene.")
     of: str = Field(description="The body that it is over.")
     by: Annotated[Length, Field(ge=0)] = Field(
-        default=0.0, description="Least gap between the two, along the world's z [m]. Default 0."
+        default=0.0,
+        description="Least gap between the two, along the world's z [m]. Default 0; what rests on it sinks in a "
+        "little and is asked for by `rests_on`.",
     )
 
 
