@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 
-from manipcli.control.tuning import LEAST_DAMPING, MARGIN, StepAnswer, Tuned, Wish
+from manipcli.control.tuning import MARGIN, StepAnswer, Tuned, Wish
 from manipcli.report.table import table
 
 
@@ -42,11 +42,13 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
         f"Margin: all gains of the joint may grow by it at its smallest inertia; {MARGIN:g} is left to all together, "
         "in the tightest postures that were found."
     )
-    weak = [one.joint for one in joints if one.interface == "effort" and one.damping < min(0.5, wish.damping)]
+    weak = {
+        one.joint: one.damping for one in joints if one.interface == "effort" and one.damping < min(0.5, wish.damping)
+    }
     if weak:
         lines.append(
-            f"Damping of {', '.join(weak)}: down to {LEAST_DAMPING:g} at the largest inertia, because more would be "
-            f"unstable at the smallest; a shorter control period, or inverse dynamics with softer gains, helps."
+            f"Damping of {', '.join(weak)}: {min(weak.values()):.2f} at least, at the largest inertia, because more "
+            f"would be unstable at the smallest; a shorter control period, or inverse dynamics with softer gains, helps."
         )
     return "\n".join([*lines, *notes])
 
