@@ -48,7 +48,8 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
     if weak:
         lines.append(
             f"Damping of {', '.join(weak)}: {min(weak.values()):.2f} at least, at the largest inertia, because more "
-            f"would be unstable at the smallest; a shorter control period, or inverse dynamics with softer gains, helps."
+            "would be unstable at the smallest; a shorter control period, or inverse dynamics with softer gains, "
+            "helps."
         )
     return "\n".join([*lines, *notes])
 
