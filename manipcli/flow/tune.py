@@ -14,7 +14,7 @@ from manipcli.control.reflected import Load, Postures, load_of
 from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
-from manipcli.core.text import did_you_mean, told_apart
+from manipcli.core.text import did_you_mean, listed, told_apart
 from manipcli.flow.extremes import climbed
 from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
@@ -176,6 +176,9 @@ class _Tuner:
                 break
             postures = np.vstack([postures, tightest])
         self._refuse_hopeless(tuned)
+        raised = [one.joint for one in tuned if one.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
+        if raised:
+            self.notes += (f"Raised, so that a finger presses with all its effort over its travel: {listed(raised)}.",)
         if margin < MARGIN:
             self._tell_margin(margin)
         return tuned
