@@ -8,12 +8,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.batch.first_look import SUFFIXES, first_look, is_entered
+from manipcli.batch.first_look import LEFT_OUT, SUFFIXES, first_look, is_entered
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
-
-NO_ROBOT = "has `task:` but no `robot:`; not run"
-"""What is told of a file that looks like a task and is none."""
 
 
 def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = None) -> tuple[Path, ...]:
@@ -33,8 +30,9 @@ def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = No
             looks = [(file, first_look(file)) for file in _files(path)]
             below = [file for file, look in looks if look == "task"]
             if tell is not None:
-                for file in (file for file, look in looks if look == "no robot"):
-                    tell(f"{shown_path(file)} {NO_ROBOT}")
+                for file, look in looks:
+                    if look in LEFT_OUT:
+                        tell(f"{shown_path(file)} {LEFT_OUT[look]}")
         else:
             below = [path]
             refused += _no_task(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -13,9 +14,9 @@ SNIFFED = 65536
 NOT_ENTERED = frozenset({"runs", "build", "dist", "node_modules", "site-packages", "__pycache__"})
 """Folders that hold results and what others wrote; as well as hidden ones and virtual environments."""
 _KEY = rb"""(?:^|\A\s*\{(?s:.*[,{])?\s*)(["']?)(?:%b)\1[ \t]*:(?=\s)"""
-_TASK, _ROBOT, _OURS = (
+_TASK, _ROBOT, _CONTROLLERS, _STEPS, _OURS = (
     re.compile(_KEY % key, re.MULTILINE)
-    for key in (b"task", b"robot", b"controllers|scene|steps|expect|start|simulation")
+    for key in (b"task", b"robot", b"controllers", b"steps", b"controllers|scene|steps|expect|start|simulation")
 )
 _NAME = re.compile(rb"""[ \t]+(?!(?:null|true|false|[\d.]+)\s*(?:#|$))["']?[^\W_]""", re.MULTILINE)
 """A text that begins as a name does, and no list, mapping, alias or tag."""
@@ -23,8 +24,13 @@ _NO_SCALAR = re.compile(
     rb"""[ \t]+[\[{*&!]|[ \t]*(?:#[^\n]*)?\r?\n(?:\s*#[^\n]*\n)*\s*(?:-[ \t]|[ \t][^\s#][^\n]*:\s)"""
 )
 
-Look = Literal["task", "no robot", "other"]
-"""`no robot`: begins like a task that lacks its robot, or has it misspelt."""
+Look = Literal["task", "no robot", "no task", "other"]
+"""`no robot`, `no task`: looks like a task that lacks this key, or has it misspelt."""
+LEFT_OUT: Mapping[Look, str] = {
+    "no robot": "has `task:` but no `robot:`; not run",
+    "no task": "has `robot:`, `controllers:` and `steps:` but no `task:`; not run",
+}
+"""What is told of a file that looks like a task and is none."""
 
 
 def first_look(path: Path, *, named: bool = False) -> Look:
@@ -44,8 +50,11 @@ def first_look(path: Path, *, named: bool = False) -> Look:
     except OSError:
         return "other"
     task = _TASK.search(text)
-    if task is None or named:
-        return "other" if task is None else "task"
+    if task is None:
+        torn = not named and all(key.search(text) is not None for key in (_ROBOT, _CONTROLLERS, _STEPS))
+        return "no task" if torn else "other"
+    if named:
+        return "task"
     robot = _ROBOT.search(text) is not None
     if robot and _NAME.match(text, task.end()):
         return "task"

@@ -27,7 +27,8 @@ MARKS_OF_PYTEST = frozenset(
 
 _SEEN = pytest.StashKey[dict[Path, Path]]()
 """Task files that are tests, by what they are without links."""
-_NO_ROBOT = pytest.StashKey[dict[Path, None]]()
+_TORN = pytest.StashKey[dict[Path, str]]()
+"""Files that look like tasks and are none: what is told of each."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -63,7 +64,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
     """
     if file_path.suffix.lower() not in SUFFIXES:
         return None
-    from manipcli.batch.first_look import first_look
+    from manipcli.batch.first_look import LEFT_OUT, first_look
 
     named = parent.session.isinitpath(file_path)
     look = first_look(file_path, named=named)
@@ -74,8 +75,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
     if look == "other" or not _is_looked_for(file_path, parent.session):
         return None
     stash = parent.config.stash
-    if look == "no robot":
-        stash.setdefault(_NO_ROBOT, {})[file_path] = None
+    if look in LEFT_OUT:
+        stash.setdefault(_TORN, {})[file_path] = LEFT_OUT[look]
         return None
     if stash.setdefault(_SEEN, {}).setdefault(file_path.resolve(), file_path) != file_path and not named:
         return None
@@ -84,12 +85,12 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
     """What looks like a task and is left out."""
-    files = config.stash.get(_NO_ROBOT, {})
+    files = config.stash.get(_TORN, {})
     if not files:
         return []
-    from manipcli.batch.discovery import NO_ROBOT, shown_path
+    from manipcli.batch.discovery import shown_path
 
-    return [f"{shown_path(file)} {NO_ROBOT}" for file in files]
+    return [f"{shown_path(file)} {told}" for file, told in files.items()]
 
 
 class TaskFile(pytest.File):

@@ -88,6 +88,23 @@ def test_what_looks_like_a_task_without_its_robot_is_told(folder: Path, text: st
     assert told == ["tasks/left.yaml has `task:` but no `robot:`; not run"]
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("taks: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: []\n", True),
+        ("{Task: t, robot: r, controllers: c, steps: []}", True),
+        ("robot: r.yaml\nsteps: []\n", False),
+        ("robot: r\ndescription: r.urdf\ncontrollers: c.yaml\n", False),
+    ],
+)
+def test_what_looks_like_a_task_without_its_name_is_told(folder: Path, text: str, told: bool) -> None:
+    (folder / "tasks" / "left.yaml").write_text(text)
+    lines: list[str] = []
+    assert Path("tasks/left.yaml") not in task_files([Path("tasks")], tell=lines.append)
+    wanted = "tasks/left.yaml has `robot:`, `controllers:` and `steps:` but no `task:`; not run"
+    assert lines == [wanted] * told
+
+
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
 def test_a_task_in_utf_16_is_one_that_cannot_be_read(tmp_path: Path, encoding: str) -> None:
     path = tmp_path / "t.yaml"
