@@ -368,10 +368,10 @@ class JointTrajectoryController:
     def _cancel(self, handle: GoalHandle) -> None:
         handle.end("canceled", ErrorCode.SUCCESSFUL, f"canceled at t = {self._time:.3f} s", self._time)
         if self._next is not None and self._next.handle is handle:
-            self._next = None
-        if self._goal is not None and self._goal.handle is handle:
+            self._next = None  # and the goal before ended when this one was sent: nobody wants its path any more
+        else:
             self._forget()
-            self._stop = self._waiting = True
+        self._stop = self._waiting = True
 
     def _feedback(self) -> Feedback:
         goal, clock = self._goal, self._reference.clock(self._time)

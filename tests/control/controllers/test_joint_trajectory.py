@@ -241,6 +241,19 @@ def test_a_goal_can_be_canceled_before_it_began():
     assert handle.status == "canceled"
 
 
+def test_a_goal_that_is_canceled_before_it_began_does_not_leave_the_joints_on_the_path_before():
+    controller = make(limits=[JointLimits(-5, 5, 3, acceleration=10.0)] * 3)
+    controller.update(0.0, PERIOD, state([0, 0, 0]))
+    first = controller.send_goal(trajectory(point([2, 0, 0], 2.0, [0, 0, 0])))
+    run(controller, state([0, 0, 0]), 1000, first=1)
+    second = controller.send_goal(trajectory(point([-2, 0, 0], 2.0, [0, 0, 0])))
+    second.cancel()
+    assert (first.status, second.status) == ("aborted", "canceled")
+    output = run(controller, state([0, 0, 0]), 1000, first=1001)
+    assert not output.velocity.any()
+    assert output.position[0] == pytest.approx(1.0 + 1.5**2 / (2 * 10.0), abs=3e-3)  # from 1.5 rad/s at 10 rad/s2
+
+
 def test_deactivation_aborts_and_the_next_update_holds_anew():
     controller = make()
     controller.update(0.0, PERIOD, state(START))
