@@ -13,9 +13,10 @@ SNIFFED = 65536
 """Bytes of a file in which keys are looked for: nothing else of foreign files is read."""
 NOT_ENTERED = frozenset({"runs", "build", "dist", "node_modules", "site-packages", "__pycache__"})
 """Folders that hold results and what others wrote; as well as hidden ones and virtual environments."""
-_KEY = rb"""(?:^|\A\s*\{(?s:.*[,{])?\s*)(["']?)(?:%b)\1[ \t]*:(?=\s)"""
+_KEY = rb"""\n(?:(?<=\A\n)\s*\{(?s:.*[,{])?\s*)?(["']?)(?:%b)\1[ \t]*:(?=\s)"""
+"""A top-level key, of a text that begins with a line feed: looking for one costs a tenth of looking for `^`."""
 _TASK, _ROBOT, _CONTROLLERS, _STEPS, _OURS = (
-    re.compile(_KEY % key, re.MULTILINE)
+    re.compile(_KEY % key)
     for key in (b"task", b"robot", b"controllers", b"steps", b"controllers|scene|steps|expect|start|simulation")
 )
 _NAME = re.compile(rb"""[ \t]+(?!(?:null|true|false|[\d.]+)\s*(?:#|$))["']?[^\W_]""", re.MULTILINE)
@@ -46,9 +47,12 @@ def first_look(path: Path, *, named: bool = False) -> Look:
         if not path.is_file():  # opening a pipe would wait for who writes into it
             return "other"
         with path.open("rb") as file:
-            text = _flush(_utf_8(file.read(SNIFFED)))
+            text = _utf_8(file.read(SNIFFED))
     except OSError:
         return "other"
+    if b"task" not in text and b"robot" not in text:  # as foreign files are, and this is quickly said
+        return "other"
+    text = _flush(text)
     task = _TASK.search(text)
     if task is None:
         torn = not named and all(key.search(text) is not None for key in (_ROBOT, _CONTROLLERS, _STEPS))
@@ -79,9 +83,10 @@ def _utf_8(text: bytes) -> bytes:
 
 
 def _flush(text: bytes) -> bytes:
-    """With line feeds alone, and its top-level keys at the left."""
-    lines = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    """With line feeds alone, one of them before each line, and its top-level keys at the left."""
+    text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    lines = text.split(b"\n")
     content = (line for line in lines if line.lstrip(b" ") and not line.lstrip(b" ").startswith((b"#", b"---", b"%")))
     first = next(content, b"")
     by = first[: len(first) - len(first.lstrip(b" "))]
-    return b"\n".join(line.removeprefix(by) for line in lines)
+    return b"\n" + (b"\n".join(line.removeprefix(by) for line in lines) if by else text)
