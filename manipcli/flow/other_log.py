@@ -33,7 +33,7 @@ from manipcli.record.namespaces import TYPES, meant, namespaces
 from manipcli.record.scan import METADATA, Scan
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
-from manipcli.replay.playback import Playback, PlotTable, joint_tables
+from manipcli.replay.playback import Playback
 
 LEAST_STEADY = 1e-6
 """[m], and of a quaternion's parts: a frame that moves by less stands still."""
@@ -200,11 +200,6 @@ def open_other(
     notes += [f"{what}: {listed(each)}" for what, each in unknown.items()]
     position, velocity, effort = np.moveaxis(np.array(columns).reshape(-1, len(times), 3), (2, 1), (0, 1))
     scene, p, q = _scene(robot, tree, len(times))
-    tables = joint_tables(names, robot, times, position, velocity, effort, np.full_like(position, np.nan))
-
-    def between(start: float, end: float) -> tuple[PlotTable, ...]:
-        return tables
-
     return Playback(
         name=path.name,
         robot=robot,
@@ -220,7 +215,6 @@ def open_other(
         contacts=((),) * len(times),
         lost=topics.lost,
         notes=tuple(notes),
-        tables_of=between,
     )
 
 

@@ -85,7 +85,7 @@ def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_ou
         verdict=verdict,
         lost=recording.lost,
         notes=notes,
-        tables_of=partial(plot_tables, recording, robot),
+        tables=partial(plot_tables, recording, robot),
         keep=meshes.folder,
     )
 

@@ -69,10 +69,6 @@ class PlotTable:
         return self.values[:, self.columns.index(name)]
 
 
-TablesOf = Callable[[float, float], tuple[PlotTable, ...]]
-"""The curves from one time to another [s], read when they are asked for."""
-
-
 @dataclass(frozen=True)
 class Playback:
     """A run at the rate of a screen.
@@ -92,7 +88,8 @@ class Playback:
         verdict: None where the log cannot be judged.
         lost: why the end of the log is missing, or None.
         notes: what else is missing or unlike it was in the run, a sentence each.
-        tables_of: see `tables`.
+        tables: reads the curves at the full rate of the log: joints, reference and error, tool, contact forces. Empty
+            where it has no more than `curves` shows.
         keep: what must live as long as this does: the folder of the meshes that the log carries.
     """
 
@@ -112,7 +109,7 @@ class Playback:
     verdict: Verdict | None = None
     lost: str | None = None
     notes: tuple[str, ...] = ()
-    tables_of: TablesOf = field(repr=False, default=lambda start, end: ())
+    tables: Callable[[], tuple[PlotTable, ...]] = field(repr=False, default=lambda: ())
     keep: object = field(repr=False, default=None)
 
     @property
@@ -177,7 +174,7 @@ class Playback:
         return tool_positions(self.robot, self.stance)
 
     def curves(self) -> tuple[PlotTable, ...]:
-        """The curves of `tables`, at the times of what is shown."""
+        """Measured and wanted values of the joints, the way of the tool and contact forces, at the times shown."""
         forces = force_table(self.times, self.contacts)
         return (
             *joint_tables(
@@ -185,14 +182,6 @@ class Playback:
             ),
             *((forces,) if forces.columns else ()),
         )
-
-    def tables(self, start: float = -np.inf, end: float = np.inf) -> tuple[PlotTable, ...]:
-        """Curves at the full rate of the log, read from it now: joints, reference and error, tool, contact forces.
-
-        Args:
-            start, end: [s] only what lies between; the memory this takes grows with what is asked for.
-        """
-        return self.tables_of(start, end)
 
 
 def tool_positions(robot: RobotModel, position: Array) -> Array:

@@ -121,28 +121,17 @@ def references(traces: Sequence[ControllerTrace], joints: Sequence[str], count: 
     return found
 
 
-def plot_tables(
-    recording: Recording, robot: RobotModel | None, start: float = -np.inf, end: float = np.inf
-) -> tuple[PlotTable, ...]:
-    """The curves of a recording, every tick from `start` to `end` [s].
+def plot_tables(recording: Recording, robot: RobotModel | None) -> tuple[PlotTable, ...]:
+    """The curves of a recording, every tick of it.
 
     Args:
         recording: any.
         robot: says the units of joints and where the tool is; None: neither.
-        start, end: [s].
     """
-    changes = _Changes(start, end)
-    spans = []
-    for span in recording.spans:
-        changes.add(span.contacts)
-        if _meets(span, start, end):
-            spans.append(_between(span, start, end))
-    if not spans:
-        return ()
-    whole = joined(spans)
+    whole = joined(recording.spans)
     states, names = whole.states, recording.joint_names
     reference = references(whole.controllers, names, len(states.time))
-    forces = force_table(states.time, _held(changes.found, states.time))
+    forces = force_table(states.time, _held(whole.contacts, states.time))
     return (
         *joint_tables(names, robot, states.time, states.position, states.velocity, states.effort, reference),
         *((forces,) if forces.columns else ()),
@@ -153,31 +142,3 @@ def _held(snapshots: Sequence[ContactSnapshot], times: Array) -> list[tuple[Cont
     """What touches at each of `times` (T,) [s]."""
     last = np.searchsorted([one.time for one in snapshots], times, side="right") - 1
     return [snapshots[k].contacts if k >= 0 else () for k in last.tolist()]
-
-
-class _Changes:
-    """The contacts that hold at some time from `start` to `end` [s]."""
-
-    def __init__(self, start: float, end: float) -> None:
-        self._start, self._end = start, end
-        self.found: list[ContactSnapshot] = []
-
-    def add(self, snapshots: Iterable[ContactSnapshot]) -> None:
-        for one in snapshots:
-            if one.time > self._end:
-                break
-            if one.time <= self._start:
-                self.found.clear()
-            self.found.append(one)
-
-
-def _meets(span: Span, start: float, end: float) -> bool:
-    times = span.states.time
-    return len(times) > 0 and bool(times[-1] >= start and times[0] <= end)
-
-
-def _between(span: Span, start: float, end: float) -> Span:
-    times = span.states.time
-    if times[0] >= start and times[-1] <= end:
-        return span
-    return _picked(span, np.flatnonzero((times >= start) & (times <= end)))
