@@ -9,7 +9,6 @@ from manipcli.core.text import listed
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
-from manipcli.judge.expectation import Seams
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.model.conditions import CONDITIONS
@@ -22,14 +21,7 @@ RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
 
-def judge(
-    recording: Recording,
-    *,
-    expect: Sequence[ExpectationSpec],
-    robot: RobotModel,
-    scene: Scene,
-    seam: Seams = CONDITIONS,
-) -> Verdict:
+def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: RobotModel, scene: Scene) -> Verdict:
     """Judge a recording by what its task expected.
 
     The order of importance: a run that was interrupted, did not end or has lost its end is an `error`, whatever else is
@@ -41,14 +33,19 @@ def judge(
         recording: the log.
         expect: the expectations, in the order of the task in the log.
         robot, scene: built from the log's own attachments.
-        seam: the conditions that their words name.
     """
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
     errors = _errors(recording, status)
     steps = step_outcomes(recording, interrupted=bool(errors))
     examined = examine(
-        recording, expect, robot=robot, scene=scene, seam=seam, physics=run.get("physics", "") == "full", steps=steps
+        recording,
+        expect,
+        robot=robot,
+        scene=scene,
+        seam=CONDITIONS,
+        physics=run.get("physics", "") == "full",
+        steps=steps,
     )
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     word, text = _verdict(errors, cause, steps, examined.outcomes)

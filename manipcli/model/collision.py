@@ -211,21 +211,18 @@ class CollisionQuery:
         q: npt.ArrayLike,
         times: Array,
         positions: Array,
-        *,
-        resolution: float = RESOLUTION,
     ) -> CollisionHit | None:
-        """The first hit on the way, with its time; first, last, and every point `resolution` after the one before.
+        """The first hit on the way, with its time; first, last, and every point `RESOLUTION` after the one before.
 
         Args:
             columns: where the joints of the trajectory stand in `q`.
             q: (n) all moving joints; the others stay here.
             times: (k,) [s].
-            positions: (k, m) of the trajectory's joints; neighbours much closer than `resolution`.
-            resolution: [rad or m].
+            positions: (k, m) of the trajectory's joints; neighbours much closer than `RESOLUTION`.
         """
         whole = np.array(q, dtype=np.float64)
         walked = np.concatenate(([0.0], np.cumsum(np.max(np.abs(np.diff(positions, axis=0)), axis=1))))
-        chosen = np.unique(np.searchsorted(walked, np.append(np.arange(0.0, walked[-1], resolution), walked[-1])))
+        chosen = np.unique(np.searchsorted(walked, np.append(np.arange(0.0, walked[-1], RESOLUTION), walked[-1])))
         for k in chosen.tolist():
             whole[list(columns)] = positions[k]
             if self.touches(whole):

@@ -59,7 +59,6 @@ class Kinematics:
             self._holders[link.name] = parent
         model.armature = reflected_inertia(robot)
         self._data = model.createData()
-        self._zero = np.zeros(model.nv)
 
     @property
     def model(self) -> pinocchio.Model:

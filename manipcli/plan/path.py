@@ -39,21 +39,18 @@ def joint_path(names: Sequence[str], waypoints: npt.ArrayLike) -> JointPath:
     return JointPath(names=tuple(names), waypoints=frozen(points[keep]))
 
 
-def interpolate(
-    X_WA: Transform, X_WB: Transform, *, step: float = LINEAR_STEP, angle: float = ANGULAR_STEP
-) -> tuple[Transform, ...]:
+def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
     """Poses from A to B, both included: p(u) = p_A + u (p_B - p_A), R(u) = R_A exp(u log(R_A^T R_B)), u in [0, 1].
 
     Args:
-        X_WA, X_WB: first and last pose.
-        step: at most this far apart [m].
-        angle: at most this much turned from one to the next [rad].
+        X_WA, X_WB: first and last pose; neighbours between them differ by at most `LINEAR_STEP` and `ANGULAR_STEP`.
     """
     distance = X_WB.p - X_WA.p
     turn = rotation_vector(X_WA.R.T @ X_WB.R)
     whole = float(np.linalg.norm(turn))
     axis = turn / whole if whole > 1e-12 else np.array([0.0, 0.0, 1.0])
-    count = max(1, int(np.ceil(float(np.linalg.norm(distance)) / step - 1e-9)), int(np.ceil(whole / angle - 1e-9)))
+    steps = max(float(np.linalg.norm(distance)) / LINEAR_STEP, whole / ANGULAR_STEP)
+    count = max(1, int(np.ceil(steps - 1e-9)))
     between = [
         Transform(
             R=frozen(X_WA.R @ matrix_from_axis_angle(axis, k / count * whole)),
@@ -64,33 +61,22 @@ def interpolate(
     return (X_WA, *between, X_WB)
 
 
-def linear_path(
-    solver: InverseKinematics,
-    q: npt.ArrayLike,
-    X_WT: Transform,
-    *,
-    step: float = LINEAR_STEP,
-    angle: float = ANGULAR_STEP,
-    max_jump: float = MAX_JUMP,
-) -> JointPath:
+def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) -> JointPath:
     """The straight line of the tool from where `q` (n) has it to `X_WT`.
 
     Raises:
         NotPlannable: see `follow_poses`.
     """
-    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT, step=step, angle=angle), max_jump=max_jump)
+    return follow_poses(solver, q, interpolate(solver.forward(q), X_WT))
 
 
-def follow_poses(
-    solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform], *, max_jump: float = MAX_JUMP
-) -> JointPath:
+def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> JointPath:
     """Joint positions that take the tool through `poses`, the first of which `q` (n) already has.
 
     Args:
         solver: of the joints that move.
         q: (n) positions of all moving joints of the robot at the start.
         poses: `X_WT`, near neighbours (see `interpolate`).
-        max_jump: largest change of one joint between two poses [rad or m].
 
     Returns:
         One waypoint a pose, of the solver's joints.
@@ -114,7 +100,7 @@ def follow_poses(
             )
         jump = np.abs(found.q[columns] - q[columns])
         worst = int(np.argmax(jump))
-        if jump[worst] > max_jump:
+        if jump[worst] > MAX_JUMP:
             raise NotPlannable(
                 f"the arm would have to jump {where}: joint '{solver.joints[worst]}' by {jump[worst]:.2f} within one "
                 f"point of the line (near singular: {solver.singularity(q)})",

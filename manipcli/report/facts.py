@@ -121,23 +121,20 @@ class RunFacts:
     end: float
 
 
-def run_facts(
-    recording: Recording, robot: RobotModel, scene: Scene, steps: Sequence[StepOutcome], *, buckets: int = BUCKETS
-) -> RunFacts:
+def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequence[StepOutcome]) -> RunFacts:
     """Measure a recording.
 
     Args:
         recording: the log; it holds every joint of the robot and every movable body of the scene.
         robot, scene: built from it.
         steps: how they went.
-        buckets: see `RunFacts.times`.
     """
     joints = [recording.joint_names.index(name) for name in robot.joint_names]
     bodies = {name: k for k, name in enumerate(recording.body_names)}
     holds, end = find_holds(recording, scene)
     meters = [HoldMeter(hold, robot, scene, joints) for hold in holds if hold.body in bodies]
     limits = _Limits(robot)
-    errors = _Errors(robot, end, buckets)
+    errors = _Errors(robot, end)
     powers = _Powers(len(joints), steps, end)
     for span in recording.spans:
         if not len(span.states.time):
@@ -223,16 +220,16 @@ class _Limits:
 class _Errors:
     """|reference - measured| of each joint: the largest, the mean square, and the largest in each part of the run."""
 
-    def __init__(self, robot: RobotModel, end: float, buckets: int) -> None:
+    def __init__(self, robot: RobotModel, end: float) -> None:
         n = len(robot.joint_names)
         self._names = robot.joint_names
         self._endless = [k for k, joint in enumerate(robot.moving_joints) if joint.type == "continuous"]
-        self.start, self._end, self._buckets = 0.0, end, buckets
+        self.start, self._end = 0.0, end
         self._begun = False
         self._largest = np.full(n, -np.inf)
         self._at = np.zeros(n)
         self._squares, self._count = np.zeros(n), np.zeros(n)
-        self._table = np.full((buckets, n), -np.inf)
+        self._table = np.full((BUCKETS, n), -np.inf)
 
     def add(self, span: Span, position: Array) -> None:
         times = span.states.time
@@ -249,12 +246,12 @@ class _Errors:
         self._squares += np.square(np.where(known, error, 0.0)).sum(axis=0)
         self._count += known.sum(axis=0)
         share = (times - self.start) / max(self._end - self.start, 1e-12)
-        part = np.clip((share * self._buckets).astype(int), 0, self._buckets - 1)
+        part = np.clip((share * BUCKETS).astype(int), 0, BUCKETS - 1)
         np.maximum.at(self._table, part, size)
 
     @property
     def times(self) -> Array:
-        middle = (np.arange(self._buckets) + 0.5) / self._buckets
+        middle = (np.arange(BUCKETS) + 0.5) / BUCKETS
         return frozen(self.start + middle * (self._end - self.start))
 
     def table(self) -> Array:

@@ -27,7 +27,7 @@ def solver(make_arm7: Callable[..., RobotModel]) -> InverseKinematics:
 def test_interpolation_is_uniform_in_position_and_angle() -> None:
     A = Transform.of(xyz=(0.0, 0.0, 0.0), rpy=(0.1, 0.2, 0.3))
     B = A @ Transform.of(xyz=(0.03, 0.04, 0.0), rpy=(0.0, 0.0, 0.5))
-    poses = interpolate(A, B, step=0.005, angle=0.02)
+    poses = interpolate(A, B)
     steps = [np.linalg.norm(b.p - a.p) for a, b in pairwise(poses)]
     turns = [np.linalg.norm(rotation_vector(a.R.T @ b.R)) for a, b in pairwise(poses)]
     assert len(poses) == 26  # 0.5 rad in steps of 0.02; 50 mm in steps of 5 need only 10
