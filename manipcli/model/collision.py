@@ -66,18 +66,14 @@ def pairs(links: Iterable[str], *bodies: str) -> frozenset[Pair]:
 class CollisionChecker:
     """The shapes of a robot and a scene."""
 
-    def __init__(
-        self, kinematics: Kinematics, scene: Scene, *, ignore: Iterable[Pair] = (), margin: float = 0.0
-    ) -> None:
+    def __init__(self, kinematics: Kinematics, scene: Scene, *, ignore: Iterable[Pair] = ()) -> None:
         """
         Args:
             kinematics: of the robot.
             scene: its bodies are the obstacles.
             ignore: pairs of link names that are never checked (`collision_ignore` of the robot file).
-            margin: parts nearer than this [m] count as touching; a negative one forgives so much overlap.
         """
         self.scene = scene
-        self.margin = margin
         self._kinematics = kinematics
         self._bodies = {body.name: [(g.X_LS, coal_shape(g.shape)) for g in body.geometries] for body in scene.bodies}
         self._links: list[_Part] = []
@@ -99,7 +95,7 @@ class CollisionChecker:
         *,
         carried: Carried | None = None,
         ignore: Iterable[Pair] = (),
-        margin: float | None = None,
+        margin: float = 0.0,
         absent: Iterable[str] = (),
         only: str | None = None,
     ) -> CollisionQuery:
@@ -109,7 +105,7 @@ class CollisionChecker:
             poses: `X_WO` of each of `scene.movable`, in that order; None: where the task puts them.
             carried: a movable body that the robot holds.
             ignore: pairs of parts whose contact is allowed (`pairs` makes them); order does not matter.
-            margin: instead of the checker's [m].
+            margin: parts nearer than this [m] count as touching; a negative one forgives so much overlap.
             absent: bodies that are not there (what lies in a carried cup).
             only: a part; pairs without it are not checked.
         """
@@ -132,7 +128,6 @@ class CollisionChecker:
         allowed = self._ignored | {frozenset(pair) for pair in ignore}
         if carried is not None:
             allowed |= {frozenset((f"robot/{carried.link}", carried.body))}
-        margin = self.margin if margin is None else margin
         return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, only=only)
 
     def _touching_at_zero(self) -> set[frozenset[str]]:

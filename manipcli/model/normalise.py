@@ -16,8 +16,6 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.mesh import read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
 from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.robot import (
     Box,
@@ -46,7 +44,7 @@ def portable_urdf(
     """The whole description as text with `package://` meshes; reading it again gives the same links and joints."""
     lines = _head(name)
     for link in links:
-        lines += _link(link, link.inertial, link.visuals, lambda mesh: mesh.uri)
+        lines += _link(link, lambda mesh: mesh.uri)
     for joint in joints:
         lines += _joint(joint)
     for tag in transmissions:
@@ -54,7 +52,7 @@ def portable_urdf(
     return _text(lines)
 
 
-def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> str:
+def engine_urdf(robot: RobotModel, folder: Path) -> str:
     """What a physics engine reads: inertials, collision shapes, joints; meshes as files of ours, never those of users.
 
     A link without an inertial is written with mass 0. Limits are those of the model, robot file included; a mimic joint
@@ -63,7 +61,6 @@ def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> st
     Args:
         robot: the robot.
         folder: takes the files of its meshes; to be kept until the engine has read them.
-        visuals: also write what is drawn; a mesh of it that cannot be read is left out.
 
     Raises:
         InvalidInput: a joint moves a link without mass, a line would be too long, or a collision mesh is damaged.
@@ -73,10 +70,10 @@ def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> st
         raise InvalidInput(massless)
     lines = _head(robot.name)
     for link in robot.links:
-        drawn = tuple(filter(_readable, link.visuals)) if visuals else ()
         inertial = link.inertial or MASSLESS
         inertial = dataclasses.replace(inertial, inertia=inside_triangle(inertial.inertia))
-        lines += _link(link, inertial, drawn, lambda mesh: str(clean_mesh(mesh, folder)))
+        simulated = dataclasses.replace(link, inertial=inertial, visuals=())
+        lines += _link(simulated, lambda mesh: str(clean_mesh(mesh, folder)))
     for joint in robot.joints:
         # Bullet would take greatest numbers for limits.
         free = joint.type == "revolute" and joint.limits.lower is None and joint.limits.upper is None
@@ -85,13 +82,6 @@ def engine_urdf(robot: RobotModel, folder: Path, *, visuals: bool = False) -> st
 
 
 MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)))
-
-
-def _readable(geometry: Geometry) -> bool:
-    try:
-        return not isinstance(geometry.shape, Mesh) or bool(read_mesh(geometry.shape.path))
-    except UnusableMesh:
-        return False
 
 
 def massless_joints(robot: RobotModel) -> tuple[str, ...]:
@@ -148,8 +138,9 @@ FileOf = Callable[[Mesh], str]
 """What stands in the description for the file of a mesh."""
 
 
-def _link(link: Link, inertial: Inertial | None, visuals: Sequence[Geometry], file_of: FileOf) -> list[str]:
+def _link(link: Link, file_of: FileOf) -> list[str]:
     lines = [f"  <link name={quoteattr(link.name)}>"]
+    inertial = link.inertial
     if inertial is not None:
         I = inertial.inertia  # noqa: E741  (the inertia matrix)
         lines += ["    <inertial>", *_origin(inertial.X_LI, "      ")]
@@ -157,7 +148,7 @@ def _link(link: Link, inertial: Inertial | None, visuals: Sequence[Geometry], fi
         moments = {"ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2]}
         pairs = " ".join(f'{key}="{number(float(value))}"' for key, value in moments.items())
         lines += [f"      <inertia {pairs}/>", "    </inertial>"]
-    for tag, geometries in (("visual", visuals), ("collision", link.collisions)):
+    for tag, geometries in (("visual", link.visuals), ("collision", link.collisions)):
         for geometry in geometries:
             lines += _geometry(tag, geometry, file_of)
     return [*lines, "  </link>"]

@@ -86,9 +86,10 @@ def test_agrees_with_the_distances_between_balls() -> None:
 @pytest.mark.parametrize(("margin", "hit"), [(-0.02, False), (0.0, True)])
 def test_a_negative_margin_forgives_overlap(margin: float, hit: bool) -> None:
     """The last ball, at x = 3, overlaps the post by 1 cm."""
-    checker = CollisionChecker(Kinematics(robot()), scene(body("post", Sphere(0.2), (3.29, 0.0, 0.0))), margin=margin)
-    assert checker.at().touches(np.zeros(3)) is hit
-    assert (checker.at().check(np.zeros(3)) is not None) is hit
+    checker = CollisionChecker(Kinematics(robot()), scene(body("post", Sphere(0.2), (3.29, 0.0, 0.0))))
+    query = checker.at(margin=margin)
+    assert query.touches(np.zeros(3)) is hit
+    assert (query.check(np.zeros(3)) is not None) is hit
 
 
 def test_a_margin_makes_near_things_touch() -> None:
