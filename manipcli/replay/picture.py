@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
-from manipcli.replay.drawing import Drawable, Drawing, Layer, draw
+from manipcli.replay.drawing import Drawable, Drawing, draw
 from manipcli.replay.image import Image, sky, write_png
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.posture import posture
@@ -33,14 +33,10 @@ FLOOR = "floor"
 """The kind of body that everything stands on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Light:
-    """Towards the light in the world; how bright what faces it, what does not, and what mirrors it."""
-
-    direction: tuple[float, float, float] = (0.35, 0.55, 1.0)
-    ambient: float = 0.62
-    diffuse: float = 0.42
-    specular: float = 0.08
+TO_LIGHT = (0.35, 0.55, 1.0)
+"""Towards the light in the world."""
+AMBIENT, DIFFUSE, SPECULAR = 0.62, 0.42, 0.08
+"""How bright is what does not face the light, what faces it, and what mirrors it."""
 
 
 class Studio:
@@ -48,9 +44,7 @@ class Studio:
 
     Args:
         drawing: what there is.
-        layers: which of it is shown.
         size: width and height of the pictures [pixel].
-        light: the light.
         still: frames that stand where they are in all pictures of one camera: they are drawn once, and of each
             picture only the part that the others may cover.
     """
@@ -59,14 +53,11 @@ class Studio:
         self,
         drawing: Drawing,
         *,
-        layers: tuple[Layer, ...] = ("visual",),
         size: tuple[int, int] = SIZE,
-        light: Light = Light(),
         still: frozenset[str] = frozenset(),
     ) -> None:
         self._size = size
-        self._light = light
-        shown = [one for one in drawing.drawables if one.layer in layers and one.rgba[3] > 0.0]
+        shown = [one for one in drawing.layer("visual") if one.rgba[3] > 0.0]
         self._still = _Client(drawing, [one for one in shown if one.frame in still])
         self._moving = _Client(drawing, [one for one in shown if one.frame not in still])
         self._before: tuple[Camera, _Raster, Image] | None = None
@@ -82,13 +73,13 @@ class Studio:
         """What the camera sees at one instant, with the sky behind."""
         whole = Window(0, 0, FINER * self._size[0], FINER * self._size[1])
         if self._before is None or self._before[0] != camera:
-            raster = self._still.render(poses, camera, self._light, whole, whole)
+            raster = self._still.render(poses, camera, whole, whole)
             self._before = (camera, raster, _averaged(raster.rgb))
         _, behind, image = self._before
         window = self._moving.window(poses, camera, whole)
         if window is None:
             return image.copy()
-        front = self._moving.render(poses, camera, self._light, whole, window)
+        front = self._moving.render(poses, camera, whole, window)
         rows, columns = window.slices
         nearer = front.seen & (front.depth <= behind.depth[rows, columns])
         rgb = np.where(nearer[..., None], front.rgb, behind.rgb[rows, columns])
@@ -176,7 +167,7 @@ class _Client:
         )
         return found if found.left < found.right and found.top < found.bottom else None
 
-    def render(self, poses: Poses, camera: Camera, light: Light, whole: Window, part: Window) -> _Raster:
+    def render(self, poses: Poses, camera: Camera, whole: Window, part: Window) -> _Raster:
         """A part of the whole picture."""
         for body, k in self._bodies:
             self._bullet.resetBasePositionAndOrientation(
@@ -197,11 +188,11 @@ class _Client:
                 camera.near,
                 camera.far,
             ),
-            lightDirection=light.direction,
+            lightDirection=TO_LIGHT,
             lightColor=(1.0, 1.0, 1.0),
-            lightAmbientCoeff=light.ambient,
-            lightDiffuseCoeff=light.diffuse,
-            lightSpecularCoeff=light.specular,
+            lightAmbientCoeff=AMBIENT,
+            lightDiffuseCoeff=DIFFUSE,
+            lightSpecularCoeff=SPECULAR,
             shadow=0,
             renderer=self._bullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
