@@ -1,6 +1,6 @@
 """A run as conditions see it while it goes on: the same moments that its recording will hold, some ticks at a time.
 
-Contacts pass the filter of the recorder and times are rounded as in the log, so that what a probe answers live is what
+Contacts are those that are recorded and times are rounded as in the log, so that what a probe answers live is what
 judging the log gives for the same ticks. Who listens to every answer is told at every tenth tick; the others are looked
 at when they are asked, or when there is no more room for what they have not seen.
 """
@@ -21,7 +21,6 @@ from manipcli.model.moments import Moments, Reference, StepTime, Touching
 from manipcli.model.reading import Reading
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.contact_filter import ContactFilter
 from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 
@@ -93,7 +92,6 @@ class Live:
         self._period = period
         self._probes: list[Probe] = []
         self._steps = {name: StepTime(name, None, None, "") for name in world.steps}
-        self._filter = ContactFilter()
         self._contacts: list[Touching] = []
         n, m = len(world.robot.joint_names), len(world.scene.movable)
         self._rows = WorldState.room(n, m, ROOM + 1)  # row 0 is the tick before the others
@@ -123,10 +121,8 @@ class Live:
             self._ask()
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
-        """Everything that touches; told before the tick."""
-        changed = self._filter.changed(tick * self._period, contacts)
-        if changed is not None:
-            self._contacts.append(Touching(self._moment(tick), tuple(changed)))
+        """Everything that touches, as it is recorded; told before the tick."""
+        self._contacts.append(Touching(self._moment(tick), tuple(contacts)))
 
     def step_started(self, step: str) -> None:
         """The next tick is the first of a step."""

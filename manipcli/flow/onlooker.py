@@ -14,6 +14,7 @@ from manipcli.flow.live import Live
 from manipcli.flow.plan import PlannedStep
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import Contact, WorldState
+from manipcli.record.contact_filter import ContactFilter
 from manipcli.record.recorder import Recorder
 
 FEEDBACK_PERIOD: Final = 0.05
@@ -68,6 +69,7 @@ class Onlooker:
         self._progress = progress
         self._period = period
         self._began = wall_clock.perf_counter()
+        self._filter = ContactFilter()
         self._feedback_ticks = max(1, round(FEEDBACK_PERIOD / period))
         self._next_tick = 0
         self._goals: list[_Goal] = []
@@ -85,8 +87,10 @@ class Onlooker:
             self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:
-        self._recorder.contacts(tick, contacts)
-        self._live.contacts(tick, contacts)
+        changed = self._filter.changed(tick * self._period, contacts)
+        if changed is not None:
+            self._recorder.contacts(tick, changed)
+            self._live.contacts(tick, changed)
 
     def goal(self, controller: str, handle: GoalHandle) -> None:
         """A controller has a new goal; one that it had before may have ended by that."""

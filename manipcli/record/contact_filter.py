@@ -4,7 +4,6 @@ simulated second, small changes at most ten times, so that a force that stays is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
 
 from manipcli.model.state import Contact
 
@@ -26,8 +25,6 @@ KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
 DEPTH_LEAST = 2e-4
 """[m] A pair that is deeper by more than this than what was recorded is written at once."""
 
-_pair = attrgetter("a", "b")
-
 
 class ContactFilter:
     """Remembers what was recorded last. The first contacts are always recorded, were there none: a log without any
@@ -35,21 +32,19 @@ class ContactFilter:
 
     def __init__(self) -> None:
         self._pairs: list[tuple[str, str]] | None = None
-        self._last: list[Contact] = []
+        self._last: Sequence[Contact] = ()
         self._time = 0.0
 
-    def changed(self, time: float, contacts: Sequence[Contact]) -> list[Contact] | None:
-        """The contacts to record at `time` [s], sorted by their names; None when the last message still holds."""
-        if not contacts and self._pairs == []:
+    def changed(self, time: float, contacts: Sequence[Contact]) -> Sequence[Contact] | None:
+        """What to record of `contacts`, which are sorted by their names, at `time` [s]: all; None when the last message
+        still holds."""
+        pairs = [contact[:2] for contact in contacts]
+        if pairs == self._pairs and not self._differs(time, contacts):
             return None
-        found = sorted(contacts, key=_pair)
-        pairs = [(contact.a, contact.b) for contact in found]
-        if pairs == self._pairs and not self._differs(time, found):
-            return None
-        self._pairs, self._last, self._time = pairs, found, time
-        return found
+        self._pairs, self._last, self._time = pairs, contacts, time
+        return contacts
 
-    def _differs(self, time: float, found: list[Contact]) -> bool:
+    def _differs(self, time: float, found: Sequence[Contact]) -> bool:
         due = time - self._time >= FORCE_PERIOD - 1e-9
         steady = time - self._time >= STEADY_PERIOD - 1e-9
         share, least = (STEADY_SHARE, STEADY_LEAST) if steady else (FORCE_SHARE, FORCE_LEAST)

@@ -23,7 +23,6 @@ from manipcli.record import channels as topics
 from manipcli.record import messages
 from manipcli.record.block import Block, Single
 from manipcli.record.channels import TRANSIENT_LOCAL, Channel, ControllerChannel, Recorded, channel_table
-from manipcli.record.contact_filter import ContactFilter
 from manipcli.record.container import Container
 from manipcli.record.contents import RECORD, Contents
 from manipcli.record.faults import RecordingRefused
@@ -77,7 +76,6 @@ class Recorder:
         self._block = Block(robot, scene, controllers, table, selection, period, capacity)
         self._singles: list[Single] = []
         self._sequences: Counter[int] = Counter()
-        self._contact_filter = ContactFilter()
         self._contact_encoder = messages.ContactEncoder()
         self._container = Container(path, overwrite=overwrite)
         self._thread = ThreadPoolExecutor(max_workers=1)
@@ -130,13 +128,10 @@ class Recorder:
         self._block.add(tick, state, outputs)
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
-        """Everything that touches at `tick`; recorded when it differs enough from what was recorded last."""
-        if not self._touches:
-            return
-        changed = self._contact_filter.changed(tick * self._period, contacts)
-        if changed is not None:
+        """Everything that touches at `tick`, until the next call; see `contact_filter.py`."""
+        if self._touches:
             ns = self._ns(tick)
-            self._single(topics.CONTACTS, ns, self._contact_encoder.encode(ns, changed))
+            self._single(topics.CONTACTS, ns, self._contact_encoder.encode(ns, contacts))
 
     def event(self, tick: int, *, kind: str, step: str, verb: str, outcome: str, text: str, place: str) -> None:
         """Something happened in the task; also said on /rosout."""

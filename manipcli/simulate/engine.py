@@ -66,7 +66,7 @@ class Engine(Protocol):
         ...
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Everything that touches now."""
+        """Everything that touches now, sorted by the names of the parts."""
         ...
 
     def close(self) -> None:

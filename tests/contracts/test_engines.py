@@ -462,6 +462,16 @@ def test_a_block_on_a_slope_slides_beyond_the_angle_of_friction(
 
 
 @with_physics
+def test_contacts_are_sorted_by_name_whatever_the_order_of_the_bodies(member: EngineMember, opens: Opens) -> None:
+    table = body("table", Box((1.0, 1.0, 0.2)), (2.0, 0.0, 0.4), fixed=True)
+    blocks = [body(name, Box((0.1, 0.1, 0.1)), (1.8 + 0.2 * k, 0.0, 0.55)) for k, name in enumerate("zma")]
+    engine = opens(member, pendulum(), scene(blocks[0], table, *blocks[1:]))
+    run(engine, 50)
+    found = [contact[:2] for contact in engine.contacts()]
+    assert found == [("a", "table"), ("m", "table"), ("table", "z")]
+
+
+@with_physics
 def test_contacts_carry_the_weight_and_are_named(member: EngineMember, opens: Opens) -> None:
     table = body("table", Box((1.0, 1.0, 0.2)), (2.0, 0.0, 0.4), fixed=True)
     block = body("block", Box((0.2, 0.2, 0.1)), (2.0, 0.0, 0.55), mass=1.5, moments=(0.01, 0.01, 0.01))

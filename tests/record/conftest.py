@@ -130,7 +130,8 @@ class Run:
             one = [a[k] for a in (s.time, s.position, s.velocity, s.effort, s.body_position, s.body_quat_xyzw)]
             zeros = np.zeros((2, 3))
             recorder.tick(k, WorldState(*one, zeros, zeros), self.outputs_at(k))
-            recorder.contacts(k, self.contacts if (k // 100) % 2 else ())
+            if k % 100 == 0:
+                recorder.contacts(k, self.contacts if (k // 100) % 2 else ())
 
     def write(self, path: Path) -> Path:
         recorder = self.recorder(path)
@@ -157,7 +158,7 @@ def _run(ticks: int) -> Run:
         body_angular=np.zeros((ticks, 2, 3)),
     )
     outputs = tuple(tuple(rng.normal(size=(ticks, len(c.joints))) for _ in range(4)) for c in CONTROLLERS)
-    contacts = (Contact("cup", "robot/wheel", 1.5, -0.0002), Contact("ball", "cup", 0.25, 0.0))
+    contacts = (Contact("ball", "cup", 0.25, 0.0), Contact("cup", "robot/wheel", 1.5, -0.0002))
     return Run(robot, scene, states, outputs, contacts)
 
 

@@ -22,6 +22,27 @@ def recorded(forces: list[float]) -> list[float]:
     return known
 
 
+def test_pairs_are_followed_at_once_and_forces_at_their_pace() -> None:
+    def touch(force: float, distance: float = 0.0) -> list[Contact]:
+        return [Contact("a", "b", force, distance)]
+
+    contacts = ContactFilter()
+    assert contacts.changed(0.0, []) == [], "that nothing touches is said once, too"
+    assert contacts.changed(0.0, []) is None
+    assert contacts.changed(0.001, touch(1.0)) == touch(1.0)
+    assert contacts.changed(0.002, touch(1.4)) is None, "a force alone waits"
+    assert contacts.changed(0.003, touch(1.0, -0.001)) == touch(1.0, -0.001), "a deeper contact does not"
+    assert contacts.changed(0.012, touch(1.4)) is None
+    assert contacts.changed(0.013, touch(1.4)) == touch(1.4)
+    assert contacts.changed(0.014, touch(9.0)) == touch(9.0), "nor does a knock"
+    assert contacts.changed(0.015, touch(1.4)) is None, "but its end"
+    assert contacts.changed(0.030, touch(9.1)) is None, "nearly the same force"
+    two = [*touch(9.0), Contact("b", "c", 1.0, 0.0)]
+    assert contacts.changed(0.031, two) == two
+    assert contacts.changed(0.032, []) == []
+    assert contacts.changed(0.033, []) is None
+
+
 @pytest.mark.parametrize("change", [0.05, -0.05, 0.09, -0.03])
 def test_a_force_that_changes_a_little_and_stays_is_known_within_a_tenth_of_a_second(change: float) -> None:
     forces = [1.4715] * 40 + [1.4715 * (1 + change)] * 200

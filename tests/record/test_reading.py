@@ -89,7 +89,7 @@ def test_reads_back_what_was_recorded(tmp_path: Path, make_run: MakeRun) -> None
         np.testing.assert_array_equal(trace.times, recording.states.time)
     assert [snapshot.time for snapshot in recording.contacts] == [k / 10 for k in range(13)]
     assert recording.contacts[0].contacts == ()
-    assert recording.contacts[1].contacts == (run.contacts[1], run.contacts[0])
+    assert recording.contacts[1].contacts == run.contacts
     assert recording.silent == ()
     assert [(event.time, event.step, event.text) for event in recording.events] == [
         (k / 4, f"step_{250 * k}", "é ok") for k in range(5)

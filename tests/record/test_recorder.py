@@ -23,9 +23,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.geometry import Transform, matrix_from_axis_angle, quat_from_matrix
-from manipcli.model.state import Contact
 from manipcli.record import recorder as recorder_module
-from manipcli.record.contact_filter import ContactFilter
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.reading import read_recording
 
@@ -374,27 +372,6 @@ class TestRefusedBeforeAnythingIsWritten:
         with pytest.raises(RecordingRefused, match=r"plain file name"):
             make_run(1).recorder(tmp_path / "run.mcap", attachments=[(name, "text/plain", b"")])
         assert list(tmp_path.iterdir()) == []
-
-
-def test_contact_filter_follows_pairs_at_once_and_forces_at_their_pace() -> None:
-    def touch(force: float, distance: float = 0.0) -> list[Contact]:
-        return [Contact("a", "b", force, distance)]
-
-    contacts = ContactFilter()
-    assert contacts.changed(0.0, []) == [], "that nothing touches is said once, too"
-    assert contacts.changed(0.0, []) is None
-    assert contacts.changed(0.001, touch(1.0)) == touch(1.0)
-    assert contacts.changed(0.002, touch(1.4)) is None, "a force alone waits"
-    assert contacts.changed(0.003, touch(1.0, -0.001)) == touch(1.0, -0.001), "a deeper contact does not"
-    assert contacts.changed(0.012, touch(1.4)) is None
-    assert contacts.changed(0.013, touch(1.4)) == touch(1.4)
-    assert contacts.changed(0.014, touch(9.0)) == touch(9.0), "nor does a knock"
-    assert contacts.changed(0.015, touch(1.4)) is None, "but its end"
-    assert contacts.changed(0.030, touch(9.1)) is None, "nearly the same force"
-    two = [Contact("b", "c", 1.0, 0.0), *touch(9.0)]
-    assert contacts.changed(0.031, two) == [two[1], two[0]]
-    assert contacts.changed(0.032, []) == []
-    assert contacts.changed(0.033, []) is None
 
 
 def test_failing_disk_leaves_what_was_flushed(
