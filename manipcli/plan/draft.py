@@ -12,7 +12,7 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried
-from manipcli.plan.hand import closed_on, ramp, with_mimics
+from manipcli.plan.hand import closed_on, pressing, ramp, with_mimics
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.path import ANGULAR_STEP, JointPath, follow_poses, joint_path, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
@@ -241,14 +241,21 @@ class Draft:
         With `must_arrive` the step fails where something stops the hand.
 
         Raises:
-            NotPlannable: no gripper controller moves the hand, or something else than the object is in its way.
+            NotPlannable: no gripper controller moves the hand, something else than the object is in its way, or it
+                `must_arrive` where it would still press on the object.
         """
         grip = self._grip(self._posture(posture))
         if grip is None:
             raise _no_gripper(posture)
         allowed = NOTHING
         if self._now.carried is not None:
-            allowed |= self._planner.hand_contacts(self._now.carried.body)
+            held = self._now.carried.body
+            there, query = self._with(grip.joints, grip.target), self._planner.grasping(self._now, held)
+            still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
+            if still is not None:
+                message = f"with the hand in its pose '{posture}', '{still}' would still press on '{held}'"
+                raise NotPlannable(message, hint="it lets go in a pose that is open: `posture: POSE`")
+            allowed |= self._planner.hand_contacts(held)
         if around is not None:
             allowed |= self._planner.hand_contacts(around)
         self._now = replace(self._now, carried=None, closed=False)

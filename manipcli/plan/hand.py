@@ -14,6 +14,8 @@ STEPS = 40
 """Points of the way of a closing hand at which contact is looked for."""
 SPEED = 1.0
 """[rad/s or m/s] of a hand's references, where nobody says."""
+PRESSES = 1e-3
+"""[m] A finger that would stand deeper than this in what it is to let go of still presses on it."""
 
 
 def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
@@ -99,3 +101,12 @@ def closed_on(
         if not moving.any():
             break
     return frozen(position), frozenset(touched)
+
+
+def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequence[str]) -> str | None:
+    """The part of the hand of these `joints` that is deepest at `q` (n) in what the query looks at, by more than
+    `PRESSES`, as `robot/<link>`; None if none is."""
+    links = {f"robot/{link}" for link in moved_links(robot, joints)}
+    deep = [hit for hit in query.every(q) if hit.distance < -PRESSES and {hit.a, hit.b} & links]
+    deepest = min(deep, key=lambda hit: hit.distance, default=None)
+    return None if deepest is None else next(iter({deepest.a, deepest.b} & links))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -337,6 +338,16 @@ def test_a_release_lets_go_and_leaves_the_object(bench: Make, story: Story) -> N
     np.testing.assert_array_equal(arm.body("cup").matrix, arm.body("cup", story.steps["pick"][1].end).matrix)
     assert plan.duration > 0.05
     assert arm.plan("release", {}).duration == 0.0
+
+
+def test_a_release_into_a_pose_that_would_still_hold_is_refused(bench: Make, story: Story) -> None:
+    arm = bench()
+    arm.now = story.steps["pick"][1].end
+    refusal = arm.refused("release", {"posture": "wrap"})
+    still = r"with the hand in its pose 'wrap', 'robot/finger_\d_\w+' would still press on 'cup'"
+    assert re.fullmatch(still, refusal.cause)
+    assert refusal.hint == "it lets go in a pose that is open: `posture: POSE`"
+    assert arm.plan("release", {"posture": "zero"}).end.carried is None
 
 
 def test_a_hand_closed_on_nothing_named_is_left_closed_by_moves(bench: Make) -> None:
