@@ -14,11 +14,11 @@ from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_an
 from manipcli.model.collision import RESOLUTION, Carried
 from manipcli.plan.hand import closed_on, pressing, ramp, with_mimics
 from manipcli.plan.limits import MotionLimits
-from manipcli.plan.path import ANGULAR_STEP, JointPath, follow_poses, joint_path, linear_path
+from manipcli.plan.line import Walk, timed_line
+from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
-from manipcli.plan.retimer import retime
 from manipcli.plan.sampling import LONGEST
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
@@ -119,9 +119,9 @@ class Draft:
         self._add(label, trajectory, grip)
 
     def straight(self, label: str, X_WT: Transform, *, speed: float = 1.0, allowed: Pairs = NOTHING) -> None:
-        """The tool on a straight line to a pose."""
+        """The tool on a straight line to a pose; one that is the step itself may lead along joint limits."""
         with self._told(label):
-            trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
+            trajectory = self._straight(X_WT, speed, insist=label == self._verb)
         self._add(label, trajectory, None, allowed=allowed)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float = 1.0, grazing: bool = False) -> None:
@@ -131,7 +131,7 @@ class Draft:
         that does not sit in the middle of the hand.
         """
         with self._told("withdraw"):
-            trajectory = self._timed(linear_path(self._planner.solver, self._now.position, X_WT), speed)
+            trajectory = self._straight(X_WT, speed)
         allowed = NOTHING
         if grazing:
             planner = self._planner
@@ -152,7 +152,7 @@ class Draft:
             for k in range(count + 1)
         ]
         with self._told(label):
-            trajectory = self._timed(follow_poses(self._planner.solver, self._now.position, poses), speed)
+            trajectory = self._timed(lambda solver: follow_poses(solver, self._now.position, poses), speed)
         self._add(label, trajectory, None)
 
     def back(self, label: str) -> None:
@@ -310,11 +310,12 @@ class Draft:
         verify(trajectory, limits)
         return trajectory
 
-    def _timed(self, path: JointPath, speed: float) -> JointTrajectory:
-        limits = self._limits(path.names, speed)
-        trajectory = retime(joint_path(path.names, path.waypoints), limits, period=self._planner.period)
-        verify(trajectory, limits)
-        return trajectory
+    def _straight(self, X_WT: Transform, speed: float, *, insist: bool = False) -> JointTrajectory:
+        return self._timed(lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist)
+
+    def _timed(self, walk: Walk, speed: float, *, insist: bool = False) -> JointTrajectory:
+        limits = self._limits(self._planner.solver.joints, speed)
+        return timed_line(walk, self._planner.solver, limits, period=self._planner.period, insist=insist)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING

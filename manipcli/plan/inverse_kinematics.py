@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -99,6 +100,12 @@ class InverseKinematics:
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower = np.array([-np.inf if limit.lower is None else limit.lower for limit in limits])
         self._upper = np.array([np.inf if limit.upper is None else limit.upper for limit in limits])
+
+    def drawn_in(self, margin: Array) -> InverseKinematics:
+        """The same within narrower limits: each joint's drawn in by its `margin` (m) [rad or m]."""
+        narrower = copy(self)
+        narrower._lower, narrower._upper = self._lower + margin, self._upper - margin
+        return narrower
 
     def forward(self, q: npt.ArrayLike) -> Transform:
         """`X_WT` at `q` (n), all moving joints."""

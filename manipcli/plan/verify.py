@@ -69,9 +69,7 @@ def verify_written(
         NotPlannable: names the joint, the position and the limit, and says where that position stands.
     """
     for name, value, loc in written:
-        limits = robot.joint(name).limits
-        lower = -np.inf if limits.lower is None else limits.lower
-        upper = np.inf if limits.upper is None else limits.upper
+        lower, upper = robot.joint(name).limits.range
         if max(lower - value, value - upper) > _POSITION:
             raise _beyond(name, value, lower, upper, when, loc)
 
@@ -84,10 +82,21 @@ def _beyond(
     return NotPlannable(f"joint '{name}' goes to {there}{when}, beyond its {word} limit {most}", loc=loc)
 
 
+def overshoot(trajectory: JointTrajectory, limits: MotionLimits) -> Array:
+    """(n) how far each joint goes beyond its position limits [rad or m]; 0 where it does not."""
+    worst = _outside(trajectory, limits).max(axis=0)
+    return np.where(worst > _POSITION, worst, 0.0)
+
+
+def _outside(trajectory: JointTrajectory, limits: MotionLimits) -> Array:
+    """(k, n) how far beyond the nearer limit; negative inside."""
+    q = trajectory.positions
+    return np.maximum(limits.lower - q, q - limits.upper)
+
+
 def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
     """The worst position outside its limits, if any."""
-    q = trajectory.positions
-    outside = np.maximum(limits.lower - q, q - limits.upper)
+    q, outside = trajectory.positions, _outside(trajectory, limits)
     k, i = np.unravel_index(int(np.argmax(outside)), outside.shape)
     if outside[k, i] > _POSITION:
         when = f" at t = {trajectory.times[k]:.3f} s"
