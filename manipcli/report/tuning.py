@@ -16,13 +16,13 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
     integral = any(one.i for one in joints)
     headers = ["joint", "inertia", "kp", *(["ki"] if integral else []), "kd", "damping", "overshoot", "settles"]
     headers += ["simulated", "settles "] if simulated else []
-    headers += ["bandwidth", "margin"]
+    headers += ["frequency", "-3 dB", "margin"]
     rows = []
     for one in joints:
         row = [one.joint, f"{one.inertia:.3g}", f"{one.p:.4g}", *([f"{one.i:.4g}"] if integral else []), f"{one.d:.4g}"]
         row += [f"{one.damping:.2f}", *_answer(one.predicted)]
         row += (_answer(one.simulated) if one.simulated is not None else ["-", "-"]) if simulated else []
-        row += [f"{one.bandwidth:.2g} Hz", f"x {one.margin:.1f}"]
+        row += [f"{one.frequency:.2g} Hz", f"{one.bandwidth:.2g} Hz", f"x {one.margin:.1f}"]
         rows.append((*row, one.limited_by or "nothing"))
     lines = [
         f"{robot}: gains for {wish.bandwidth:g} Hz and a damping ratio of {wish.damping:g}, "
@@ -35,6 +35,10 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
     lines.append(
         f"Step of {' or '.join(f'{size:g}' for size in steps)} (rad or m), of each joint alone with the most inertia "
         "that it meets, without gravity."
+    )
+    lines.append(
+        "Frequency: the natural one, which --bandwidth asks for; -3 dB: that up to which a joint follows its reference "
+        "with 1 / sqrt 2 of the swing or more."
     )
     if simulated:
         lines.append("Simulated: the whole robot in the engine, with gravity, the other joints held by these gains.")

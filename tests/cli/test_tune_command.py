@@ -19,7 +19,10 @@ def test_the_table_names_the_joint_and_says_what_its_numbers_are(capsys: pytest.
     out = capsys.readouterr().out
     assert "gains for 5 Hz and a damping ratio of 1, at a control period of 1 ms" in out
     (row,) = [line for line in out.splitlines() if line.startswith("joint_6 ")]
-    assert " Hz " in row
+    head = next(line for line in out.splitlines() if line.startswith("joint "))
+    there = head.index("frequency")
+    assert row[there : there + len("frequency")].strip() == "5 Hz"  # as --bandwidth asks; with damping 1 it is
+    assert row[there + len("frequency") :].split()[0] == "3.2"  # 5 Hz sqrt(sqrt(2) - 1), where |H| is 1 / sqrt 2
     assert " ms " in row
     assert row.endswith("nothing")  # limits it
     assert "of each joint alone" in out
