@@ -6,6 +6,7 @@ files, evaluating expressions and `$(...)`, loading YAML, warnings. The module t
 
 from __future__ import annotations
 
+import glob
 import importlib.util
 import os
 import re
@@ -270,8 +271,9 @@ class _Expansion:
     def _door_include_files(self, filename_spec: str, symbols: Mapping[str, object]) -> Iterator[str]:
         spec = str(self._door_eval_text(filename_spec, symbols))
         if any(character in spec for character in "*[?"):
-            folder = self._folder() / Path(spec).parent
-            names = sorted(str(path) for path in folder.glob(Path(spec).name))
+            parent, folder = Path(spec).parent, self._folder() / Path(spec).parent
+            # As the library, unlike Path.glob: `**` is `*`, so that no tree of folders is walked; nothing hidden.
+            names = sorted(str(parent / name) for name in glob.glob(Path(spec).name, root_dir=folder))  # noqa: PTH207
             if not names:
                 self._warn(f"'{spec}' matches no file")
         else:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Final
 
 from manipcli.core.text import any_of, did_you_mean, nearest
+
+_TAGS: Final = ("arg", "attribute", "call", "element", "if", "include", "insert_block", "macro", "property", "unless")
+"""Of xacro itself."""
 
 
 class UnknownArgument(NameError):
@@ -34,5 +38,5 @@ def near_name(error: NameError, known: Collection[str]) -> str | None:
 
 
 def near_macro(tag: str, known: Collection[str]) -> str | None:
-    close = nearest(tag.removeprefix("xacro:"), [name.removeprefix("xacro:") for name in known])
+    close = nearest(tag.removeprefix("xacro:"), [*(name.removeprefix("xacro:") for name in known), *_TAGS])
     return f"did you mean <xacro:{close[0]}>?" if close else None

@@ -73,6 +73,11 @@ def test_an_element_from_a_macro_in_an_included_file_knows_where_it_was_written(
     assert (Path(own.file).name, own.line, own.column) == ("r.urdf.xacro", 3, 45)
 
 
+def test_a_misspelt_tag_of_xacro_names_the_right_one(tmp_path: Path) -> None:
+    finding = refused(tmp_path, '<xacro:proprety name="n" value="1"/>').findings[0]
+    assert "did you mean <xacro:property>?" in (finding.hint or "")
+
+
 def test_an_error_in_a_macro_names_its_place_and_the_call(tmp_path: Path) -> None:
     macro = '<xacro:macro name="part" params="x">\n<link name="${x + missing}"/>\n</xacro:macro>\n'
     error = refused(tmp_path, macro + '<xacro:part x="1"/>')
@@ -101,6 +106,22 @@ def test_a_finding_in_a_macro_names_the_outermost_and_the_innermost_call(tmp_pat
     assert (finding.hint or "").endswith(f"expanded from {path}:7:1, in it from {path}:4:42")
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (3, 44)
+
+
+@pytest.mark.parametrize("pattern", ["parts/*.xacro", "parts/**", "{parts}/*.xacro"])
+def test_a_pattern_includes_the_files_of_one_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pattern: str
+) -> None:
+    parts = tmp_path / "robot" / "parts"
+    (parts / "deeper").mkdir(parents=True)
+    for folder, name in ((parts, "b"), (parts, "a"), (parts / "deeper", "c")):
+        (folder / f"{name}.xacro").write_text(f'<robot><link name="{name}"/></robot>')
+    if pattern.endswith("**"):
+        (parts / "deeper" / "c.xacro").unlink()
+        (parts / "deeper").rmdir()
+    monkeypatch.chdir(tmp_path)
+    include = f'<xacro:include filename="{pattern.format(parts=parts)}"/>'
+    assert names(expand(Path("robot"), include)) == ["a", "b"]
 
 
 def test_packages_are_found_through_our_search(tmp_path: Path) -> None:
