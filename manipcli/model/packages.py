@@ -102,6 +102,7 @@ class Packages:
         self._own = own_root(description) if description is not None else None
         self._found: dict[str, Path] = {}
         self._below: dict[str, Path] | None = None
+        self._meant: dict[Path, str | None] = {}
 
     def root(self, name: str) -> Path:
         """The folder of package `name`.
@@ -111,14 +112,14 @@ class Packages:
         """
         if name in self._found:
             return self._found[name]
-        searched: list[Path] = []
-        if name and not name.startswith(".") and "/" not in name and "\\" not in name and "\0" not in name:
-            searched = self._candidates(name)
-            found = next((folder for folder in searched if folder.is_dir()), None)
-            found = found or self._crawled(name) or _installed_package(name)
-            if found is not None:
-                self._found[name] = found.resolve()
-                return self._found[name]
+        if not name or name.startswith(".") or any(character in name for character in "/\\\0"):
+            raise NotFound(f"'{name}' cannot be the name of a package", hint="write package://NAME/path, $(find NAME)")
+        searched = self._candidates(name)
+        found = next((folder for folder in searched if folder.is_dir()), None)
+        found = found or self._crawled(name) or _installed_package(name)
+        if found is not None:
+            self._found[name] = found.resolve()
+            return self._found[name]
         places = ", ".join(shown_path(place) for place in searched)
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
@@ -184,9 +185,12 @@ class Packages:
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            message = f"'{uri}' is not found; searched {shown_path(path)}"
+            if os.path.islink(path):  # noqa: PTH114 (of a name that is too long, too)
+                message, near = f"'{uri}' is a link that leads to no file", False
+            else:
+                message, near = f"'{uri}' is not found; searched {shown_path(path)}", True
             if inside(Path(os.path.realpath(path))):
-                raise Absent(message, hint=_meant(path)) from error
+                raise Absent(message, hint=self._near(path) if near else None) from error
             raise NotFound(message) from error
         if not inside(real):
             hint = "move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
@@ -194,6 +198,12 @@ class Packages:
         if not real.is_file():
             raise NotFound(f"'{uri}' is not a regular file")
         return real
+
+    def _near(self, path: Path) -> str | None:
+        """`_meant`, once a path: many checks ask for the same absent file."""
+        if path not in self._meant:
+            self._meant[path] = _meant(path)
+        return self._meant[path]
 
     def _beside(self, real: Path) -> bool:
         """In a folder of everything: whether a file lies below it without being hidden, as `~/meshes/arm.stl` does."""

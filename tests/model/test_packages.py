@@ -112,6 +112,21 @@ def test_a_link_that_leaves_the_tree_is_refused_unless_allowed(tree: Path) -> No
     assert Packages(description, allow_outside=True).resolve("package://arm/meshes/link.stl").name == "secret.txt"
 
 
+@pytest.mark.parametrize("target", ["gone.stl", "link.stl"])
+def test_a_link_that_leads_to_no_file_is_called_one(tree: Path, target: str) -> None:
+    (tree / "arm" / "meshes" / "link.stl").symlink_to(target)
+    with pytest.raises(NotFound, match=r"'\.\./meshes/link.stl' is a link that leads to no file") as refused:
+        Packages(tree / "arm" / "urdf" / "arm.urdf").resolve("../meshes/link.stl")
+    assert refused.value.hint is None
+
+
+@pytest.mark.parametrize("uri", ["package:///a.stl", "package://", "package://../a.stl", "package://%2e%2e/a.stl"])
+def test_what_cannot_be_a_package_is_not_looked_for(tree: Path, uri: str) -> None:
+    with pytest.raises(NotFound, match="cannot be the name of a package") as refused:
+        Packages(tree / "arm" / "urdf" / "arm.urdf").resolve(uri)
+    assert "package://NAME/path" in (refused.value.hint or "")
+
+
 def test_a_pipe_is_refused_at_once(tree: Path) -> None:
     os.mkfifo(tree / "arm" / "meshes" / "pipe.stl")
     with pytest.raises(NotFound, match="regular file"):
