@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.hand import with_mimics
 
 FIRST: Final = 0.25
 """Of a joint's range: the first steps."""

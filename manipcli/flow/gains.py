@@ -36,9 +36,9 @@ from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.flow.switches import active_in
 from manipcli.flow.weak import Held, weak
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.posture import posture, with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims
-from manipcli.plan.hand import with_mimics
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 
@@ -99,12 +99,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
 
 def named_postures(robot: RobotModel, start: Array) -> Array:
     """(T, n): the start, and every named pose with the other joints as at the start."""
-    rows = [start]
-    for pose in robot.poses:
-        q = np.array(start)
-        q[robot.indices(pose.joints)] = pose.positions
-        rows.append(with_mimics(robot, q))
-    return np.array(rows)
+    return np.array([start, *(posture(robot, pose.name, rest=start) for pose in robot.poses)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -260,14 +255,14 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
         return  # of different rates there is no one tick to look at
     p, d, i = (np.array([getattr(loop.gains, key) for loop in loops]) for key in ("p", "d", "i"))
     tightest = np.argsort(-(d / load.own_inertia).max(axis=1))[:TOGETHER]
-    for posture in tightest:
+    for k in tightest:
         latency = np.array(load.latency)
-        whole = Loop(load.mass[posture], p, d, i, load.damping, period, substeps, latency)
+        whole = Loop(load.mass[k], p, d, i, load.damping, period, substeps, latency)
         if is_stable(whole):
             continue
         pole, share = unstable_share(whole)
-        worst = [k for k in np.argsort(-share) if share[k] > 0.1][:3]
-        names = ", ".join(f"{loops[k].joint} (kd {digits(d[k])})" for k in worst)
+        worst = [j for j in np.argsort(-share) if share[j] > 0.1][:3]
+        names = ", ".join(f"{loops[j].joint} (kd {digits(d[j])})" for j in worst)
         message = (
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"

@@ -14,7 +14,8 @@ from manipcli.core.text import digits, told_apart
 from manipcli.core.units import readable
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
-from manipcli.plan.hand import fingers, moved_links, with_mimics
+from manipcli.model.posture import with_mimics
+from manipcli.plan.hand import fingers, moved_links
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation
 from manipcli.spec.controllers import GainsSpec, GripperSpec

@@ -13,9 +13,9 @@ from manipcli.flow.load import load_task
 from manipcli.flow.plan import start_position
 from manipcli.flow.robot_file import read_robot
 from manipcli.model.build_robot import build_robot
+from manipcli.model.posture import posture
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.replay.posture import posture
 from manipcli.spec import load
 from manipcli.spec.robot import RobotSpec
 

@@ -13,8 +13,9 @@ from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.posture import posture
 from manipcli.plan.claims import Claims
-from manipcli.plan.hand import SPEED, closing_speed, with_mimics
+from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
@@ -136,17 +137,7 @@ def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPla
 
 def start_position(task: Task) -> Array:
     """(n) where the robot starts: the task's `start` pose, else `home` if there is one, else zero within the limits."""
-    robot = task.robot
-    names = [pose.name for pose in robot.poses]
-    chosen = task.spec.start or ("home" if "home" in names else None)
-    q = np.zeros(len(robot.joint_names))
-    for k, joint in enumerate(robot.moving_joints):
-        lower, upper = joint.limits.lower, joint.limits.upper
-        q[k] = min(max(0.0, -np.inf if lower is None else lower), np.inf if upper is None else upper)
-    if chosen is not None:
-        pose = robot.pose(chosen)
-        q[robot.indices(pose.joints)] = pose.positions
-    return with_mimics(robot, q)
+    return posture(task.robot, task.spec.start)
 
 
 def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[str], None]) -> Iterator[PlannedStep]:

@@ -9,9 +9,9 @@ import numpy as np
 from manipcli.core.errors import Finding
 from manipcli.model.collision import CollisionChecker
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.posture import posture
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
-from manipcli.plan.hand import with_mimics
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 
@@ -23,13 +23,9 @@ def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Fi
     """
     nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
     query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()
-    rest = np.zeros(len(robot.joint_names))
-    for pose in (pose for pose in robot.poses if pose.name == "home"):
-        rest[robot.indices(pose.joints)] = pose.positions
+    rest = posture(robot)
     for pose in robot.poses:
-        q = rest.copy()
-        q[robot.indices(pose.joints)] = pose.positions
-        for hit in query.every(with_mimics(robot, q)):
+        for hit in query.every(posture(robot, pose.name, rest=rest)):
             a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
             yield Finding(
                 code="ROBOT340",

@@ -20,7 +20,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
 from manipcli.flow.plan import plan_step
 from manipcli.model.collision import Carried
-from manipcli.model.robot import RobotModel
+from manipcli.model.posture import position_limits
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.simulate.session import Session
@@ -136,8 +136,7 @@ class Measured:
             columns = robot.indices(controller.joints)
             near = np.abs(output.position - measured[columns]) <= self._limits.joints
             position[columns] = np.where(near, output.position, measured[columns])
-        lower, upper = _bounds(robot)
-        return frozen(np.clip(position, lower, upper))
+        return frozen(np.clip(position, *position_limits(robot.moving_joints)))
 
     def _joints(self, planned: Situation, now: Situation) -> Iterator[str]:
         """The joint that is furthest off. Fingers of a closed hand are where the object lets them be."""
@@ -206,14 +205,6 @@ def after(planned: StepPlan, before: Situation, *, done: int) -> Situation:
         elif motion.grip is not None and (closed or carried is not None):
             closed, carried = False, None
     return replace(before, carried=carried, closed=closed)
-
-
-def _bounds(robot: RobotModel) -> tuple[Array, Array]:
-    """(n) the least and the greatest position [rad or m] of each joint, infinite where it has no limit."""
-    limits = [joint.limits for joint in robot.moving_joints]
-    lower = np.array([-math.inf if limit.lower is None else limit.lower for limit in limits])
-    upper = np.array([math.inf if limit.upper is None else limit.upper for limit in limits])
-    return lower, upper
 
 
 def _between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, float]:

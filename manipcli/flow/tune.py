@@ -20,8 +20,8 @@ from manipcli.flow.gains import named_postures
 from manipcli.flow.robot_file import read_robot
 from manipcli.flow.simulated_steps import simulated_answers
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.posture import posture, with_mimics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.hand import with_mimics
 from manipcli.spec import load
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 from manipcli.spec.controllers_file import ControllersSpec
@@ -87,7 +87,7 @@ def tune(
             raise InvalidInput([Finding("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
     found = tuple(one for one in everything if not joints or one.joint in joints)
     if simulated:
-        found = simulated_answers(robot, file.spec, everything, [one.joint for one in found], wish, tuner.start())
+        found = simulated_answers(robot, file.spec, everything, [one.joint for one in found], wish, posture(robot))
     return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
 
 
@@ -258,31 +258,19 @@ class _Tuner:
 
     def _postures(self) -> Postures:
         """The named ones, and some from the whole range of the joints."""
-        start = self.start()
+        start = posture(self._robot)
         rng = np.random.default_rng(0)
         spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
         return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
 
     def _range(self) -> tuple[Array, Array]:
         """(n), (n) the least and the greatest of the joints."""
-        start = self.start()
+        start = posture(self._robot)
         low, high = start - WIDE, start + WIDE
         for k, joint in enumerate(self._robot.moving_joints):
             low[k] = low[k] if joint.limits.lower is None else joint.limits.lower
             high[k] = high[k] if joint.limits.upper is None else joint.limits.upper
         return low, high
-
-    def start(self) -> Array:
-        """`home`, if there is such a pose; other joints at zero, or as near to it as their limits let them."""
-        robot = self._robot
-        q = np.zeros(len(robot.joint_names))
-        for k, joint in enumerate(robot.moving_joints):
-            low, high = joint.limits.lower, joint.limits.upper
-            q[k] = min(max(0.0, -np.inf if low is None else low), np.inf if high is None else high)
-        for pose in robot.poses:
-            if pose.name == "home":
-                q[robot.indices(pose.joints)] = pose.positions
-        return with_mimics(robot, q)
 
 
 def _inertia(k: int, load: Load) -> Array:

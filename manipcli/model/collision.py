@@ -132,11 +132,9 @@ class CollisionChecker:
 
     def _touching_at_zero(self) -> set[frozenset[str]]:
         """Links that touch with every joint at zero (or at its limit nearest to zero): so made, so allowed."""
-        limits = [joint.limits for joint in self._kinematics.robot.moving_joints]
-        lower = [-np.inf if limit.lower is None else limit.lower for limit in limits]
-        upper = [np.inf if limit.upper is None else limit.upper for limit in limits]
+        moving = self._kinematics.robot.moving_joints
         zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, 0.0)
-        return {frozenset((hit.a, hit.b)) for hit in zero.every(np.clip(np.zeros(len(limits)), lower, upper))}
+        return {frozenset((hit.a, hit.b)) for hit in zero.every([joint.limits.nearest(0.0) for joint in moving])}
 
 
 class CollisionQuery:

@@ -1,35 +1,35 @@
-"""Joint vectors to look at: named poses, the zero pose, and mimic joints that follow."""
+"""Postures: where all joints stand. Named poses, zero, and mimic joints that follow."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen
-from manipcli.model.robot import JointLimits, RobotModel
+from manipcli.model.robot import Joint, RobotModel
 
 
-def within(limits: JointLimits, value: float) -> float:
-    """The nearest value inside the limits."""
-    if limits.lower is not None:
-        value = max(value, limits.lower)
-    return min(value, limits.upper) if limits.upper is not None else value
+def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
+    """(n,) the lower and (n,) the upper limit of each joint [rad or m], infinite where it has none."""
+    ranges = [joint.limits.range for joint in joints]
+    return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
 
 
-def following(robot: RobotModel, q: npt.ArrayLike) -> Array:
+def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
     """(..., n) the same with every mimic joint where its leader puts it: multiplier * q_leader + offset."""
     position = np.array(q, dtype=np.float64)
-    index = {name: k for k, name in enumerate(robot.joint_names)}
     for k, joint in enumerate(robot.moving_joints):
         if joint.mimic is not None:
-            leader = position[..., index[joint.mimic.joint]]
+            leader = position[..., robot.joint_names.index(joint.mimic.joint)]
             position[..., k] = joint.mimic.multiplier * leader + joint.mimic.offset
     return frozen(position)
 
 
 def zero_posture(robot: RobotModel) -> Array:
     """(n,) every independent joint at zero, or at the limit nearest to it."""
-    return following(robot, [within(joint.limits, 0.0) for joint in robot.moving_joints])
+    return with_mimics(robot, [joint.limits.nearest(0.0) for joint in robot.moving_joints])
 
 
 def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
@@ -46,4 +46,4 @@ def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = 
     if pose is not None:
         named = robot.pose(pose)
         q[robot.indices(named.joints)] = named.positions
-    return following(robot, q)
+    return with_mimics(robot, q)

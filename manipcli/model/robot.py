@@ -5,6 +5,7 @@ Frames: L link, J joint (coincides with its child link), P parent link, B robot 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -106,6 +107,16 @@ class JointLimits:
     acceleration: float | None = None
     jerk: float | None = None
     soft: SoftLimits | None = None
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """`lower` and `upper`, infinite where there is none."""
+        return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
+
+    def nearest(self, position: float) -> float:
+        """The position within the limits that is nearest to this one."""
+        lower, upper = self.range
+        return min(max(position, lower), upper)
 
 
 @dataclass(frozen=True, slots=True)

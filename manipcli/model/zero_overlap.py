@@ -83,9 +83,7 @@ def _at_zero(joint: Joint) -> Transform:
     """How far the joint has moved, (joint frame to child): not at all, but where zero is outside of its limits."""
     if not joint.independent:
         return Transform.identity()
-    lower, upper = joint.limits.lower, joint.limits.upper
-    q = max(0.0, lower) if lower is not None else 0.0
-    q = min(q, upper) if upper is not None else q
+    q = joint.limits.nearest(0.0)
     if q == 0.0:
         return Transform.identity()
     if joint.type == "prismatic":

@@ -9,6 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
+from manipcli.model.posture import position_limits
 from manipcli.model.robot import RobotModel
 
 
@@ -54,10 +55,11 @@ class MotionLimits:
                         hint=f"state it in the robot file: limits: {{{name}: {{{word}: ...}}}}",
                     )
                 into.append(value)
+        lower, upper = position_limits(robot.joint(name) for name in joints)
         return MotionLimits(
             names=tuple(joints),
-            lower=frozen([-np.inf if limit.lower is None else limit.lower for limit in limits]),
-            upper=frozen([np.inf if limit.upper is None else limit.upper for limit in limits]),
+            lower=lower,
+            upper=upper,
             velocity=frozen(np.array(velocity) * velocity_scale),
             acceleration=frozen(np.array(acceleration) * acceleration_scale),
             jerk=frozen([np.inf if limit.jerk is None else limit.jerk * acceleration_scale for limit in limits]),

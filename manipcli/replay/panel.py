@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array
+from manipcli.model.posture import posture, with_mimics, zero_posture
 from manipcli.model.robot import Joint, RobotModel
 from manipcli.replay.placing import Placing
-from manipcli.replay.posture import following, posture, within, zero_posture
 from manipcli.replay.stage import Stage
 
 if TYPE_CHECKING:
@@ -134,8 +134,8 @@ class JointPanel:
             q = np.array(self._q)
             if not math.isfinite(value) or value == q[k]:
                 return
-            q[k] = within(self._robot.moving_joints[k].limits, value)
-            self._place(following(self._robot, q))
+            q[k] = self._robot.moving_joints[k].limits.nearest(value)
+            self._place(with_mimics(self._robot, q))
 
     def _move(self, q: Array) -> None:
         with self._lock:

@@ -15,12 +15,12 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.model.posture import posture
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw
 from manipcli.replay.image import Image, sky, write_png
 from manipcli.replay.placing import Placing, Poses
-from manipcli.replay.posture import posture
 from manipcli.replay.surface import Surface, surface
 
 SIZE = (960, 720)

@@ -13,11 +13,11 @@ import numpy as np
 
 from manipcli.core.geometry import Array, rotate
 from manipcli.judge.verdict import Verdict
+from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
 from manipcli.replay.placing import Placing, Poses
-from manipcli.replay.posture import following
 
 RATE = 50.0
 """[Hz] at which a run is shown unless somebody asks for another."""
@@ -161,7 +161,7 @@ class Playback:
     def reference_position(self) -> Array:
         """(T, n) where the joints should be: what no controller moves stands as measured, mimic joints follow."""
         assert self.robot is not None
-        return following(self.robot, np.where(np.isnan(self.reference), self.stance, self.reference))
+        return with_mimics(self.robot, np.where(np.isnan(self.reference), self.stance, self.reference))
 
     def reference_poses(self) -> Poses:
         """Where the robot should be, and the bodies as they are: the frames of `draw(robot, scene)` at every time."""

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.look import Sight, load_sight
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.posture import posture, with_mimics, zero_posture
 from manipcli.model.robot import Box, Inertial, Mesh
 from manipcli.replay.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
 from manipcli.replay.placing import Placing
-from manipcli.replay.posture import following, posture, zero_posture
 
 ROOT = Path(__file__).parents[2]
 
@@ -76,7 +76,7 @@ def test_colours_come_from_the_description_then_the_mesh_then_are_plain(two: Sig
 def test_frames_are_where_kinematics_puts_the_links(pour: Sight) -> None:
     robot = pour.robot
     rng = np.random.default_rng(1)
-    q = np.array([following(robot, rng.uniform(-1.0, 1.0, len(robot.joint_names))) for _ in range(3)])
+    q = np.array([with_mimics(robot, rng.uniform(-1.0, 1.0, len(robot.joint_names))) for _ in range(3)])
     poses = Placing(robot).at(q, np.zeros((3, 0, 3)), np.zeros((3, 0, 4)))
     kinematics = Kinematics(robot)
     for instant in range(3):
@@ -101,13 +101,13 @@ def test_bodies_are_where_the_scene_starts_or_the_state_says(pour: Sight) -> Non
 
 def test_a_mimic_joint_follows_with_its_multiplier_and_offset(two: Sight) -> None:
     robot = two.robot
-    assert dict(zip(robot.joint_names, following(robot, [0.05, 9.0]), strict=True)) == {
+    assert dict(zip(robot.joint_names, with_mimics(robot, [0.05, 9.0]), strict=True)) == {
         "drive": 0.05,
         "mimic": pytest.approx(-2 * 0.05 + 0.5),
     }
     # Zero lies outside of the limits: the nearest position inside, and the follower with it.
     assert zero_posture(robot) == pytest.approx([0.01, 0.48])
-    placed = Placing(robot).start(following(robot, [0.1, 0.0]))
+    placed = Placing(robot).start(with_mimics(robot, [0.1, 0.0]))
     assert placed.position[draw(robot).frames.index("robot/follower")] == pytest.approx([0.3, 0.0, 0.0])
 
 
