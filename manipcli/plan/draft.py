@@ -12,7 +12,8 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried
-from manipcli.plan.hand import closed_on, pressing, ramp, with_mimics
+from manipcli.model.posture import with_mimics
+from manipcli.plan.hand import closed_on, pressing, ramp
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path

@@ -8,6 +8,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.collision import CollisionQuery
+from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 
 STEPS = 40
@@ -44,16 +45,6 @@ def moved_links(robot: RobotModel, joints: Sequence[str]) -> frozenset[str]:
     """The links below `joints` and below those that mimic them."""
     driven = set(joints) | {joint.name for joint in robot.joints if joint.mimic and joint.mimic.joint in joints}
     return frozenset().union(*(robot.descendants(robot.joint(name).child) for name in driven))
-
-
-def with_mimics(robot: RobotModel, q: Array) -> Array:
-    """`q` (..., n) with every mimic joint where its driver has it: multiplier * q_driver + offset."""
-    result = np.array(q, dtype=np.float64)
-    for k, joint in enumerate(robot.moving_joints):
-        if joint.mimic is not None:
-            driver = result[..., robot.joint_names.index(joint.mimic.joint)]
-            result[..., k] = joint.mimic.multiplier * driver + joint.mimic.offset
-    return frozen(result)
 
 
 def ramp(here: Array, target: Array, way: Array) -> Array:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.posture import position_limits
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
@@ -96,10 +97,8 @@ class InverseKinematics:
         self._X_LT = Transform.identity() if X_LT is None else X_LT
         self._free_axis = None if free_axis is None else frozen(free_axis)
         self._columns = np.array(self.columns, dtype=np.intp)
-        limits = [robot.joint(name).limits for name in self.joints]
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
-        self._lower = np.array([-np.inf if limit.lower is None else limit.lower for limit in limits])
-        self._upper = np.array([np.inf if limit.upper is None else limit.upper for limit in limits])
+        self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
 
     def drawn_in(self, margin: Array) -> InverseKinematics:
         """The same within narrower limits: each joint's drawn in by its `margin` (m) [rad or m]."""

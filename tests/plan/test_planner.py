@@ -12,9 +12,10 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform, frozen
+from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.draft import Draft
-from manipcli.plan.hand import fingers, moved_links, ramp, with_mimics
+from manipcli.plan.hand import fingers, moved_links, ramp
 from manipcli.plan.planner import CLEARANCE, TOUCHING, Planner
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
