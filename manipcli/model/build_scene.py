@@ -202,9 +202,12 @@ class _Builder:
             hint = "`pose: {xyz: [x, y, z]}`, or `rests_on: BODY` with `at: [x, y]`, or `inside: CONTAINER`"
             self._error("TASK224", f"body '{name}' {found}", (*loc, words[-1]) if words else loc, hint)
             return None
-        if (spec.at is not None) != (spec.rests_on is not None):
-            message = "needs `at: [x, y]` beside `rests_on`" if spec.at is None else "has `at` without `rests_on`"
-            self._error("TASK224", f"body '{name}' {message}", (*loc, "rests_on" if spec.at is None else "at"))
+        if spec.at is None and spec.rests_on is not None:
+            self._error("TASK224", f"body '{name}' needs `at: [x, y]` beside `rests_on`", (*loc, "rests_on"))
+            return None
+        if spec.at is not None and spec.pose is not None:
+            hint = "say it in the pose: `xyz: [x, y, z]`"
+            self._error("TASK224", f"body '{name}' has `pose` and `at`", (*loc, "at"), hint)
             return None
         if spec.pose is not None:
             if spec.yaw != 0.0:
@@ -252,7 +255,7 @@ class _Builder:
         return X_WO
 
     def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """On the floor of the other's hollow, in its middle, axes along the container's (turned by yaw)."""
+        """On the floor of the other's hollow, in its middle or `at` a place, axes along the other's (turned by yaw)."""
         loc: Loc = ("scene", name, "inside")
         interior, shape = self.shapes[other].interior, self.shapes[name]
         if interior is None:
@@ -267,9 +270,16 @@ class _Builder:
         if lack > 0.0:
             self._error("TASK224", f"'{name}' is {lack * 1e3:.1f} mm too wide for the inside of '{other}'", loc)
             return None
+        X_WS = X_WB @ interior.X_OS
+        x, y, _ = (0.0, 0.0, 0.0) if spec.at is None else X_WS.inverse().apply([*spec.at, 0.0])
+        lack = _too_big(shape, spec.yaw, interior, x, y)
+        if lack > 0.0:
+            hint = f"the middle of '{other}' is at [{X_WS.p[0]:g}, {X_WS.p[1]:g}] m"
+            message = f"'{name}' would stand {lack * 1e3:.1f} mm outside of the hollow of '{other}'"
+            self._error("TASK224", message, ("scene", name, "at"), hint)
+            return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-        X_SO = Transform.of(xyz=(0.0, 0.0, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
-        return X_WB @ interior.X_OS @ X_SO
+        return X_WS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
 
     # -- frames
 
@@ -325,13 +335,13 @@ def _bottom(shape: BodyShape) -> float:
     return float(shape.centre[2] - shape.size[2] / 2.0)
 
 
-def _too_big(shape: BodyShape, yaw: float, interior: Interior) -> float:
-    """By how much [m] the outline of the shape, turned by yaw, is wider than the hollow on one side; <= 0: it fits."""
+def _too_big(shape: BodyShape, yaw: float, interior: Interior, x: float = 0.0, y: float = 0.0) -> float:
+    """By how much [m] the outline of the shape at (x, y) [m], turned by yaw, leaves the hollow; <= 0: it fits."""
     half: Array = shape.size[:2] / 2.0
     if isinstance(interior.shape, Cylinder):
         outline = shape.radius if shape.radius is not None else float(np.hypot(*half))
-        return outline - interior.shape.radius
+        return outline + float(np.hypot(x, y)) - interior.shape.radius
     if shape.radius is None:
         c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
         half = np.array([c * half[0] + s * half[1], s * half[0] + c * half[1]])
-    return float(np.max(half - np.array(interior.shape.size[:2]) / 2.0))
+    return float(np.max(half + np.abs([x, y]) - np.array(interior.shape.size[:2]) / 2.0))

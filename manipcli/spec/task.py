@@ -114,7 +114,8 @@ class UrdfSpec(Model):
 class BodySpec(Model):
     """One thing in the scene: exactly one shape key, one way to place it, and how it behaves in contact.
 
-    Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`.
+    Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
+    its middle or `at: [x, y]`.
     """
 
     box: BoxSpec | None = Field(None, description="Shape: a solid box.")
@@ -126,7 +127,9 @@ class BodySpec(Model):
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
     pose: PoseSpec | None = Field(None, description="Where its frame starts, in the world.")
     rests_on: str | None = Field(None, description="The body that it stands on, which is not tilted; `at` says where.")
-    at: tuple[Length, Length] | None = Field(None, description="x, y in the world [m], with `rests_on`.")
+    at: tuple[Length, Length] | None = Field(
+        None, description="x, y in the world [m]: needed with `rests_on`, and with `inside` where not in its middle."
+    )
     yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
     fixed: bool = Field(False, description="Never moves. Default false.")

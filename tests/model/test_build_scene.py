@@ -98,6 +98,28 @@ def test_what_is_inside_a_turned_tray_lies_on_its_floor() -> None:
     np.testing.assert_allclose(scene.body("box").X_WO.R, Transform.of(rpy=(0, 0, 0.75)).R, atol=1e-12)
 
 
+def test_several_lie_inside_where_the_world_says() -> None:
+    cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
+    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [1, 2, 3], "rpy": [0, 0, 0.5]}, "mass": 1}
+    balls = {f"ball_{k}": BALL | {"inside": "cup", "at": [0.75 + x, 0.0]} for k, x in enumerate((-0.016, 0.016))}
+    scene = built({"desk": DESK, "cup": cup, "tray": tray, "box": CUBE | {"inside": "tray", "at": [1.04, 2.0]}} | balls)
+    np.testing.assert_allclose(scene.body("ball_1").X_WO.p, [0.766, 0.0, 0.4 + 0.004 + 0.014], atol=1e-12)
+    np.testing.assert_allclose(scene.body("box").X_WO.p, [1.04, 2.0, 3 + 0.01 + 0.05], atol=1e-12)
+    np.testing.assert_allclose(scene.body("box").X_WO.R, Transform.of(rpy=(0, 0, 0.5)).R, atol=1e-12)
+
+
+def test_what_would_reach_through_the_wall_is_refused_with_the_excess() -> None:
+    """A hollow of 32 mm about [0.75, 0], a ball of 14 mm: 18 mm off its middle is the most, and in a tray 90 mm."""
+    cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
+    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.75, 0.023]}})
+    assert found.message == "'ball' would stand 5.0 mm outside of the hollow of 'cup'"
+    assert found.hint == "the middle of 'cup' is at [0.75, 0] m"
+    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "rests_on": "floor", "at": [0, 0], "mass": 1}
+    assert built({"tray": tray, "box": CUBE | {"inside": "tray", "at": [-0.0899, 0.0399]}})
+    found = only({"tray": tray, "box": CUBE | {"inside": "tray", "at": [-0.05, 0.047]}})
+    assert "7.0 mm outside of the hollow of 'tray'" in found.message
+
+
 @pytest.mark.parametrize("rpy", [[np.pi, 0, 0], [0, np.pi / 2, 0], [0.1, 0, 0]])
 def test_nothing_is_put_inside_or_on_what_is_tilted(rpy: list[float]) -> None:
     cup = CUP | {"pose": {"xyz": [0, 0, 1], "rpy": rpy}}
@@ -170,7 +192,7 @@ def test_a_finding_carries_its_place() -> None:
         ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "inside": "x"}}, "TASK224", "placed twice"),
         ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "yaw": 1.0}}, "TASK224", "`pose` and `yaw`"),
         ({"x": CUBE | {"rests_on": "floor"}}, "TASK224", "needs `at"),
-        ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "at": [0, 0]}}, "TASK224", "`at` without"),
+        ({"x": CUBE | {"pose": {"xyz": [0, 0, 1]}, "at": [0, 0]}}, "TASK224", "`pose` and `at`"),
         ({"desk": DESK, "x": CUBE | {"rests_on": "desk", "at": [0.5, 0]}}, "TASK224", "beside 'desk'"),
         ({"desk": DESK, "x": BALL | {"inside": "desk"}}, "TASK224", "no inside"),
         ({"x": CUBE | {"rests_on": "x", "at": [0, 0]}}, "TASK225", "x -> x"),
