@@ -27,7 +27,8 @@ def check(
     """Check files: all findings, nothing simulated.
 
     The kind (task, robot, controllers) is read from each file. A task with controllers on efforts is planned, and their
-    gains are looked at over the plan; a step that cannot be planned is an error.
+    gains are looked at over the plan; a step that cannot be planned is an error. A controllers file alone names no
+    robot: its joints and gains are compared with one where a task names both.
     """
     from manipcli import pipeline
     from manipcli.report import json, text
@@ -39,4 +40,7 @@ def check(
     if any(finding.code in UNREADABLE for finding in findings):
         return ExitCode.USAGE
     failed = any(finding.severity == "error" for finding in findings)
+    kinds = () if failed else [pipeline.kind_of(file) for file in files]
+    if "controllers" in kinds and "task" not in kinds:
+        console.talk("joints and gains of controllers were compared with no robot: check a task that names both")
     return ExitCode.FAILED if failed else ExitCode.PASSED

@@ -227,6 +227,7 @@ def test_check_fails_on_errors_only(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], severity: str, code: int
 ) -> None:
     pipeline.check_files = lambda _, **__: (Finding("TASK1", "x", severity=severity),)
+    pipeline.kind_of = lambda path: None
     assert main(["check", "a.yaml", "b.yaml"]) == code
     assert "2 files checked" in capsys.readouterr().out
     assert main(["check", "a.yaml", "--format", "json"]) == code
