@@ -160,8 +160,10 @@ class CollisionQuery:
             self._geometry.addGeometryObject(
                 pin.GeometryObject(f"{part.name}#{k}", part.joint, part.placement, part.shape)
             )
+        carried = [k for k, part in enumerate(parts) if part.role == "carried"]
         for i, a in enumerate(parts):
-            for j in range(i + 1, len(parts)):
+            # Bodies of the scene never meet each other here: of many, the pairs are not even looked at.
+            for j in [k for k in carried if k > i] if a.role == "scene" else range(i + 1, len(parts)):
                 b = parts[j]
                 if only is not None and only not in (a.name, b.name):
                     continue

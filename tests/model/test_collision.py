@@ -154,6 +154,17 @@ def test_a_body_carried_by_the_base_is_checked_against_the_scene() -> None:
     assert hit.distance == pytest.approx(-0.02, abs=1e-6)
 
 
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_carried_body_meets_those_before_and_after_it_in_the_file(place: int) -> None:
+    can = body("can", Sphere(RADIUS), (9.0, 9.0, 0.0), fixed=False)
+    bodies = [body("left", Sphere(RADIUS), (3.0, 0.15, 0.0)), body("right", Sphere(RADIUS), (3.0, -0.15, 0.0))]
+    bodies.insert(place, can)
+    checker = CollisionChecker(Kinematics(robot()), scene(*bodies))
+    held = Carried("can", "c", Transform.of(xyz=(ROD, 0.0, 0.0)))
+    query = checker.at(carried=held, ignore=pairs(["c"], "left", "right"))
+    assert [(hit.a, hit.b) for hit in query.every(np.zeros(3))] == [("can", "left"), ("can", "right")]
+
+
 def test_a_trajectory_is_stopped_at_the_first_touch() -> None:
     """The last joint sweeps from 0 to pi in a second; the ball of the tip first meets a post at 90 degrees."""
     checker = CollisionChecker(Kinematics(robot()), scene(body("post", Sphere(0.2), (2.0, 1.0, 0.0))))
