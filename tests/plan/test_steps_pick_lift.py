@@ -83,6 +83,17 @@ def test_a_pick_from_above_comes_down_on_the_block(bench: Make) -> None:
     assert 0.015 < fingers[0] <= 0.021
 
 
+def test_what_cannot_be_taken_from_the_side_is_taken_from_above_unless_the_side_was_asked_for(bench: Make) -> None:
+    """Between a low block and the table there is no room for the Panda's broad hand."""
+    panda = bench("panda")
+    refusal = panda.refused("pick", {"object": "block", "approach": {"from": "side"}})
+    assert "table" in refusal.cause
+    before = panda.now
+    plan = panda.do("pick", {"object": "block"})
+    X = panda.tools(before, plan, "approach")
+    np.testing.assert_allclose(X[:, :3, 2], np.broadcast_to([0.0, 0.0, -1.0], (40, 3)), atol=1e-3)
+
+
 def test_a_given_yaw_is_the_direction_of_approach(bench: Make) -> None:
     arm = bench()
     before = arm.now
@@ -152,10 +163,10 @@ def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
     scene = "\n  post: {box: {size: [0.1, 0.1, 0.4]}, pose: {xyz: [1.2, 0.4, 0.2]}, fixed: true}\n"
     scene += "  can: {cylinder: {radius: 3 cm, height: 10 cm}, mass: 0.1, rests_on: post, at: [1.2, 0.4]}\n"
     refusal = bench(scene=scene).refused("pick", {"object": "can", "grasp": {"posture": "wrap"}})
-    assert "no way to pick 'can', 90 ways tried: approach: no joint positions reach (1.200, 0.400, 0.450) m, 1.3" in (
+    assert "no way to pick 'can', 126 ways tried: approach: no joint positions reach (1.200, 0.400, 0.450) m, 1.3" in (
         refusal.cause
     )
-    assert "(90 of 90)" in refusal.cause
+    assert "(126 of 126)" in refusal.cause
     assert refusal.hint.startswith("move 'can', or say from where and how high it is taken")
 
 

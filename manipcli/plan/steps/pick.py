@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from pydantic import Field
@@ -43,10 +43,18 @@ _AIM = (
 )
 
 
+Direction = Literal["side", "top"]
+
+
 class ApproachSpec(Model):
     """From where the hand comes."""
 
-    from_: Literal["side", "top"] = Field("side", alias="from", description="Horizontally, or from straight above.")
+    from_: Direction | None = Field(
+        None,
+        alias="from",
+        description="`side`: horizontally, `top`: from straight above. Default: from the side where that can be, else "
+        "from the top.",
+    )
     yaw: Angle | None = Field(
         None, description="Direction of the approach about the vertical [rad]; default: away from the robot's base."
     )
@@ -102,9 +110,11 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
             out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
         refusal = out_of_reach[k]
         if refusal is not None:
-            other = "top" if spec.approach.from_ == "side" else "side"
-            move, turn = f"move '{spec.object}', or {_OTHERWISE}", f"{_AIM}; or say `approach: {{from: {other}}}`"
-            raise NotPlannable(refusal.cause, hint=turn if refusal.hint == NOT_SO else move)
+            hint = f"move '{spec.object}', or {_OTHERWISE}"
+            if refusal.hint == NOT_SO:
+                others = [word for word in get_args(Direction) if spec.approach.from_ not in (None, word)]
+                hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
+            raise NotPlannable(refusal.cause, hint=hint)
         draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
         draft.straight("approach", X_WG, speed=spec.speed / 2)
         draft.close(
@@ -152,7 +162,7 @@ def slopes() -> tuple[float, ...]:
 def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[Array]:
     """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z)."""
     found = []
-    if spec.from_ == "side":
+    if spec.from_ != "top":
         away = X_WO.p - X_WB.p
         nominal = math.atan2(away[1], away[0]) if spec.yaw is None else spec.yaw
         turns = YAWS_DEG if spec.yaw is None else (0.0,)
@@ -161,7 +171,7 @@ def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[
             z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
             x = np.array([0.0, 0.0, -1.0])
             found += [_frame(x, z), _frame(-x, z)]
-    else:
+    if spec.from_ != "side":
         nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
         for turn in (0.0, 90.0, 180.0, -90.0) if spec.yaw is None else (0.0, 180.0):
             yaw = nominal + math.radians(turn)
