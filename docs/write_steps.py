@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from inspect import cleandoc, getdoc
 from pathlib import Path
 from textwrap import dedent
@@ -21,11 +21,50 @@ from manipcli.core.units import readable
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import STEPS
 from manipcli.spec.base import Model, about
-from manipcli.spec.condition import ConditionSpec
+from manipcli.spec.baseline import BaselineSpec
+from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
+from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
+from manipcli.spec.other_controllers import PidGainsSpec
 from manipcli.spec.quantity import Unit
-from manipcli.spec.task import StepSpec
+from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.robot import (
+    ActuatorSpec,
+    AttachSpec,
+    GroupSpec,
+    LimitsSpec,
+    PoseSpec,
+    ToolSpec,
+    TransmissionSpec,
+)
+from manipcli.spec.task import BodySpec, FrameSpec, RecordSpec, SimulationSpec, StepSpec
+from manipcli.spec.vary import DistributionSpec, VarySpec
 
 PAGE = Path(__file__).with_name("steps.md")
+ELSEWHERE: dict[type, str] = {
+    ConditionSpec: "a [condition](conditions.md)",
+    ExpectationSpec: "[conditions](conditions.md)",
+    WatchSpec: "[conditions](conditions.md)",
+    StepSpec: "[steps](steps.md)",
+    SimulationSpec: "a [mapping](task.md#simulation)",
+    BodySpec: "[bodies](task.md#scene)",
+    FrameSpec: "[frames](task.md#frames)",
+    PoseSpec: "a [pose](task.md#poses)",
+    RecordSpec: "a [mapping](task.md#record)",
+    ReplanSpec: "a [mapping](task.md#replan)",
+    VarySpec: "[distributions](task.md#vary)",
+    DistributionSpec: "one of the first four",
+    BaselineSpec: "a [mapping](task.md#baseline)",
+    GroupSpec: "[groups](robot.md#groups)",
+    ToolSpec: "a [mapping](robot.md#tool)",
+    LimitsSpec: "[limits](robot.md#limits)",
+    TransmissionSpec: "[transmissions](robot.md#transmissions-and-actuators)",
+    ActuatorSpec: "[actuators](robot.md#transmissions-and-actuators)",
+    AttachSpec: "[mappings](robot.md#attach)",
+    GainsSpec: "[gains](controllers.md#gains)",
+    PidGainsSpec: "[gains](controllers.md#gains), and the fields below",
+    ConstraintsSpec: "a [mapping](controllers.md#constraints)",
+}
+"""Blocks that are told in one place, and what stands for them everywhere else."""
 INTRODUCTION = """\
 # Steps
 
@@ -55,7 +94,7 @@ whole task is planned, step after step, before anything moves.
 
 def page() -> str:
     """The whole text."""
-    parts = [INTRODUCTION + "\n".join(_table(StepSpec)), "## The steps\n\n" + _contents()]
+    parts = [INTRODUCTION + table(StepSpec), "## The steps\n\n" + _contents()]
     parts += [part for one in STEPS for part in _section(one)]
     return "\n\n".join(parts)
 
@@ -74,15 +113,18 @@ def _section(one: StepMember[Any]) -> Iterator[str]:
     yield f"### {one.name}"
     yield getdoc(one.spec) or ""
     yield f"```yaml\n{example(one)}\n```"
-    yield "\n".join(_table(one.spec))
+    yield table(one.spec)
 
 
-def _table(spec: type[BaseModel]) -> list[str]:
-    return ["| field | type | default | meaning |", "|---|---|---|---|", *_rows(spec)]
+def table(spec: type[BaseModel], *, beside: type[BaseModel] | None = None) -> str:
+    """The fields of a block and of the blocks in it; without those that `beside`, which it is made of, has already."""
+    known = {} if beside is None else beside.model_fields
+    fields = {key: field for key, field in spec.model_fields.items() if key not in known}
+    return "\n".join(["| field | type | default | meaning |", "|---|---|---|---|", *_rows(fields)])
 
 
-def _rows(spec: type[BaseModel], before: str = "") -> Iterator[str]:
-    for key, field in spec.model_fields.items():
+def _rows(fields: Mapping[str, FieldInfo], before: str = "") -> Iterator[str]:
+    for key, field in fields.items():
         if field.annotation is NoneType:
             continue
         name = f"{before}{field.alias or key}"
@@ -93,7 +135,7 @@ def _rows(spec: type[BaseModel], before: str = "") -> Iterator[str]:
             meaning = meaning.partition(" Default ")[0]
         yield f"| `{name}` | {_type(kind)} | {default} | {meaning} |"
         for block, within in _blocks(kind):
-            yield from _rows(block, f"{name}{within}.")
+            yield from _rows(block.model_fields, f"{name}{within}.")
 
 
 def _parts(kind: object) -> tuple[object, ...]:
@@ -102,11 +144,12 @@ def _parts(kind: object) -> tuple[object, ...]:
 
 
 def _blocks(kind: object, within: str = "") -> Iterator[tuple[type[BaseModel], str]]:
-    """The mappings with keys of their own in a type; conditions have a page of their own."""
-    if isinstance(kind, type) and issubclass(kind, Model) and kind is not ConditionSpec:
+    """The mappings with keys of their own in a type, but those that are told elsewhere."""
+    if isinstance(kind, type) and issubclass(kind, Model) and kind not in ELSEWHERE:
         yield kind, within
+    inside = {tuple: "[]", dict: ".NAME"}.get(get_origin(kind), within)
     for part in _parts(kind):
-        yield from _blocks(part, "[]" if get_origin(kind) is tuple else within)
+        yield from _blocks(part, inside)
 
 
 def _unit(kind: object) -> str:
@@ -117,7 +160,7 @@ def _unit(kind: object) -> str:
 
 
 def _default(value: object, unit: str) -> str:
-    if isinstance(value, str | bool):
+    if isinstance(value, str | bool) and value != "":
         return f"`{str(value).lower() if isinstance(value, bool) else value}`"
     if isinstance(value, tuple) and value:
         return f"`[{', '.join(_default(one, unit).strip('`') for one in value)}]`"
@@ -130,7 +173,6 @@ _WORDS = {
     int: "whole number",
     float: "number",
     Any: "anything",
-    ConditionSpec: "a [condition](conditions.md)",
 }
 
 
@@ -151,7 +193,7 @@ def _type(kind: object) -> str:
         return f"mapping of: {_type(parts[1])}"
     if origin is tuple:
         return f"list of: {_type(parts[0])}" if Ellipsis in parts else f"[{', '.join(map(_type, parts))}]"
-    return _WORDS.get(kind, "mapping")
+    return ELSEWHERE.get(kind) or _WORDS.get(kind, "mapping")
 
 
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}

@@ -19,7 +19,7 @@ class ControllerSpec(Model):
 
     role: ClassVar[Role] = "other"
 
-    type: str
+    type: str = Field(description="By what law it moves them: one of the types.")
     joints: tuple[str, ...] = Field((), description="The joints that it claims or reads.")
     active: bool = Field(True, description="Whether it is active at the start. Default true.")
     update_rate: Annotated[Frequency, Field(gt=0)] | None = Field(

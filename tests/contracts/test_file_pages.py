@@ -1,0 +1,72 @@
+"""The pages about the three files are those of the models, and what they show loads."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from manipcli.flow.vocabulary import task_spec
+from manipcli.spec.controllers import ControllerSpec
+from manipcli.spec.controllers_file import AnyController
+from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.task import TaskSpec
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = ("task.md", "robot.md", "controllers.md")
+HEAD = "task: t\nrobot: r\ncontrollers: c\nsteps: [wait: 1 s]\n"
+
+
+def text(page: str) -> str:
+    return (DOCS / page).read_text(encoding="utf-8")
+
+
+def examples(page: str) -> list[str]:
+    return re.findall(r"```yaml\n(.*?)```", text(page), re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_its_tables_are_those_of_the_models(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    renewed = runpy.run_path(str(DOCS / "write_tables.py"))["renewed"]
+    assert renewed(text(page)) == text(page), "run docs/write_tables.py"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_leads_to_a_heading(page: str) -> None:
+    for target, anchor in re.findall(r"\]\(([\w.]*\.md)?(?:#([\w-]+))?\)", text(page)):
+        headings = re.findall(r"^#+ (.*)$", text(target or page), re.MULTILINE)
+        assert not anchor or anchor in {heading.lower().replace(" ", "-") for heading in headings}, (target, anchor)
+
+
+def test_every_type_of_controllers_has_a_section() -> None:
+    specs: tuple[type[ControllerSpec], ...] = AnyController.__origin__.__args__  # type: ignore[attr-defined]
+    for spec in specs:
+        (word,) = spec.model_fields["type"].annotation.__args__  # type: ignore[union-attr]
+        section = text("controllers.md").partition(f"\n## {word}\n")[2].partition("\n## ")[0]
+        assert f"<!-- fields of {spec.__name__} beside ControllerSpec -->" in section
+
+
+def test_every_word_of_the_task_file_is_told() -> None:
+    assert [key for key in TaskSpec.model_fields if f"| `{key}` |" not in text("task.md")] == []
+
+
+@pytest.mark.parametrize("example", examples("task.md"), ids=lambda e: e.split(":")[0])
+def test_examples_of_the_task_file_load(example: str) -> None:
+    whole = example if example.startswith("task:") else HEAD + example
+    spec: BaseModel = load_task_text(whole, "t.yaml", model=task_spec()).spec
+    assert spec.model_fields_set > {"task"}
+
+
+@pytest.mark.parametrize("example", examples("robot.md"), ids=lambda e: e.split(":")[0])
+def test_examples_of_the_robot_file_load(example: str) -> None:
+    whole = example if example.startswith("robot:") else "robot: r\ndescription: r.urdf\n" + example
+    assert load_robot_text(whole, "r.yaml").spec.model_fields_set > {"robot", "description"}
+
+
+@pytest.mark.parametrize("example", examples("controllers.md"), ids=lambda e: e.split("type: ")[1].split()[0])
+def test_examples_of_the_controllers_file_load(example: str) -> None:
+    assert load_controllers_text(example, "c.yaml").spec.controllers
