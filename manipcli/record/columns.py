@@ -250,6 +250,11 @@ def singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
         yield ns, CdrReader(view[start : start + length])
 
 
+def sequences(data: bytes, places: Places) -> Int:
+    """The sequence number of each message."""
+    return _every(data, "<u4")[places.starts - PAYLOAD + 11].astype(np.int64)
+
+
 def joint_state_layout(reader: CdrReader) -> Layout:
     """sensor_msgs/JointState: position, velocity, effort."""
     reader.header()

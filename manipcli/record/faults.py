@@ -67,7 +67,7 @@ class BadRecording(InvalidInput):
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
 
 
-LEFT_OUT = "another program left out messages of joints, bodies or controllers"
+LEFT_OUT = "another program left out messages of joints, bodies, controllers or contacts"
 
 
 class Thinned(BadRecording):

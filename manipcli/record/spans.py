@@ -22,6 +22,7 @@ from manipcli.record.columns import (
     controller_state_layout,
     indexed,
     joint_state_layout,
+    sequences,
     singly,
     walked,
 )
@@ -100,7 +101,8 @@ class FileSpans:
 
 
 class _Apart(Exception):
-    """Joints, bodies and controllers were not recorded at the same times, or not as often as the log says."""
+    """Joints, bodies and controllers were not recorded at the same times, or not as often as the log says; or contacts
+    are missing among others."""
 
 
 class _SpanReader:
@@ -130,6 +132,7 @@ class _SpanReader:
         self._contacts: list[ContactSnapshot] = []
         self._gaps = gaps
         self._last = -1
+        self._number = 0
 
     @property
     def ready(self) -> int:
@@ -151,7 +154,15 @@ class _SpanReader:
                 if len(common.times):
                     self._columns[topic].add(data, common)
             elif topic == topics.CONTACTS:
+                self._follow(sequences(data, found))
                 self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
+
+    def _follow(self, numbers: Int) -> None:
+        """Contacts hold until the next ones, so that nothing but their numbers tells that some are missing; those that
+        another program wrote again may all be 0."""
+        if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=self._number) == 1):
+            raise _Apart
+        self._number = int(numbers[-1])
 
     def _common(self, places: Places) -> Places:
         """The messages of the ticks at which every topic has one."""

@@ -22,7 +22,7 @@ from manipcli.core.errors import ExitCode
 from manipcli.model.state import WorldState
 from manipcli.record import recorder as recorder_module
 from manipcli.record.differences import body_velocities
-from manipcli.record.faults import BadRecording
+from manipcli.record.faults import BadRecording, Thinned
 from manipcli.record.reading import open_recording, read_recording
 from manipcli.record.recording import Recording
 
@@ -564,3 +564,32 @@ def test_a_run_killed_before_its_first_tick_has_no_states(tmp_path: Path, make_r
     assert recording.states.body_quat_xyzw.shape == (0, 2, 4)
     assert recording.lost == "it was not finished"
     recorder.close_partial()
+
+
+@pytest.mark.parametrize("gone", [{1}, {2}, {2, 3}])
+def test_contacts_that_another_program_left_out_are_missed(
+    make_run: MakeRun, rewrite_log: Any, tmp_path: Path, gone: set[int]
+) -> None:
+    """They hold until the next. `gone`: the numbers of those that are left out, as `mcap filter` keeps numbers."""
+    log, thinned = make_run(450).write(tmp_path / "run.mcap"), tmp_path / "thinned.mcap"
+
+    def kept(topic: str, message: Message) -> bytes | None:
+        return None if topic == "/contacts" and message.sequence in gone else message.data
+
+    assert len(read_recording(rewrite_log(log, thinned)).contacts) == 5
+    rewrite_log(log, thinned, message=kept)
+    with pytest.raises(Thinned, match="contacts"):
+        read_recording(thinned)
+
+
+def test_contacts_of_a_program_that_numbers_nothing_are_read(
+    make_run: MakeRun, rewrite_log: Any, tmp_path: Path
+) -> None:
+    log, again = make_run(450).write(tmp_path / "run.mcap"), tmp_path / "again.mcap"
+
+    def unnumbered(_: str, message: Message) -> bytes:
+        message.sequence = 0
+        return message.data
+
+    rewrite_log(log, again, message=unnumbered)
+    assert_same(read_recording(again), read_recording(log))
