@@ -103,10 +103,10 @@ def player_page(playback: Playback) -> str:
         "<style>\nbody { margin: 0; padding: 12px 16px; background: #fff; color: #1d2733;"
         ' font: 14px/1.4 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }\n'
         "header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 2px 16px; margin-bottom: 10px; }\n"
-        "h1 { font-size: 20px; margin: 0; } p { margin: 0; } .good { color: #1a7f4b; } .bad { color: #c4342d; }\n"
-        ".note { color: #687686; }\n"
+        "h1 { font-size: 20px; } h1, header p { margin: 0; overflow-wrap: anywhere; }\n"
+        "header .good { color: #1a7f4b; } header .bad { color: #c4342d; } .note { color: #687686; }\n"
         "@media (min-width: 761px) { body { height: 100vh; box-sizing: border-box; display: flex;"
-        " flex-direction: column; } body > .mc-player { flex: 1; height: auto; min-height: 0; } }\n"
+        " flex-direction: column; } body > .mc-player { flex: 1; height: auto; min-height: 420px; } }\n"
         f"</style></head><body>\n<header><h1>{name}</h1>{''.join(said)}</header>\n"
         f"{player_html(playback, whole_page=True)}</body></html>\n"
     )

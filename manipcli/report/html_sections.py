@@ -28,6 +28,10 @@ SHORT_HASH = 16
 """Digits of a hash that are shown; all of them are in the page."""
 
 
+ALSO = 3
+"""Causes beside the first that are shown at once; the others are folded, and told below."""
+
+
 def head(page: RunPage) -> Markup:
     """The task, the verdict, and the run in a few numbers."""
     verdict = page.verdict
@@ -84,7 +88,10 @@ def causes(page: RunPage) -> Markup | None:
         )
         shown.append(element("div", *lines, class_="cause"))
     cut = str(page.verdict.cuts)
-    also = element("div", element("p", "Also:", class_="about"), *shown[1:], class_="also") if shown[1:] else None
+    rest = shown[1 + ALSO :] if page.facts is not None else []  # of an invalid file nothing else tells them
+    folded = element("details", element("summary", f"{len(rest)} more"), *rest) if rest else None
+    others = (*shown[1 : len(shown) - len(rest)], folded)
+    also = element("div", element("p", "Also:", class_="about"), *others, class_="also") if shown[1:] else None
     told_cut = element("p", f"In this run: {cut}.", class_="about") if cut else None
     first = [element("div", shown[0], also, told_cut)]
     if page.moment is not None:

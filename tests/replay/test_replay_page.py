@@ -8,6 +8,7 @@ import re
 import shutil
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -147,6 +148,11 @@ def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_p
     _press(browser, *space)
     assert not browser.evaluate(f"{player}.playing")
 
+    for key, code, number, then in (("End", "End", 35, playback.end), ("Home", "Home", 36, playback.start)):
+        browser.evaluate("document.activeElement.blur()")
+        _press(browser, key, code, number)
+        assert browser.evaluate(f"{player}.time") == pytest.approx(then, abs=1e-6)
+
     for name in ("loop", "show-path"):
         box = f"document.querySelector('[data-part={name}]')"
         before = browser.evaluate(f"{box}.focus(), {box}.checked")
@@ -168,6 +174,25 @@ def test_the_page_of_its_own_takes_keys(browser: Page, playback: Playback, tmp_p
     ends = [browser.evaluate(f"Number({track}.getAttribute('aria-value{name}'))") for name in ("min", "max")]
     assert ends == pytest.approx([playback.start, playback.end], abs=0.005)
     browser.wait_for(f"{track}.getAttribute('aria-valuetext').startsWith('0.10 s')")
+    assert browser.complaints == []
+
+
+@pytest.mark.slow
+def test_long_names_leave_the_page_as_wide_as_it_is(browser: Page, playback: Playback, tmp_path: Path) -> None:
+    """Nothing is cut or scrolls sideways; of every step its time is seen, and all of the legend."""
+    long = "a_name_that_goes_on_and_on_until_nobody_wants_to_read_it_any_more_and_then_some"
+    steps = tuple(replace(step, label=f"{long}_{step.label}") for step in playback.steps)
+    path = tmp_path / "run.html"
+    path.write_text(player_page(replace(playback, name=long, steps=steps, lost=long)), "utf-8")
+    for width in (360, 800, 1280):
+        browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=800, deviceScaleFactor=1, mobile=False)
+        browser.open(path.as_uri())
+        browser.wait_for("!!document.querySelector('.mc-player')?.player")
+        assert browser.evaluate("document.documentElement.scrollWidth <= window.innerWidth") is True, width
+        wide = "[...document.querySelectorAll('.steps, .caption, .view')].every(e => e.scrollWidth <= e.clientWidth)"
+        assert browser.evaluate(wide) is True, width
+        high = "(e => e.scrollHeight <= e.clientHeight)(document.querySelector('.side'))"
+        assert browser.evaluate(high) is True, width
     assert browser.complaints == []
 
 

@@ -144,6 +144,17 @@ def test_the_cause_comes_first_and_the_verdict_before_it() -> None:
     assert words.index("82 mm") < words.index("−16.0 mm") < words.index("Tracking and limits")
 
 
+def test_many_causes_are_folded_where_the_page_tells_them_again() -> None:
+    causes = tuple(Cause(f"expectation 'e{k}' fails", "") for k in range(12))
+    folds = [
+        [attributes for tag, attributes in _Page(render_page(page)).found if tag == "details"]
+        for page in (replace(_page(), causes=causes[:4]), replace(_page(), causes=causes))
+    ]
+    assert len(folds[1]) == len(folds[0]) + 1
+    assert " 8 more " in _Page(render_page(replace(_page(), causes=causes))).words
+    assert " more " not in _Page(render_page(replace(_page(), causes=causes, facts=None))).words
+
+
 def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
     page = replace(_page(), causes=(Cause("expectation 'near' fails by 2 mm", "", 1.5),))
     cut = replace(page, verdict=replace(page.verdict, cuts=Cuts({"b": 7}, {}, 150)))

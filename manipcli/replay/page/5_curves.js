@@ -70,7 +70,8 @@ function drawPlot() {
   pen.textAlign = "center";
   for (let t = Math.ceil(begin / dx) * dx; t <= end; t += dx) {
     pen.beginPath(); pen.moveTo(X(t), upper); pen.lineTo(X(t), lower); pen.stroke();
-    pen.fillText(+t.toFixed(6) + " s", X(t), high - 5);
+    const text = +t.toFixed(6) + " s";
+    pen.fillText(text, Math.min(X(t), wide - pen.measureText(text).width / 2), high - 5);
   }
   pen.save();
   pen.beginPath(); pen.rect(left, 0, right - left, high); pen.clip();

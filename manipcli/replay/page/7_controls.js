@@ -34,7 +34,7 @@ function build() {
     button.dataset.step = k;
     button.title = piece.title;
     element(button, "span", "mark" + (good(step) ? "" : " bad"), good(step) ? "✓" : "✗");
-    element(button, "span", "", step.label);
+    element(button, "span", "label", step.label);
     element(button, "span", "phase", step.phases.map((one) => one.name).join(" · "));
     element(button, "span", "when", `${step.start.toFixed(2)} s`);
     button.addEventListener("click", (event) => {
@@ -77,8 +77,8 @@ function build() {
     if (kind === "SELECT" || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === " " && kind !== "BUTTON" && kind !== "INPUT") play(!playing);
     else if (way) seek(time + way * (event.shiftKey ? 1 : 0.1));
-    else if (slider && event.key === "Home") seek(run.start);
-    else if (slider && event.key === "End") seek(run.end);
+    else if (event.key === "Home") seek(run.start);
+    else if (event.key === "End") seek(run.end);
     else return;
     event.preventDefault();
   });
