@@ -17,17 +17,19 @@ Curve = Callable[[Array], tuple[Array, Array, Array]]
 
 LONGEST = 600.0
 """[s] of one motion. A longer one comes of a limit that is mistyped, and a trajectory has a point a control tick."""
-_ROUNDS = 6  # each stretches by what the samples exceed; 2 suffice, the rest is for jerk across kinks
+_ROUNDS = 12  # each stretches by what the samples exceed; 2 suffice, the rest is for narrow bends and kinks
 
 
 def excess(velocities: Array, accelerations: Array, limits: MotionLimits, *, period: float) -> float:
     """By which factor time must be stretched so that the samples (k, n) keep the limits; 1 or less if they do.
 
     Stretching time by f divides velocity by f, acceleration by f^2, jerk by f^3, hence
-    f = max(|v|/v_max, sqrt(|a|/a_max), cbrt(|da/dt|/j_max)).
+    f = max(|v|/v_max, sqrt(|a|/a_max), cbrt(|da/dt|/j_max)), with the accelerations of the samples and those between.
     """
     factor = float(np.max(np.abs(velocities) / limits.velocity))
-    factor = max(factor, math.sqrt(float(np.max(np.abs(accelerations) / limits.acceleration))))
+    between = np.diff(velocities, axis=0) / period
+    for each in (accelerations, between):
+        factor = max(factor, math.sqrt(float(np.max(np.abs(each) / limits.acceleration))))
     if np.isfinite(limits.jerk).any():
         jerk = np.abs(np.diff(accelerations, axis=0)) / period
         factor = max(factor, float(np.cbrt(np.max(jerk / limits.jerk))))

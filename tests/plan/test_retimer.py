@@ -127,3 +127,11 @@ def test_matplotlib_is_not_imported_for_it_and_stays_importable(after: str) -> N
         f"{after}\n"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize(("limit", "period"), [((1.0, 10.0, np.inf), 1e-3), ((2.0, 10.0, 1000.0), 2e-3)])
+def test_a_path_that_turns_back_on_itself_keeps_its_limits(limit: tuple[float, ...], period: float) -> None:
+    """One joint over the top of a sine: a bend so narrow that it lies between two ticks."""
+    points = np.sin(np.linspace(1.0, 3.0, 80))[:, None]
+    within = MotionLimits(("a",), np.full(1, -9.0), np.full(1, 9.0), *(np.array([each]) for each in limit))
+    verify(retime(joint_path(("a",), points), within, period=period), within)
