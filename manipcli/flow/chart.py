@@ -11,7 +11,6 @@ from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import did_you_mean, listed, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
 from manipcli.judge.steps import step_outcomes
-from manipcli.model.located_xml import parse_document
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
 from manipcli.record.definition import Array, Message, UnknownDefinition, read_definition
@@ -22,7 +21,7 @@ from manipcli.record.reading import open_recording
 from manipcli.record.schemas import CONTROLLER_STATE, JOINT_STATE
 from manipcli.record.series import Series, Wanted, read_series
 from manipcli.record.topics import Topic, Topics, open_topics
-from manipcli.record.units import JointUnits, unit_of
+from manipcli.record.units import JointUnits, joint_units, unit_of
 from manipcli.replay.curves import Chart, Curve, Interval, Panel
 
 MAX_CURVES = 400
@@ -253,19 +252,6 @@ class _Log:
 
     def _refused(self, code: str, message: str, hint: str | None = None) -> InvalidInput:
         return InvalidInput([Finding(code, message, Place(str(self.path), 0, 0), hint)])
-
-
-def joint_units(urdf: bytes) -> Mapping[str, str]:
-    """Unit of the position of each joint of a description; of none where it is no description."""
-    try:
-        joints = parse_document(urdf, "robot_description").getElementsByTagName("joint") if urdf else []
-    except InvalidInput:
-        return {}
-    units = {"prismatic": "m", "revolute": "rad", "continuous": "rad"}
-    # Those inside a <transmission> have no type.
-    return {
-        one.getAttribute("name"): units[one.getAttribute("type")] for one in joints if one.getAttribute("type") in units
-    }
 
 
 def _steps(path: Path) -> tuple[Interval, ...]:

@@ -83,7 +83,7 @@ def too_weak(
     robot: RobotModel, joint: str, place: Place, *, weight: float, needed: float, limit: float
 ) -> Finding | None:
     """Too little effort for gravity or for the plan, all three in N m or N; None where there is enough."""
-    unit = "N" if robot.joint(joint).type == "prismatic" else "N m"
+    unit = robot.joint(joint).effort_unit
     if weight > limit:
         takes, most = told_apart(weight, limit, form=".3g")
         message = f"{joint}: holding against gravity takes up to {takes} {unit}, its limit is {most} {unit}"

@@ -183,7 +183,7 @@ def _doubts(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -
             substeps=loop.ticks * substeps,
             delay=math.ceil(load.latency[k] / loop.ticks),
         )
-        unit = _inertia_unit(task.robot, loop.joint)
+        unit = task.robot.joint(loop.joint).inertia_unit
         finding = _unstable(loop.joint, one, f"inertia {least:.2g} {unit}, the least over the {where}")
         if finding is None:
             slow = Loop.of_joint(most, p=gains.p, d=gains.d, damping=float(load.damping[k]), period=one.period)
@@ -269,7 +269,3 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
         )
         yield Doubt("", Finding("CTRL154", message, loops[worst[0]].place, "lower their kd", "warning"))
         return
-
-
-def _inertia_unit(robot: RobotModel, joint: str) -> str:
-    return "kg" if robot.joint(joint).type == "prismatic" else "kg m2"

@@ -37,7 +37,7 @@ def too_swift(task: Task) -> Iterator[Finding]:
         limits = {joint: task.robot.joint(joint).limits.velocity for joint in spec.joints}
         limit, joint = min((limit or math.inf, joint) for joint, limit in limits.items())
         if spec.speed > limit:
-            unit = "m/s" if task.robot.joint(joint).type == "prismatic" else "rad/s"
+            unit = f"{task.robot.joint(joint).unit}/s"
             swift, most = told_apart(spec.speed, limit, form=".3g")
             message = f"{joint}: its references move at {swift} {unit}, its velocity limit is {most} {unit}"
             place = task.controllers_file.place("controllers", name, "speed")

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform
 from manipcli.flow.log import URDF
-from manipcli.model.located_xml import element_of, parse_document
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
@@ -21,11 +20,11 @@ from manipcli.record.messages import WORLD
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Span, TaskEvent
 from manipcli.record.snapshot import snapshot
+from manipcli.record.units import joint_units
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 
 _ROUNDING = 0.5e-9
 """[s] Recorded times are whole nanoseconds."""
-_UNITS = {"revolute": "rad", "continuous": "rad", "prismatic": "m"}
 
 
 def moment(path: Path, time: float) -> Moment:
@@ -60,7 +59,7 @@ def _ours(path: Path, time: float) -> Moment:
         row = int(np.searchsorted(trace.times, now + _ROUNDING, side="right")) - 1
         if row >= 0:
             references |= dict(zip(trace.joints, trace.reference_position[row].tolist(), strict=True))
-    units = _units(recording.attachments.get(URDF, b""))
+    units = joint_units(recording.attachments.get(URDF, b""))
     joints = tuple(
         JointMoment(
             name,
@@ -137,7 +136,9 @@ def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
     taken = snapshot(path, found, start + time)
     missing = [f"there is no {topic}" for topic in taken.lacks]
     missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
-    units = {before + name: unit for before, urdf in taken.urdf.items() for name, unit in _units(urdf.encode()).items()}
+    units = {
+        before + name: unit for before, urdf in taken.urdf.items() for name, unit in joint_units(urdf.encode()).items()
+    }
     newest = [sample.time for sample in taken.joints.values()] + [sample.time for sample in taken.frames.values()]
     return Moment(
         log=str(path),
@@ -163,18 +164,3 @@ def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
 def _pose(position: npt.ArrayLike, quat_xyzw: npt.ArrayLike) -> Transform:
     """Others write quaternions of zeros."""
     return Transform.of(xyz=position, quat_xyzw=quat_xyzw if np.any(quat_xyzw) else None)
-
-
-def _units(urdf: bytes) -> dict[str, str]:
-    """The unit of each joint's position, by the types in a description; empty where it cannot be read."""
-    if not urdf:
-        return {}
-    try:
-        document = parse_document(urdf, "robot.urdf")
-    except InvalidInput:
-        return {}
-    if document.documentElement is None:
-        return {}
-    joints = element_of(document.documentElement).all("joint")
-    kinds = {joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in joints}
-    return {name: _UNITS[kind] for name, kind in kinds.items() if kind in _UNITS}

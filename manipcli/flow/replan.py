@@ -150,7 +150,7 @@ class Measured:
             if len(off) and off.max() > most:
                 k = int(np.argmax(off))
                 here, there = now.position[columns][k], planned.position[columns][k]
-                unit = "m" if robot.joint(names[k]).type == "prismatic" else "rad"
+                unit = robot.joint(names[k]).unit
                 yield f"joint '{names[k]}' is at {round(here, 4):g} {unit} and not at {round(there, 4) + 0.0:g} {unit}"
 
     def _held(self, planned: Situation, now: Situation) -> Iterator[str]:

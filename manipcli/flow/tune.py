@@ -211,7 +211,7 @@ class _Tuner:
             if one.limited_by not in ("control step", "other joints"):
                 continue
             if one.frequency < HOPELESS * self._wish.bandwidth:
-                unit = "kg" if self._robot.joint(one.joint).type == "prismatic" else "kg m2"
+                unit = self._robot.joint(one.joint).inertia_unit
                 message = (
                     f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
                     f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "

@@ -19,7 +19,7 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import too_weak
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import Joint, RobotModel
 from manipcli.spec.controllers import GainsSpec
 
 SAG: Final = {"rad": 0.1, "m": 0.02}
@@ -61,27 +61,28 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) ->
         yield Doubt(loop.joint, finding)
     if loop.weightless or weight <= WEIGHTLESS:
         return
-    units = ("m", "N") if robot.joint(loop.joint).type == "prismatic" else ("rad", "N m")
-    told = _cut(loop, gravity, units) or _sags(loop, np.clip(gravity, -limit, limit), units)
+    joint = robot.joint(loop.joint)
+    told = _cut(loop, gravity, joint) or _sags(loop, np.clip(gravity, -limit, limit), joint)
     if told is not None:
         code, message, hint = told
         yield Doubt(loop.joint, Finding(code, f"{loop.joint}: {message}", loop.place, hint, "warning"))
 
 
-def _cut(loop: Held, gravity: Array, units: tuple[str, str]) -> tuple[str, str, str] | None:
+def _cut(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | None:
     """A clamp of the command that lets less through than what holds (T) against gravity."""
     least, most = loop.gains.u_clamp_min, loop.gains.u_clamp_max
     for key, bound, sign in (("u_clamp_max", most, 1.0), ("u_clamp_min", least, -1.0)):
         takes = float((sign * gravity).max())
         if bound is not None and takes > sign * bound + WEIGHTLESS:
-            message = f"holding against gravity takes up to {sign * takes:.3g} {units[1]}, its {key} is {digits(bound)}"
+            needed = f"{sign * takes:.3g} {joint.effort_unit}"
+            message = f"holding against gravity takes up to {needed}, its {key} is {digits(bound)}"
             return "CTRL159", message, f"it will sink; {CARRY}, or another clamp does"
     return None
 
 
-def _sags(loop: Held, gravity: Array, units: tuple[str, str]) -> tuple[str, str, str] | None:
+def _sags(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | None:
     """By how much it gives way under what holds (T) against gravity; until an integral carries that, or for good."""
-    length, unit = units
+    length, unit = joint.unit, joint.effort_unit
     gains = loop.gains
     kp, ki = f"kp {digits(gains.p)}", f"ki {digits(gains.i)}"
     weight = float(np.abs(gravity).max())

@@ -152,6 +152,21 @@ class Joint:
         """Moves and follows no other joint: what a controller may command."""
         return self.moves and self.mimic is None
 
+    @property
+    def unit(self) -> Literal["rad", "m"]:
+        """Of its position."""
+        return "m" if self.type == "prismatic" else "rad"
+
+    @property
+    def effort_unit(self) -> Literal["N m", "N"]:
+        """Of its effort."""
+        return "N" if self.type == "prismatic" else "N m"
+
+    @property
+    def inertia_unit(self) -> Literal["kg m2", "kg"]:
+        """Of what resists its acceleration."""
+        return "kg" if self.type == "prismatic" else "kg m2"
+
 
 @dataclass(frozen=True, slots=True)
 class Group:

@@ -1,9 +1,11 @@
-"""The unit of a number in a ROS message, by where it stands (REP 103: SI, and angles in rad)."""
+"""The unit of a number in a ROS message, by where it stands (REP 103: SI, and angles in rad), and of joints."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from manipcli.core.errors import InvalidInput
+from manipcli.model.located_xml import parse_document
 from manipcli.record.fields import Way
 
 JointUnits = Mapping[str, str]
@@ -54,3 +56,16 @@ def unit_of(way: Way, label: str, joints: JointUnits) -> str:
     if way.is_time:
         return "s"
     return _BY_NAME.get(holder, {}).get(last, "")
+
+
+def joint_units(urdf: bytes) -> JointUnits:
+    """Unit of the position of each joint of a description; of none where it is no description."""
+    try:
+        joints = parse_document(urdf, "robot_description").getElementsByTagName("joint") if urdf else []
+    except InvalidInput:
+        return {}
+    units = {"prismatic": "m", "revolute": "rad", "continuous": "rad"}
+    # Those inside a <transmission> have no type.
+    return {
+        one.getAttribute("name"): units[one.getAttribute("type")] for one in joints if one.getAttribute("type") in units
+    }

@@ -147,11 +147,10 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
         for meter in meters:
             meter.add(span, bodies)
     cuts = Cuts.from_metadata(recording.metadata, end=end, period=recording.period)
-    units = ["m" if joint.type == "prismatic" else "rad" for joint in robot.moving_joints]
     found = tuple(
         JointFacts(
             name,
-            units[k],
+            robot.moving_joints[k].unit,
             errors.largest(k),
             errors.rms(k),
             *limits.used(k),

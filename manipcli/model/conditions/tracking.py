@@ -32,7 +32,7 @@ def gauge(spec: TrackingSpec, world: World) -> Gauge:
     joints = robot.group(spec.group).joints
     columns = robot.indices(joints)
     endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
-    unit_of = ["m" if robot.joint(name).type == "prismatic" else "rad" for name in joints]
+    unit_of = [robot.joint(name).unit for name in joints]
     units = tuple(sorted(set(unit_of)))
 
     def look(moments: Moments) -> Reading:
