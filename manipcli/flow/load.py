@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-
-import numpy as np
+from typing import Final
 
 from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.core.geometry import Transform, frozen
 from manipcli.flow.changed_files import Files, out_of_range
 from manipcli.flow.gathered import Gathered
 from manipcli.flow.robot_file import gather_robot
+from manipcli.flow.stand_ins import named_robot, named_scene
 from manipcli.flow.switches import foreseen
 from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
@@ -27,8 +26,8 @@ from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.joint_units import misread_units
 from manipcli.model.packages import Packages
-from manipcli.model.robot import Box, RobotModel
-from manipcli.model.scene import Body, Frame, Interior, Scene
+from manipcli.model.robot import RobotModel
+from manipcli.model.scene import Scene
 from manipcli.model.scene_names import misnamed
 from manipcli.plan import retimer
 from manipcli.plan.claims import Claims, no_hand
@@ -44,6 +43,8 @@ from manipcli.spec.salvage import intended_ids
 from manipcli.spec.task import TaskSpec
 
 Loc = tuple[str | int, ...]
+SHARED: Final = ("TASK220", "TASK227")
+"""A body or a frame, and a link of the robot, of one name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +151,9 @@ def load_task(
         found = unusable(read, commanding, built[0], scene or named_scene(read.spec))
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
+    else:
+        found = tuple(_unusable(read, named_robot(read.spec), scene or named_scene(read.spec), None))
+        gathered.findings += [finding for finding in found if finding.code not in SHARED]
     if task is not None and robot_file and controllers_file:
         varied, wrong = bind(task, robot_file, controllers_file)
         gathered.findings += (*wrong, *out_of_range(Files(task, robot_file, controllers_file), varied))
@@ -180,22 +184,6 @@ def unusable(
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
     return (*unusable, *_refused(task, robot), *claimed, *misread, *warned)
-
-
-def named_scene(spec: TaskSpec) -> Scene:
-    """The names of a scene that cannot be built: bodies that could be anything, so that only unknown names are told."""
-    one = Box((1.0, 1.0, 1.0))
-    origin = Transform.identity()
-    bodies = tuple(
-        Body(
-            name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
-            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=False, X_WO=origin,
-            interior=Interior(X_OS=origin, shape=one), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
-        )
-        for name in (*(("floor",) if spec.floor else ()), *spec.scene)
-    )  # fmt: skip
-    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
-    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
 
 
 def load_libraries(task: Task) -> None:

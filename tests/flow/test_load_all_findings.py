@@ -1,5 +1,6 @@
 """Every mistake of a task is told at once, each at its own place, and a mistake hides no other."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.flow.load import load_task
 
 ROOT = Path(__file__).parents[2]
+TASKS = sorted([*ROOT.glob("tasks/*.yaml"), *ROOT.glob("examples/*/task.yaml")])
 
 HEAD = f"""\
 task: bad
@@ -269,3 +271,48 @@ def test_a_value_that_a_parameter_says_is_told_with_the_place_of_the_parameter(t
     assert (line, column) == (6, 11)
     assert "a mass" in told
     assert "bad.yaml:4:17" in told  # where `2 kg` stands
+
+
+NO_ROBOT = f"""\
+task: x
+robot: nowhere.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+scene:
+  desk: {{box: {{size: [0.6, 1, 0.4]}}, pose: {{xyz: [0.85, 0, 0.2]}}, fixed: true}}
+  cup: {{cup: {{radius: 36 mm, height: 110 mm}}, mass: 150 g, rests_on: desk, at: [0.75, 0]}}
+steps:
+  - pick: {{object: cupp, grasp: {{posture: any}}}}
+  - move: {{pose: {{xyz: [0, 0, 1]}}, frame: dsk}}
+  - move: {{to: {{any_joint: 0}}}}
+expect:
+  - tracking: {{group: any_group, within: 1 deg}}
+  - collision: [robot/any_link, cu]
+  - step_done: {{step: nowhere}}
+  - at_pose: {{pose: any_pose}}
+"""
+
+
+def test_names_of_the_scene_are_told_where_the_robot_cannot_be_built(tmp_path: Path) -> None:
+    path = tmp_path / "task.yaml"
+    path.write_text(NO_ROBOT)
+    with pytest.raises(InvalidInput) as invalid:
+        load_task(path)
+    told = [(one.code, one.place.line, one.message.rsplit(": ")[-1]) for one in invalid.value.findings if one.place]
+    assert told == [
+        ("TASK231", 2, f"there is no file '{tmp_path / 'nowhere.yaml'}'"),
+        ("TASK230", 8, "'cupp' is not a movable body of the scene"),
+        ("TASK230", 9, "there is no frame 'dsk'"),
+        ("TASK230", 13, "'cu' is neither a body of the scene nor a part of the robot"),
+        ("TASK230", 14, "the task has no step 'nowhere'"),
+    ]
+
+
+@pytest.mark.parametrize("file", TASKS, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_nothing_is_made_up_where_the_robot_cannot_be_built(tmp_path: Path, file: Path) -> None:
+    text = re.sub(r"(?m)^robot: .*$", "robot: nowhere.yaml", file.read_text())
+    text = re.sub(r"(?m)^controllers: ", f"controllers: {file.parent}/", text)
+    path = tmp_path / "task.yaml"
+    path.write_text(text)
+    with pytest.raises(InvalidInput) as invalid:
+        load_task(path)
+    assert [one.code for one in invalid.value.findings] == ["TASK231"]
