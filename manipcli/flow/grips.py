@@ -45,23 +45,34 @@ def too_swift(task: Task) -> Iterator[Finding]:
 
 
 def strained(task: Task, plan: Plan) -> Iterator[Finding]:
-    """Grasps with more force than a finger that slides can press with.
-
-    Fingers that mimic it take their part: the effort is that of all of them, f (1 + sum |multiplier|).
-    """
-    owners = [one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec)]
+    """Grasps with more force than a finger that slides can press with, also once it is as weak as `too_light` asks."""
     for k, step in enumerate(plan.steps):
         grips = [motion.grip for motion in step.plan.motions if motion.grip is not None]
         for force, name in ((grip.force, name) for grip in grips if grip.force is not None for name in grip.joints):
-            joint = task.robot.joint(name)
-            limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
-            mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
-            sides = 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
-            most = min((limit for limit in limits if limit), default=math.inf) / sides
-            if joint.type == "prismatic" and force > most:
+            most = _most(task, name)
+            if _sensible(task, step.plan.end, force) > most:
                 message = f"step '{step.id}': a grasp with {force:.3g} N; {name} presses with {most:.3g} N at most"
                 hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
                 yield Finding("TASK238", message, task.file.place("steps", k), hint, "warning")
+
+
+def _most(task: Task, name: str) -> float:
+    """[N] with which a finger can press whose joint slides; infinite of one that turns.
+
+    Fingers that mimic it take their part: the effort is that of all of them, f (1 + sum |multiplier|).
+    """
+    joint = task.robot.joint(name)
+    if joint.type != "prismatic":
+        return math.inf
+    owners = [one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec)]
+    limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
+    mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
+    return min((limit for limit in limits if limit), default=math.inf) / (1.0 + sum(abs(m.multiplier) for m in mimics))
+
+
+def _sensible(task: Task, end: Situation, force: float) -> float:
+    """[N] of a grasp, once it is as weak as `too_light` asks: what is told of one grasp points one way."""
+    return force if end.carried is None else min(force, LIGHT * task.scene.body(end.carried.body).mass)
 
 
 def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
@@ -88,7 +99,7 @@ def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
     """Grasps with more force than the spring of a finger's gain gives, all the way from the object to the posture.
 
     A finger of one joint, alone or with others that mimic it, gives p |q_posture - q_object| of effort, and by virtual
-    work that over `_closing` of force.
+    work that over `_closing` of force. It is asked for what `too_light` and `strained` leave of the force.
     """
     owners = {
         joint: (name, spec)
@@ -110,11 +121,13 @@ def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
                 gains = spec.gains.get(name, GainsSpec())
                 closing = _closing(plan.planner, end, name, touched)
                 way = abs(float(target) - float(end.position[task.robot.joint_names.index(name)]))
-                if not closing or not way or gains.i or grip.force <= ENOUGH * gains.p * way / closing:
+                asked = min(_sensible(task, end, grip.force), _most(task, name))
+                if not closing or not way or gains.i or asked <= ENOUGH * gains.p * way / closing:
                     continue
                 given = f"kp {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
                 message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; {given}"
-                hint = f"kp {digits(1.2 * grip.force * closing / way)} gives a fifth more than that"
+                than = "that" if asked == grip.force else f"{asked:.3g} N"
+                hint = f"kp {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
                 place = task.controllers_file.place("controllers", controller, "gains", name)
                 yield Finding("CTRL168", message, place, hint, "warning")
 

@@ -104,3 +104,17 @@ def test_an_object_of_next_to_no_mass_beside_the_grip_is_doubted(pick: Path, gra
     assert (found.code, found.severity) == ("TASK239", "warning")
     assert found.message == ("step 'pick_1': 7 N are much for 'block' of 5 g: it may creep in the hand by millimetres")
     assert (found.hint or "").startswith("a force below 3.7 N, or more mass")
+
+
+@pytest.mark.slow
+def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
+    """Of 500 N, 3.7 are left on 5 g, and 50 where two fingers share 100 N; kp is asked for these, and not for 500."""
+    gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
+    asked, limit = "steps.0.pick.grasp.force=500 N", "robot.limits.panda_finger_joint1.effort=100 N"
+    light = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=5 g"]))
+    assert [found.code for found in light] == ["TASK239"]
+    soft = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=1 kg", f"{gain}=500"]))
+    assert {found.code: found.hint for found in soft} == {
+        "TASK238": "lower `force`, or raise what limits it: the joint's effort, or `max_effort`",
+        "CTRL168": "kp 6000 gives a fifth more than 50 N",
+    }
