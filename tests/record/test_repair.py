@@ -327,7 +327,7 @@ def test_whatever_was_done_to_a_log_it_is_refused_or_repaired(small: Path, tmp_p
     data = small.read_bytes()
     rng = np.random.default_rng(11)
     done = 0
-    for _ in range(250):
+    for _ in range(120):
         spoilt = bytearray(data)
         for _ in range(int(rng.choice([1, 2, 5, 20]))):
             at, size = int(rng.integers(len(spoilt))), int(rng.choice([1, 9, 100, 3000]))
@@ -351,7 +351,7 @@ def test_whatever_was_done_to_a_log_it_is_refused_or_repaired(small: Path, tmp_p
             pass
         with contextlib.suppress(BadRecording):
             snapshot(tmp_path / "bad.mcap", inventory(tmp_path / "bad.mcap"), 1.0)
-    assert done > 80
+    assert done > 35
 
 
 def test_the_name_of_a_run_that_was_killed_leads_to_what_it_left(small: Path) -> None:

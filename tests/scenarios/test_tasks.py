@@ -130,9 +130,10 @@ def test_without_physics_the_steps_are_done_and_objects_not_judged(run_cli: Any,
 
 
 @pytest.mark.parametrize(
-    "override",
-    ["scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]", "scene.cup.friction=0.6", "params.tilt=120 deg"],
+    "overrides",
+    [("scene.cup.mass='60 g'", "scene.cup.at=[0.76, -0.015]"), ("scene.cup.friction=0.6", "params.tilt=120 deg")],
 )
-def test_the_pour_can_be_varied_from_the_command_line(run_cli: Any, tmp_path: Path, override: str) -> None:
-    ran = run_cli("run", TASKS / "pour.yaml", "-q", "--set", override, cwd=tmp_path)
+def test_the_pour_can_be_varied_from_the_command_line(run_cli: Any, tmp_path: Path, overrides: tuple[str, ...]) -> None:
+    words = [word for override in overrides for word in ("--set", override)]
+    ran = run_cli("run", TASKS / "pour.yaml", "-q", *words, cwd=tmp_path)
     assert ran.code == 0, ran

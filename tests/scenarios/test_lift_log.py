@@ -1,4 +1,4 @@
-"""The log of the pour, message for message by a reader that is not ours, against what ours makes of it."""
+"""The log of a pick, message for message by a reader that is not ours, against what ours makes of it."""
 
 from __future__ import annotations
 
@@ -22,9 +22,12 @@ Messages = dict[str, list[tuple[int, Any]]]
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("log") / "pour.mcap"
-    assert run_task(ROOT / "tasks" / "pour.yaml", log=path).verdict.verdict == "passed"
-    return path
+    """Of the pour, as far as the cup is lifted: arm and hand have moved, and something is held."""
+    folder = tmp_path_factory.mktemp("log")
+    pour = (ROOT / "tasks" / "pour.yaml").read_text(encoding="utf-8").replace("../", f"{ROOT}/")
+    (folder / "lift.yaml").write_text(f"{pour.partition('  - pour:')[0]}expect: [{{duration: {{below: 60 s}}}}]\n")
+    assert run_task(folder / "lift.yaml", log=folder / "lift.mcap").verdict.verdict == "passed"
+    return folder / "lift.mcap"
 
 
 @pytest.fixture(scope="module")
