@@ -8,7 +8,7 @@ from pathlib import Path
 
 from manipcli.batch.baseline import Key, compared, kept_baseline, measured, read_baseline
 from manipcli.batch.job import Job
-from manipcli.core.errors import Place
+from manipcli.core.errors import Loc, Place
 from manipcli.core.whole_file import write_whole
 from manipcli.flow.replay import open_playback
 from manipcli.flow.report import file_places, log_page, refused_page
@@ -64,7 +64,7 @@ def against_baseline(job: Job, verdict: Verdict) -> tuple[tuple[Trouble, ...], l
         return (), []
     task = load.load_task(job.path, model=task_spec())
     changes = compared(old, measured(verdict, job.log), task.spec.baseline.tolerance)
-    loc: dict[Key, tuple[str | int, ...]] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
+    loc: dict[Key, Loc] = {("steps", step.id): ("steps", k) for k, step in enumerate(verdict.steps)}
     judged = zip(task.spec.judged_at, verdict.expectations, strict=False)
     loc |= {("margins", one.name): key for key, one in judged}
     worse = tuple(

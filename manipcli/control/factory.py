@@ -12,18 +12,18 @@ from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.lifecycle import ticks_between
 from manipcli.control.manager import ControllerManager
 from manipcli.control.pid import Compat
-from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, listed
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import ControllerSpec, Interface
 from manipcli.spec.controllers_file import ControllersSpec
 
-Where = Callable[[tuple[str | int, ...]], Place | None]
+Where = Callable[[Loc], Place | None]
 """The place in the file of a value, by its keys from the top: ("controllers", "arm", "joints", 0)."""
 
 
-def _nowhere(_: tuple[str | int, ...]) -> None:
+def _nowhere(_: Loc) -> None:
     return None
 
 

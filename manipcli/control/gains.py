@@ -9,7 +9,7 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from manipcli.control.pid import AntiWindup, Compat, Pid
-from manipcli.core.errors import InvalidArgument
+from manipcli.core.errors import InvalidArgument, Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
 from manipcli.spec.controllers import GainsSpec, Interface
@@ -85,9 +85,7 @@ def _antiwindup(gains: GainsSpec, compat: Compat | None) -> AntiWindup:
     return "conditional_integration" if compat == "ros1" and gains.antiwindup else gains.antiwindup_strategy
 
 
-def strangers(
-    joints: Sequence[str], given: Collection[str], loc: tuple[str | int, ...], what: str, code: str
-) -> Iterator[Problem]:
+def strangers(joints: Sequence[str], given: Collection[str], loc: Loc, what: str, code: str) -> Iterator[Problem]:
     """Whatever (`what`: gains, tolerances) is given at `loc` to joints that are not of `joints`."""
     without = [joint for joint in joints if joint not in given]  # only one that has none was meant
     for joint in given:

@@ -23,6 +23,10 @@ class ExitCode(IntEnum):
     NOTHING_TO_RUN = 5
 
 
+Loc = tuple[str | int, ...]
+"""Where something stands in what a file holds: keys and numbers of items, from the top."""
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where in a file the user wrote something. Lines and columns count from 1.
@@ -118,7 +122,7 @@ class NotPlannable(ManipcliError):
         step: str | None = None,
         hint: str | None = None,
         place: Place | None = None,
-        loc: tuple[str | int, ...] = (),
+        loc: Loc = (),
     ) -> None:
         self.cause = cause
         self.step = step

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from manipcli.control.factory import controller_findings
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Finding, InvalidInput, Loc
 from manipcli.flow.changed_files import Files, out_of_range
 from manipcli.flow.gathered import Gathered
 from manipcli.flow.robot_file import gather_robot
@@ -42,7 +42,6 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.salvage import intended_ids
 from manipcli.spec.task import TaskSpec
 
-Loc = tuple[str | int, ...]
 SHARED: Final = ("TASK220", "TASK227")
 """A body or a frame, and a link of the robot, of one name."""
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from manipcli import __version__
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
-from manipcli.flow.load import Loc, Task, unusable
+from manipcli.flow.load import Task, unusable
 from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.sample import sampled

@@ -20,7 +20,7 @@ from typing import Final
 
 from pydantic import BaseModel
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
@@ -169,7 +169,7 @@ class _Problem(Exception):
 
     message: str
     hint: str | None = None
-    loc: tuple[str | int, ...] = ()
+    loc: Loc = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +275,7 @@ def _law(
     spec: DistributionSpec, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: tuple[str, ...]
 ) -> Law:
     word = spec.word
-    written: tuple[tuple[Value, tuple[str | int, ...]], ...]
+    written: tuple[tuple[Value, Loc], ...]
     if spec.normal is not None:
         written = ((spec.normal.mean, (*loc, word, "mean")), (spec.normal.sd, (*loc, word, "sd")))
     else:
@@ -289,9 +289,7 @@ def _law(
     return Law(word, rows, together=lists)
 
 
-def _row(
-    value: Value, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: tuple[str | int, ...]
-) -> tuple[float, ...]:
+def _row(value: Value, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: Loc) -> tuple[float, ...]:
     """One amount a component, in SI."""
     if not isinstance(value, tuple):
         return (_si(value, dimensions, loc),) * count
@@ -302,7 +300,7 @@ def _row(
     return tuple(_si(one, dimensions, (*loc, k)) for k, one in enumerate(value))
 
 
-def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: tuple[str | int, ...]) -> float:
+def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: Loc) -> float:
     if not isinstance(amount, str):
         return amount
     try:

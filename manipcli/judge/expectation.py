@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -169,7 +170,7 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
     found = list(problems(spec.condition, setting, seam))
     if spec.quantifier is not None:
         found = [Problem((spec.word, *p.loc), p.message, p.hint, p.code) for p in found]
-    named: list[tuple[tuple[str | int, ...], str]] = []
+    named: list[tuple[Loc, str]] = []
     if spec.at not in (None, END):
         named.append((("at",), spec.at or ""))
     for k, name in enumerate(spec.steps):
@@ -204,7 +205,7 @@ def until_problems(spec: ConditionSpec, step: str | None, setting: Setting, seam
 
 
 def _too_early(
-    spec: ExpectationSpec, named: Sequence[tuple[tuple[str | int, ...], str]], steps: Sequence[str] | None
+    spec: ExpectationSpec, named: Sequence[tuple[Loc, str]], steps: Sequence[str] | None
 ) -> Iterator[Problem]:
     """A step that is to be done while it, or one before it, goes on."""
     if spec.quantifier == "never" or (spec.quantifier == "eventually" and len(named) > 1):

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.model.build_drives import build_actuators, build_transmissions
@@ -31,8 +31,6 @@ from manipcli.model.robot import (
 from manipcli.model.urdf import Parts, read_parts
 from manipcli.spec.located import Source
 from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
-
-Loc = tuple[str | int, ...]
 
 
 class Reporter:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Finding, InvalidInput, Loc
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
@@ -15,7 +15,7 @@ from manipcli.model.mass import union
 from manipcli.model.packages import NotFound
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
 from manipcli.model.scene import Body, Frame, Interior, Scene
-from manipcli.model.scene_names import Loc, Locate, misnamed
+from manipcli.model.scene_names import Locate, misnamed
 from manipcli.model.start_overlap import overlaps
 from manipcli.spec.base import Model
 from manipcli.spec.robot import PoseSpec

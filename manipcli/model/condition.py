@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
+from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading
@@ -90,7 +91,7 @@ class Problem:
     `code`: where the family of problems has codes of its own.
     """
 
-    loc: tuple[str | int, ...]
+    loc: Loc
     message: str
     hint: str | None = None
     code: str = ""
@@ -144,7 +145,7 @@ def effortless(world: World) -> str | None:
     return None if world.physics else "the engine has no physics, so no joint needs any effort"
 
 
-def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable: bool = False) -> tuple[Problem, ...]:
+def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) -> tuple[Problem, ...]:
     """Empty if the scene has a (movable) body of this name."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
@@ -153,7 +154,7 @@ def unknown_body(scene: Scene, name: str, loc: tuple[str | int, ...], *, movable
     return (Problem(loc, f"'{name}' is not {word}", did_you_mean(name, known)),)
 
 
-def unknown_group(robot: RobotModel, name: str | None, loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+def unknown_group(robot: RobotModel, name: str | None, loc: Loc) -> tuple[Problem, ...]:
     """Empty if the robot has a group of this name, or none is named."""
     groups = [group.name for group in robot.groups]
     if name is None or name in groups:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
 from manipcli.model.condition import Condition, Gauge, Problem, Scope, Setting, World
 from manipcli.model.moments import Moments
@@ -54,7 +55,7 @@ def problems(spec: ConditionSpec, setting: Setting, seam: Seams) -> tuple[Proble
     found: list[Problem] = []
     if spec.combines:
         for k, one in enumerate(spec.members):
-            loc: tuple[str | int, ...] = (spec.name,) if spec.name == "not" else (spec.name, k)
+            loc: Loc = (spec.name,) if spec.name == "not" else (spec.name, k)
             found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(one, setting, seam)]
         return tuple(found)
     told = seam[spec.name].check(spec.body, setting)

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Loc
 from manipcli.core.units import describe
 from manipcli.model.robot import Group, Joint
 from manipcli.spec.base import Model
 from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import Held, children, unit_of
 from manipcli.spec.located import Source
-from manipcli.spec.tree import Node, Path, ScalarNode, SequenceNode, child, shown
+from manipcli.spec.tree import Node, ScalarNode, SequenceNode, child, shown
 
 
 def misread_units(spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> Iterator[Finding]:
@@ -35,7 +35,7 @@ class _Reading:
         self._joints = {joint.name: joint for joint in joints if joint.moves}
         self._groups = {group.name: group.joints for group in groups}
 
-    def below(self, held: Held, node: Node, path: Path, about: tuple[str, ...]) -> Iterator[Finding]:
+    def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Finding]:
         """What is wrong at `node` and below; `about`: the joints that this is about, as far as blocks around it say."""
         value, annotation, metadata = held
         if isinstance(node, ScalarNode):

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Finding, Loc, Place
 from manipcli.core.text import did_you_mean
 from manipcli.spec.task import TaskSpec
 
-Loc = tuple[str | int, ...]
 Locate = Callable[[Loc], Place | None]
 
 RESERVED = ("world", "base", "tool", "robot", "start", "floor")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.state import Contact
@@ -39,7 +40,7 @@ def held_force(contacts: Sequence[Contact], body: str) -> float:
     return found[1][0] if len(found) > 1 else 0.0
 
 
-def unknown_part(setting: Setting, name: str, loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if `name` is a body, the robot, or one of its links."""
     bodies = tuple(body.name for body in setting.scene.bodies)
     links = tuple(f"{ROBOT}/{link.name}" for link in setting.robot.links)
@@ -50,7 +51,7 @@ def unknown_part(setting: Setting, name: str, loc: tuple[str | int, ...]) -> tup
     return (Problem(loc, message, did_you_mean(name, known)),)
 
 
-def impossible_pair(setting: Setting, pair: tuple[str, str], loc: tuple[str | int, ...]) -> tuple[Problem, ...]:
+def impossible_pair(setting: Setting, pair: tuple[str, str], loc: Loc) -> tuple[Problem, ...]:
     """Empty if both parts exist and the simulation lets them touch each other."""
     unknown = tuple(found for k, name in enumerate(pair) for found in unknown_part(setting, name, (*loc, k)))
     if unknown:

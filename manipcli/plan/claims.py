@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
-Loc = tuple[str | int, ...]
 _GRIPPER = "add a controller of type `gripper` for the hand's joints to the controllers file"
 
 

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaH
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
+from manipcli.core.errors import Loc
+
 Mistake = Literal["name", "range", "type", "count", "unit", "conflict", "verb", "duplicate"]
 """Kinds of mistakes that validators tell with `problem`; the codes stand in `spec/explain.py`."""
 
@@ -65,7 +67,7 @@ def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *short: JsonSche
 
 
 def problem(
-    mistake: Mistake, message: str, *, at: tuple[str | int, ...] = (), hint: str | None = None, key: bool = False
+    mistake: Mistake, message: str, *, at: Loc = (), hint: str | None = None, key: bool = False
 ) -> PydanticCustomError:
     """What a validator raises when a block cannot be meant.
 

@@ -18,7 +18,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Finding, Loc, Place
 from manipcli.core.text import did_you_mean, escape, shorten
 from manipcli.core.units import (
     NUMBER,
@@ -29,7 +29,7 @@ from manipcli.core.units import (
     format_quantity,
     parse_quantity,
 )
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, Scalar, ScalarNode, SequenceNode, dotted
+from manipcli.spec.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode, dotted
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
 NAME = re.compile(r"[A-Za-z_]\w*")
@@ -238,7 +238,7 @@ class _Substitution:
         self.refused = set(refused)
         self.unknown: set[Place] = set()
 
-    def node(self, node: Node, path: Path) -> Node:
+    def node(self, node: Node, path: Loc) -> Node:
         if isinstance(node, MappingNode):
             entries = {k: Entry(e.key_place, self.node(e.node, (*path, k))) for k, e in node.entries.items()}
             return MappingNode(entries, node.place)

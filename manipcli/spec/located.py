@@ -11,14 +11,13 @@ from typing import Final, Generic, Literal, TypeVar
 from pydantic import ValidationError
 
 from manipcli import __version__
-from manipcli.core.errors import Finding, InvalidInput, Place, Severity
+from manipcli.core.errors import Finding, InvalidInput, Loc, Place, Severity
 from manipcli.core.text import listed, shorten
 from manipcli.spec.base import Model
 from manipcli.spec.explain import explain
 from manipcli.spec.tree import (
     MappingNode,
     Node,
-    Path,
     Plain,
     ScalarNode,
     child,
@@ -77,7 +76,7 @@ class Source:
     def finding(
         self,
         number: int,
-        path: Path,
+        path: Loc,
         message: str,
         *,
         hint: str | None = None,
@@ -89,7 +88,7 @@ class Source:
         where = f"{dotted(self._in_file(path))}: " if path else ""
         return Finding(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
 
-    def _in_file(self, path: Path) -> Path:
+    def _in_file(self, path: Loc) -> Loc:
         if len(path) > 1 and isinstance(path[0], str) and isinstance(path[1], int) and path[0] in self.kept:
             return (path[0], self.kept[path[0]][path[1]], *path[2:])
         return path

@@ -14,13 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from types import NoneType
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
 from manipcli.spec import shape
 from manipcli.spec.base import Model
 from manipcli.spec.located import Area
 from manipcli.spec.task import StepSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, dotted, shown
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, shown
 from manipcli.spec.yaml import parse
 
 _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
@@ -102,7 +102,7 @@ def _moved(node: Node, place: Place) -> Node:
     return ScalarNode(node.value, place)
 
 
-def _set(node: Node, override: Override, done: Path, rest: tuple[str, ...], model: type[Model]) -> Node:
+def _set(node: Node, override: Override, done: Loc, rest: tuple[str, ...], model: type[Model]) -> Node:
     """`node` with the value put at `rest` below it; `done` leads to `node`."""
     if not rest:
         return override.value
@@ -131,7 +131,7 @@ def _is_null(value: Node) -> bool:
     return isinstance(value, ScalarNode) and value.value is None
 
 
-def _left_to_default(model: type[Model], done: Path, part: str) -> bool:
+def _left_to_default(model: type[Model], done: Loc, part: str) -> bool:
     """Whether the key may be left out, but not be nothing."""
     known = [shape.keys_of([kind]).get(part) for kind in shape.at(model, done, {})]
     fields = [field for field in known if field is not None]
@@ -139,7 +139,7 @@ def _left_to_default(model: type[Model], done: Path, part: str) -> bool:
     return any(not field.is_required() for field in fields) and NoneType not in kinds
 
 
-def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, model: type[Model]) -> None:
+def _may_be_added(node: MappingNode, override: Override, done: Loc, part: str, model: type[Model]) -> None:
     kinds = shape.at(model, done, {})
     fields = shape.keys_of(kinds)
     if part in fields:
@@ -153,7 +153,7 @@ def _may_be_added(node: MappingNode, override: Override, done: Path, part: str, 
     raise _nowhere(override, f"there is no '{escape(part)}' {where}", hint)
 
 
-def _index(node: SequenceNode, override: Override, done: Path, part: str) -> int:
+def _index(node: SequenceNode, override: Override, done: Loc, part: str) -> int:
     ids = step_ids(node) if done == ("steps",) else ()
     if part in ids:
         return ids.index(part)

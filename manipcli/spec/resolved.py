@@ -8,9 +8,10 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel
 
+from manipcli.core.errors import Loc
 from manipcli.spec.expression import escaped
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Path, Plain
+from manipcli.spec.tree import Plain
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 # The second line only means something to readers of YAML 1.1, which a log may well meet.
@@ -19,7 +20,7 @@ _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _WIDTH = 100
 
 
-def resolved(spec: BaseModel, expressions: Mapping[Path, str] | None = None) -> str:
+def resolved(spec: BaseModel, expressions: Mapping[Loc, str] | None = None) -> str:
     """The YAML text, keys in the order of the model and of the file.
 
     Args:
@@ -62,7 +63,7 @@ def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
     raise TypeError(f"a spec cannot hold {type(value).__name__}")
 
 
-def _with(data: Plain, path: Path, text: str) -> Plain:
+def _with(data: Plain, path: Loc, text: str) -> Plain:
     """The data with `text` in the place of what stands at `path`, or of the block that it is short for."""
     if not path:
         return text

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, validate
 from manipcli.spec.task import StepSpec, TaskSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, node_at
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at
 
 
 def retried(file: Located[TaskSpec], index: int) -> StepSpec:
@@ -40,7 +41,7 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
 
 
-def expressions(file: Located[TaskSpec]) -> dict[Path, str]:
+def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
     """What was written, by its path, where a step that is tried again with other parameters needs it."""
     steps = [k for k, step in enumerate(file.spec.steps) if step.retry is not None and step.retry.with_]
     if not steps:
@@ -48,12 +49,12 @@ def expressions(file: Located[TaskSpec]) -> dict[Path, str]:
     root = file.source.root
     found = dict(_expressions(child(root, "params"), ("params",)))
     for k in steps:
-        at: Path = ("steps", k)
+        at: Loc = ("steps", k)
         found.update((path, text) for path, text in _expressions(node_at(root, at), at) if path[2] != "on_fail")
     return found
 
 
-def _expressions(node: Node | None, path: Path) -> Iterator[tuple[Path, str]]:
+def _expressions(node: Node | None, path: Loc) -> Iterator[tuple[Loc, str]]:
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
             yield from _expressions(entry.node, (*path, key))

@@ -10,13 +10,13 @@ from dataclasses import replace
 
 from pydantic import ValidationError
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import nearest
 from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
 from manipcli.spec.override import step_ids
 from manipcli.spec.task import StepSpec, TaskSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, child, without
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, without
 
 LISTS = ("steps", "expect", "watch")
 """Their faulty items are left out one by one."""
@@ -82,7 +82,7 @@ def intended_ids(source: Source, verbs: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*ids, *possible)))
 
 
-def _without(root: MappingNode, faults: list[Path], kept: dict[str, tuple[int, ...]]) -> MappingNode:
+def _without(root: MappingNode, faults: list[Loc], kept: dict[str, tuple[int, ...]]) -> MappingNode:
     """The tree without what the faults are in; `kept` follows which items of the file remain."""
     heads = {str(fault[0]) for fault in faults if len(fault) == 1}
     if heads & {*NAMED}:  # which names there are is not known

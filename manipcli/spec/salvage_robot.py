@@ -9,9 +9,10 @@ from dataclasses import replace
 
 from pydantic import ValidationError
 
+from manipcli.core.errors import Loc
 from manipcli.spec.located import Located, Source
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, Path, ScalarNode, SequenceNode, without
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, without
 
 _LINKS = ("description", "args", "attach")
 """Without these it is not known which links and joints there are."""
@@ -43,7 +44,7 @@ def is_whole(file: Located[RobotSpec]) -> bool:
     return all(file.source.untouched(key) for key in _NAMED)
 
 
-def _without(root: MappingNode, faults: list[Path]) -> MappingNode:
+def _without(root: MappingNode, faults: list[Loc]) -> MappingNode:
     pairs = {fault[1] for fault in faults if fault[0] == "collision_ignore" and len(fault) > 1}
     ignored = root.get("collision_ignore")
     if pairs and isinstance(ignored, SequenceNode):

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Tag
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from manipcli.spec.tree import Path
+from manipcli.core.errors import Loc
 
 
 def alternatives(annotation: object) -> list[tuple[object, str | None]]:
@@ -27,7 +27,7 @@ def alternatives(annotation: object) -> list[tuple[object, str | None]]:
     return [(annotation, None)]
 
 
-def at(model: type[BaseModel], path: Path, tags: Mapping[int, str]) -> list[object]:
+def at(model: type[BaseModel], path: Loc, tags: Mapping[int, str]) -> list[object]:
     """The types that may stand at `path`.
 
     Args:

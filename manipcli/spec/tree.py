@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from manipcli.core.errors import Place
+from manipcli.core.errors import Loc, Place
 from manipcli.core.text import escape, listed, shorten
 
 Scalar = str | int | float | bool | None
 Plain = Scalar | list["Plain"] | dict[str, "Plain"]
-Path = tuple[str | int, ...]
+Path = Loc
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def child(node: Node, part: str | int) -> Node | None:
     return None
 
 
-def node_at(root: Node, path: Path) -> Node:
+def node_at(root: Node, path: Loc) -> Node:
     """The node at `path`, or the deepest one on the way to it."""
     node = root
     for part in path:
@@ -94,7 +94,7 @@ def node_at(root: Node, path: Path) -> Node:
     return node
 
 
-def key_place_at(root: Node, path: Path) -> Place:
+def key_place_at(root: Node, path: Loc) -> Place:
     """Where the last key of `path` stands; the place of the deepest node on the way where there is no such key."""
     parent = node_at(root, path[:-1])
     if path and isinstance(parent, MappingNode) and isinstance(path[-1], str) and path[-1] in parent.entries:
@@ -102,7 +102,7 @@ def key_place_at(root: Node, path: Path) -> Place:
     return node_at(root, path).place
 
 
-def without(root: MappingNode, path: Path) -> MappingNode:
+def without(root: MappingNode, path: Loc) -> MappingNode:
     """A copy without what `path` leads to; where it leads nowhere, without the block that it last leads into."""
     key = path[0]
     below = child(root, key)
@@ -113,7 +113,7 @@ def without(root: MappingNode, path: Path) -> MappingNode:
     return root.without(key)
 
 
-def dotted(path: Path) -> str:
+def dotted(path: Loc) -> str:
     """`scene.cup.mass`, `steps[3].move.to`."""
     text = ""
     for part in path:
