@@ -17,8 +17,8 @@ def schema(
 ) -> ExitCode:
     """Print the JSON Schema of a kind of file.
 
-    It says which keys there are, and types and limits of values; `check` finds everything, as wrong units. Controllers
-    files in a form of ROS have no schema.
+    It says which keys there are, and types, limits and plain units of values; `check` finds everything, as unknown
+    names and what is computed. Controllers files in a form of ROS have no schema.
     """
     from manipcli import pipeline
     from manipcli.report.json import dumps

@@ -264,6 +264,11 @@ def fitting_units(dimension: Dimension) -> tuple[str, ...]:
     return _EXAMPLES.get(dimension, (dimension.symbol,))
 
 
+def symbols_of(dimension: Dimension) -> tuple[str, ...]:
+    """Every symbol that alone is a unit of this dimension; for a speed there is none."""
+    return tuple(symbol for symbol, unit in _UNITS.items() if unit.dimension == dimension)
+
+
 def format_quantity(value: float, dimension: Dimension) -> str:
     """`value` [SI] as text that `parse_quantity` reads back to the same float."""
     symbol = dimension.symbol

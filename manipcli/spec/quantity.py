@@ -13,9 +13,11 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from manipcli.core import units
-from manipcli.core.units import NUMBER_PATTERN, Dimension, UnitError, fitting_units, names_of, to_si
+from manipcli.core.units import NUMBER_PATTERN, Dimension, UnitError, fitting_units, names_of, symbols_of, to_si
 from manipcli.spec.base import problem
 from manipcli.spec.expression import quantity_of
+
+_LETTER, _OTHER = r"[A-Za-z°µμ%]", r"[^A-Za-z°µμ%\s]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,17 @@ class Unit:
         example = f"5 {last}" if self.dimensions[0].symbol else last
         return f"{self.name}: a number in {symbols}, or a text such as '{example}'"
 
+    @property
+    def pattern(self) -> str:
+        """Of a text in JSON Schema: after a number an operator, a unit of several symbols, or one symbol that fits."""
+        fitting = [symbol for dimension in self.dimensions for symbol in symbols_of(dimension)]
+        alone = "|".join(symbol.replace("u", "[uµμ]") for symbol in fitting)
+        if units.NUMBER in self.dimensions:
+            alone += "|"
+        several = rf"{_LETTER}+(?:{_OTHER}|\s+\S)"
+        after = rf"[-+*/)]|{several}" + (rf"|(?:{alone})\s*$" if alone else "")
+        return rf"^[-+(\s]*{NUMBER_PATTERN}(?![\d.]|[eE][-+]?\d)\s*(?:{after})|\$"
+
     def read(self, value: object) -> object:
         """The SI value of a text; anything but a text, a number or truth value passes on to pydantic."""
         if isinstance(value, str):
@@ -54,7 +67,7 @@ class Unit:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
         json_schema = handler(schema)
         json_schema["type"] = ["number", "string"]
-        json_schema["pattern"] = rf"^[-+(\s]*{NUMBER_PATTERN}\s*[-+*/)A-Za-z°µ%]|\$"
+        json_schema["pattern"] = self.pattern
         json_schema["description"] = self.expected
         return json_schema
 

@@ -68,6 +68,25 @@ def test_a_distribution_may_be_short(normal: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("by", "fits"),
+    [
+        ("8 cm", True), ("15 mm", True), ("1e-3 m", True), ("5 µm", True), ("-2 in", True), ("8 kg", False),
+        ("15 kg", False), ("1e-3 kg", False), ("8 centimetres", False), ("'8'", False), ("8 deg", False),
+        ("2 * 4 cm", True), ("(4 cm + 1 cm)", True), ("1 m/s * 8 s", True), ("8 cm + 1 kg", None), ("kg", False),
+    ],
+)  # fmt: skip
+def test_an_editor_marks_a_plain_unit_that_does_not_fit(by: str, fits: bool | None) -> None:
+    """And nothing that the program takes; of what is computed only the program knows the dimension (None)."""
+    text = f"{HEAD}steps:\n  - pour: {{object: cup, into: tray, clearance: {by}}}\n"
+    assert bool(_red(text)) == (fits is False)
+    if fits:
+        load_task_text(text, "t.yaml", model=task_spec())
+        return
+    with pytest.raises(InvalidInput):
+        load_task_text(text, "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize(
     "step",
     ["lift: {object: cup, by: [8 cm]}", "lift: {object: cup, by: true}", "lift:", "wait: true", "wait: soon",
      "switch_controllers: 1", "switch_controllers: {to: 1}"],
