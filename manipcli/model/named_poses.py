@@ -168,5 +168,5 @@ class _Poses:
             if low or high:
                 within = interval(limits.lower, limits.upper)
                 message = f"pose '{name}': joint '{joint}' at {value:g} is outside of {within}"
-                self._reporter.error("ROBOT323", message, locs[joint])
+                self._reporter.error("ROBOT323", message, locs[joint], hint=self._moving[joint].meant(value))
         return values

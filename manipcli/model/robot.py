@@ -157,6 +157,19 @@ class Joint:
         """Of its position."""
         return "m" if self.type == "prismatic" else "rad"
 
+    def meant(self, position: float) -> str | None:
+        """The hint where a position beyond the limits lies within them as degrees, or as millimetres.
+
+        Only for more than a turn or 5 m: less may as well be a position that is too far.
+        """
+        what, unit, size, few = (
+            ("millimetres", "mm", 1000.0, 5.0) if self.unit == "m" else ("degrees", "deg", 180.0 / math.pi, math.tau)
+        )
+        lower, upper = self.limits.range
+        if lower <= position <= upper or abs(position) <= few or not lower <= position / size <= upper:
+            return None
+        return f"in {what}? write '{position:g} {unit}'"
+
     @property
     def effort_unit(self) -> Literal["N m", "N"]:
         """Of its effort."""

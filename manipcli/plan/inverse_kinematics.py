@@ -31,6 +31,7 @@ _TRIES = 40  # random restarts; past these a pose is called unreachable
 _ENOUGH = 3  # solutions among which the nearest to the seed is taken
 _AT_LIMIT = 1e-6  # rad or m
 _TURNED = math.radians(60.0)  # a pose missed by more is one to which the arm cannot turn its tool
+_FAR = 50.0  # m: a goal beyond this was hardly meant in metres
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
 NOT_SO = "change the orientation of the tool: the arm cannot turn it like this"
 """The hint where a pose is missed by its orientation."""
@@ -169,10 +170,12 @@ class InverseKinematics:
                 f"the arm reaches ({place}) m only where {refusal}",
                 hint="move the goal away from what is touched, or change the orientation of the tool",
             )
-        turned = best.angle_error > _TURNED
+        hint = NOT_SO if best.angle_error > _TURNED else "move the goal nearer, or change the orientation of the tool"
+        if distance > _FAR:
+            hint = "positions are in m: in millimetres? write '500 mm' for 500"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
-            hint=NOT_SO if turned else "move the goal nearer, or change the orientation of the tool",
+            hint=hint,
         )
 
     def track(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:

@@ -69,17 +69,24 @@ def verify_written(
         NotPlannable: names the joint, the position and the limit, and says where that position stands.
     """
     for name, value, loc in written:
-        lower, upper = robot.joint(name).limits.range
+        joint = robot.joint(name)
+        lower, upper = joint.limits.range
         if max(lower - value, value - upper) > _POSITION:
-            raise _beyond(name, value, lower, upper, when, loc)
+            raise _beyond(name, value, lower, upper, when, loc, joint.meant(value))
 
 
 def _beyond(
-    name: str, value: float, lower: float, upper: float, when: str, loc: tuple[str | int, ...] = ()
+    name: str,
+    value: float,
+    lower: float,
+    upper: float,
+    when: str,
+    loc: tuple[str | int, ...] = (),
+    hint: str | None = None,
 ) -> NotPlannable:
     word, limit = ("lower", lower) if value < lower else ("upper", upper)
     there, most = told_apart(value, limit, form=".4f")
-    return NotPlannable(f"joint '{name}' goes to {there}{when}, beyond its {word} limit {most}", loc=loc)
+    return NotPlannable(f"joint '{name}' goes to {there}{when}, beyond its {word} limit {most}", hint=hint, loc=loc)
 
 
 def overshoot(trajectory: JointTrajectory, limits: MotionLimits) -> Array:

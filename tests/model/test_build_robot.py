@@ -160,6 +160,22 @@ def test_a_pose_that_cannot_be_is_told(file: Path, poses: dict[str, object], exp
     assert expected in messages(file, groups=GROUPS, poses=poses)
 
 
+@pytest.mark.parametrize(
+    ("joint", "value", "hint"),
+    [
+        ("j2", 45.0, "in degrees? write '45 deg'"),
+        ("j2", -90.0, None),  # beyond the limits as degrees, too
+        ("j2", 1.5, None),
+        ("slide", 40.0, "in millimetres? write '40 mm'"),
+        ("slide", 1.5, None),
+    ],
+)
+def test_a_pose_in_degrees_or_millimetres_is_guessed(file: Path, joint: str, value: float, hint: str | None) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        build(file, groups={"all": {"joints": ["j1", "j2", "slide"]}}, poses={"p": {"all": {joint: value}}})
+    assert [f.hint for f in refused.value.findings if f.severity == "error"] == [hint]
+
+
 def test_limits_narrow_and_complete_the_description(file: Path) -> None:
     limits = {"j1": {"lower": -0.5, "velocity": 5.0, "acceleration": 3.0, "jerk": 40.0}}
     robot, findings = build_robot(spec(limits=limits, default_acceleration=7.0), file=file)

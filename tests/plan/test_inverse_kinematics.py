@@ -78,6 +78,12 @@ def test_a_goal_out_of_reach_names_error_and_distance(solver: InverseKinematics,
     assert refused.value.hint is not None
 
 
+def test_a_goal_in_millimetres_is_guessed(solver: InverseKinematics, middle: Array) -> None:
+    with pytest.raises(NotPlannable) as refused:
+        solver.solve(Transform.of(xyz=(500.0, 0.0, 400.0)), middle, np.random.default_rng(0))
+    assert "millimetres" in (refused.value.hint or "")
+
+
 def test_a_pose_that_is_barely_missed_is_told_with_what_would_have_counted(middle: Array) -> None:
     told = Solution(middle, position_error=2.4e-6, angle_error=1.5e-4, at_limit=()).explain()
     assert told.startswith("the nearest pose is 0.0024 mm and 0.0086 deg off, and up to 0.01 mm and 0.0057 deg counts")

@@ -116,6 +116,8 @@ def test_a_move_past_a_limit_names_joint_value_and_limit(bench: Make) -> None:
     upper = bench().robot.joint("joint_4").limits.upper
     assert refusal.cause == f"joint 'joint_4' goes to 3.0000, beyond its upper limit {upper:.4f}"
     assert refusal.loc == ("to", "joint_4")
+    assert refusal.hint is None
+    assert bench().refused("move", {"to": {"joint_4": -90.0}}).hint == "in degrees? write '-90 deg'"
 
 
 def test_a_pose_out_of_reach_says_how_far_off_it_stays(bench: Make) -> None:
