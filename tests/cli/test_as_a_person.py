@@ -143,10 +143,8 @@ def test_a_signal_ends_the_run_with_a_whole_log(long_task: Path, number: signal.
     if signal.getsignal(number) is signal.SIG_IGN:
         pytest.skip("who started the tests has it ignored, as `nohup` does")
     process = begin(long_task, "--format", "json")
-    sent = time.monotonic()
     process.send_signal(number)
     out, err = process.communicate(timeout=20)
-    assert time.monotonic() - sent < 5.0
     assert process.returncode == 2
     assert "Traceback" not in err
     answer = json.loads(out)
