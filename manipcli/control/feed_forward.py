@@ -53,13 +53,19 @@ class ModelFeedForward:
         M(q) a + C(q, v) v + g(q) + D v_r
 
     with the wanted acceleration a, and the viscous damping D of the joints at the reference velocity v_r: at the
-    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate.
+    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate, but
+    those that follow one (mimic): they move with it, and what they need is its to give.
     """
 
     def __init__(self, robot: RobotModel, kinematics: Kinematics) -> None:
         self._kinematics = kinematics
         self._damping = np.array([joint.damping for joint in robot.moving_joints])
         self._acceleration, self._rate = np.zeros((2, len(robot.joint_names)))
+        self._followers = [
+            (k, robot.joint_names.index(joint.mimic.joint), joint.mimic.multiplier)
+            for k, joint in enumerate(robot.moving_joints)
+            if joint.mimic is not None
+        ]
         self._served: list[tuple[Array, Index, int, int]] = []
         self._driven: list[tuple[Index, Array, Array]] = []
 
@@ -86,11 +92,16 @@ class ModelFeedForward:
             for index, wanted, reference in self._driven:
                 acceleration[index] = wanted
                 rate[index] = reference
+            for follower, driver, factor in self._followers:
+                acceleration[follower] = factor * acceleration[driver]
+                rate[follower] = factor * rate[driver]
             efforts = self._kinematics.inverse_dynamics(position, velocity, acceleration)
             np.multiply(self._damping, rate, out=rate)
             efforts += rate
         else:
             efforts = self._kinematics.gravity(position)
+        for follower, driver, factor in self._followers:
+            efforts[driver] += factor * efforts[follower]
         for command, index, every, first in self._served:
             if every == 1 or (tick - first) % every == 0:
                 command += efforts[index]

@@ -10,7 +10,7 @@ from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Inertial, Joint, JointLimits, Link, RobotModel
+from manipcli.model.robot import Inertial, Joint, JointLimits, Link, Mimic, RobotModel
 from manipcli.model.state import WorldState
 
 PERIOD = 0.001
@@ -77,3 +77,39 @@ def test_gravity_is_added_once_an_update_whenever_a_controller_was_activated(eve
         else:
             k = (tick - first) // every
             assert command.effort[0] == pytest.approx(1 + k + weight(0.1 * (first + every * k)), rel=1e-6)
+
+
+def linkage(multiplier):
+    """A rod on a hinge, and on another hinge a second one of the same weight that follows the first."""
+    rod = Inertial(MASS, Transform.of(xyz=(LENGTH, 0.0, 0.0)), frozen(1e-6 * np.eye(3)))
+    hinges = tuple(
+        Joint(
+            name, "revolute", "base", name + "_rod", Transform.identity(), frozen([0.0, -1.0, 0.0]), JointLimits(),
+            mimic=mimic, damping=0.5,
+        )
+        for name, mimic in (("f", Mimic("a", multiplier, 0.3)), ("a", None))
+    )  # fmt: skip
+    links = (Link("base", None, (), ()), *(Link(f"{name}_rod", rod, (), ()) for name in "fa"))
+    return RobotModel(
+        name="linkage", root="base", links=links, joints=hinges, groups=(), poses=(), transmissions=(),
+        X_WB=Transform.identity(), urdf="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("multiplier", [1.0, -2.0])
+@pytest.mark.parametrize("wants", ["gravity", "inverse_dynamics"])
+def test_a_joint_also_carries_what_follows_it(wants, multiplier):
+    """Power: u q' = d(energy)/dt with q'_f = m q', so u = w(q) + m w(q_f) + (1 + m^2) (I a + D v_r)."""
+    robot = linkage(multiplier)
+    law = ModelFeedForward(robot, Kinematics(robot))
+    controller = Counts(wants)
+    controller.output.velocity[:], controller.output.acceleration[:] = 0.7, 2.0
+    law.serve([(controller, slice(1, 2), 1, 0)])
+    q = 0.4
+    follower = multiplier * q + 0.3
+    law.add(0, np.array([follower, q]), np.zeros(2))
+    expected = weight(q) + multiplier * weight(follower)
+    if wants == "inverse_dynamics":
+        inertia = MASS * LENGTH**2 + 1e-6
+        expected += (1.0 + multiplier**2) * (inertia * 2.0 + 0.5 * 0.7)
+    assert controller.output.command[0] == pytest.approx(expected, rel=1e-6)
