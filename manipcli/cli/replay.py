@@ -48,6 +48,9 @@ def replay(
     speed: Annotated[
         float, typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film.")
     ] = 1.0,
+    robot: Annotated[
+        str | None, typer.Option("--robot", metavar="NAMESPACE", help="Of several robots in a ROS 2 log, as /left.")
+    ] = None,
     port: PagePort = None,
     open_: OpenPage = False,
     verify: Annotated[
@@ -92,7 +95,11 @@ def replay(
 
         pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
         playback = open_playback(
-            log, rate=pictures.rate, package_path=tuple(package_path or ()), allow_outside=allow_outside
+            log,
+            rate=pictures.rate,
+            space=None if robot is None else f"/{robot.strip('/')}",
+            package_path=tuple(package_path or ()),
+            allow_outside=allow_outside,
         )
         if playback.lost is not None:
             console.talk(f"the log is not closed: {playback.lost}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,8 +17,9 @@ from manipcli.record.definition import Array, Message, UnknownDefinition, read_d
 from manipcli.record.faults import BadRecording
 from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, ways
 from manipcli.record.layout import Part
+from manipcli.record.namespaces import meant
 from manipcli.record.reading import open_recording
-from manipcli.record.schemas import CONTROLLER_STATE, JOINT_STATE
+from manipcli.record.schemas import CONTROLLER_STATE
 from manipcli.record.series import Series, Wanted, read_series
 from manipcli.record.topics import Topic, Topics, open_topics
 from manipcli.record.units import JointUnits, joint_units, unit_of
@@ -274,9 +275,9 @@ def _overview(logs: Sequence[_Log]) -> list[tuple[str, ...]]:
     found: dict[str, None] = {}
     for one in logs:
         topics = one.topics.all
-        for field in ("position", "velocity", "effort"):
-            if _is(topics, JOINT_STATES, JOINT_STATE):
-                found[f"{JOINT_STATES}.{field}"] = None
+        known = meant({name: topic.type for name, topic in topics.items()}).items()
+        joints = [name for name, what in known if what.usual == JOINT_STATES and topics[name].count]
+        found |= {f"{name}.{field}": None for field in ("position", "velocity", "effort") for name in joints}
         for name, topic in topics.items():
             if topic.type == CONTROLLER_STATE and topic.count:
                 found[f"{name}.error.positions"] = None
@@ -284,10 +285,6 @@ def _overview(logs: Sequence[_Log]) -> list[tuple[str, ...]]:
             found[f"{CONTACTS}.force"] = None
     # Every log must have what is asked of all.
     return [(word,) for word in found if all(word.partition(".")[0] in one.topics.all for one in logs)]
-
-
-def _is(topics: Mapping[str, Topic], name: str, kind: str) -> bool:
-    return name in topics and topics[name].type == kind and topics[name].count > 0
 
 
 def _short(message: Message, parts: Sequence[str]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
-from manipcli.core.text import listed
+from manipcli.core.text import did_you_mean, listed
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.model.build_robot import bare_robot
 from manipcli.model.description import Description
@@ -98,17 +98,20 @@ class _Poses:
 
 
 class _Log:
-    """What was read of the log."""
+    """What was read of the log; of the robots in several namespaces, of that in `space` and of what they share."""
 
-    def __init__(self, topics: Topics) -> None:
+    def __init__(self, topics: Topics, space: str | None) -> None:
         self.urdf = ""
         self.joints: dict[str, _Samples] = {}
         self.frames: dict[tuple[str, str], _Samples] = {}
         self.start, self.end = np.inf, -np.inf
         known = meant({name: topic.type for name, topic in topics.all.items()})
         self.spaces = namespaces(known.values())
+        if space is not None and space not in self.spaces:
+            raise InvalidInput([_no_robot(topics.path, space, self.spaces)])
         # Of several robots none is meant; of one alone, in whatever namespace, it is.
-        wanted = {name: one.usual for name, one in known.items() if not one.namespace or len(self.spaces) == 1}
+        shown = {"", space, *(self.spaces if len(self.spaces) == 1 else ())}
+        wanted = {name: one.usual for name, one in known.items() if one.namespace in shown}
         self.unshown = [name for name in known if name not in wanted]
         there = {one.usual for one in known.values()}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
@@ -168,7 +171,13 @@ FOREIGN: Final = "manipcli did not write this log"
 
 
 def open_other(
-    path: Path, *, rate: float, why: str = FOREIGN, package_path: Sequence[Path] = (), allow_outside: bool = False
+    path: Path,
+    *,
+    rate: float,
+    space: str | None = None,
+    why: str = FOREIGN,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
 ) -> Playback:
     """A log of another program, as it is shown; see `open_playback`. `why` it has to be taken for one.
 
@@ -176,7 +185,7 @@ def open_other(
         InvalidInput: it is no MCAP file, damaged, or holds neither joints nor frames that move.
     """
     topics = open_topics(path)
-    log = _Log(topics)
+    log = _Log(topics, space)
     notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
     notes += [f"it has no {name} ({TYPES[name]})" for name in log.lacks]
     several = f"it tells of several robots, in {listed(log.spaces)}" if len(log.spaces) > 1 else ""
@@ -185,6 +194,8 @@ def open_other(
         what = several or f"it has neither {channels.JOINT_STATES} nor {channels.TF}"
         message = f"{path.name}: nothing to show: {what}"
         hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
+        if several:
+            hint = f"show one of them with --robot, as in --robot {log.spaces[0]}"
         raise InvalidInput([Finding("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
     times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
@@ -216,6 +227,11 @@ def open_other(
         lost=topics.lost,
         notes=tuple(notes),
     )
+
+
+def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Finding:
+    hint = did_you_mean(space, spaces, kind="namespaces") or "it tells of one robot at most: leave --robot out"
+    return Finding("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
 
 
 def _poses(samples: _Samples, times: Array) -> _Poses:

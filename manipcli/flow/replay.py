@@ -24,25 +24,31 @@ from manipcli.replay.sampling import plot_tables, sampled
 
 
 def open_playback(
-    path: Path, *, rate: float = RATE, package_path: Sequence[Path] = (), allow_outside: bool = False
+    path: Path,
+    *,
+    rate: float = RATE,
+    space: str | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
 ) -> Playback:
     """A log as it is shown.
 
     Args:
         path: the log of a run, what a killed run left of it, or a ROS 2 log of another program.
         rate: [Hz] of what is shown.
+        space: the namespace of the robot that is shown, of several that another program recorded, as `/r1`.
         package_path: folders to look for packages of meshes in, before those near the log and the working directory.
         allow_outside: lets a mesh lie anywhere.
 
     Raises:
         InvalidInput: the file is no log, is damaged, or has nothing to show.
     """
-    if is_own(path):
+    if space is None and is_own(path):
         try:
             return _open_own(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
         except Thinned:
             return open_other(path, rate=rate, why=LEFT_OUT, package_path=package_path, allow_outside=allow_outside)
-    return open_other(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
+    return open_other(path, rate=rate, space=space, package_path=package_path, allow_outside=allow_outside)
 
 
 def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_outside: bool) -> Playback:

@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import matrix_from_quat
+from manipcli.flow.chart import open_chart
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.moment import moment
 from manipcli.flow.replay import open_playback
@@ -357,6 +358,30 @@ def test_of_several_robots_a_moment_names_which_and_a_replay_shows_none(tmp_path
     assert [poses[f"{robot}/base"].pose.p[0] for robot in ("r1", "r2")] == [1.0, 2.0]
     with pytest.raises(InvalidInput, match="several robots, in /r1"):
         open_playback(path)
+
+
+@pytest.mark.parametrize("one_tf", [False, True])
+def test_of_several_robots_one_is_chosen(tmp_path: Path, one_tf: bool) -> None:
+    path = _foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"), one_tf=one_tf)
+    whole, shown = (
+        open_playback(_foreign(tmp_path / "bag.mcap"), rate=10.0),
+        open_playback(path, rate=10.0, space="/r2"),
+    )
+    assert shown.joint_names == whole.joint_names
+    np.testing.assert_array_equal(shown.position, whole.position)
+    if not one_tf:
+        assert whole.robot is not None and shown.robot is not None
+        assert shown.robot.X_WB.p[0] == whole.robot.X_WB.p[0] + 1.0
+    with pytest.raises(InvalidInput, match="no robot in '/r3'"):
+        open_playback(path, space="/r3")
+    with pytest.raises(InvalidInput, match="no robot in '/r2'"):
+        open_playback(tmp_path / "bag.mcap", space="/r2")
+
+
+def test_an_overview_shows_the_joints_of_every_robot(tmp_path: Path) -> None:
+    chart = open_chart([_foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"))], [])
+    names = {curve.name for panel in chart.panels for curve in panel.curves}
+    assert {f"{space}/joint_states.position[{joint}]" for space in ("r1", "r2") for joint in ("turn", "push")} <= names
 
 
 def test_a_replay_of_what_several_robots_share_says_that_it_shows_none_of_them(tmp_path: Path) -> None:
