@@ -84,8 +84,8 @@ steps:
 ```
 
 Numbers are SI (m, rad, s, N), or text with a unit (`12 cm`, `90 deg`), or of `params:` (`$tilt`, `2 * $tilt + 5 deg`).
-A range is one number, or `[least, most]`, of which the planner takes what it can: the middle first, then the ends. The
-whole task is planned, step after step, before anything moves.
+A range is one number of 0 or more, or `[least, most]` of such, of which the planner takes what it can: the middle
+first, then the ends. The whole task is planned, step after step, before anything moves.
 
 ## What every step may have
 

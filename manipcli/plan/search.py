@@ -30,6 +30,8 @@ def _rising(bounds: tuple[float, float]) -> tuple[float, float]:
     if bounds[0] > bounds[1]:
         message = f"the least, {readable(bounds[0], 'm')}, is above the most, {readable(bounds[1], 'm')}"
         raise problem("range", message, hint="write [least, most]")
+    if bounds[0] < 0.0:
+        raise problem("range", f"must be at least 0, not {readable(bounds[0], 'm')}")
     return bounds
 
 
@@ -38,7 +40,7 @@ Range = Annotated[
     BeforeValidator(_pair, json_schema_input_type=Length | tuple[Length, Length]),
     AfterValidator(_rising),
 ]
-"""A range of lengths [least, most] [m], or one length."""
+"""A range of lengths [least, most] [m], neither below 0, or one length."""
 
 
 def spread(bounds: tuple[float, float]) -> tuple[float, ...]:

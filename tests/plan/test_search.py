@@ -22,6 +22,10 @@ def test_a_range_rises() -> None:
     assert lengths.validate_python("8 cm") == (0.08, 0.08)
     with pytest.raises(ValidationError, match="the least, 200 mm, is above the most, 80 mm"):
         lengths.validate_python(["20 cm", "8 cm"])
+    assert lengths.validate_python([0, 0.1]) == (0.0, 0.1)
+    for below in ("-5 cm", ["-5 cm", "5 cm"]):
+        with pytest.raises(ValidationError, match="must be at least 0, not -50 mm"):
+            lengths.validate_python(below)
 
 
 def test_the_first_that_can_be_planned_is_taken_and_no_other_is_tried() -> None:
