@@ -25,6 +25,7 @@ Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,13 +34,14 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
+from manipcli.core.units import ANGLE, LENGTH
 from manipcli.spec import shape
+from manipcli.spec.fields import unit_of
 from manipcli.spec.tree import (
     MappingNode,
     Node,
-    Path,
     ScalarNode,
     SequenceNode,
     child,
@@ -70,7 +72,7 @@ class _Complaint:
     """One of pydantic's errors on the tree: `path` leads to it, `tags` say at which depth a union took which branch."""
 
     error: ErrorDetails
-    path: Path
+    path: Loc
     tags: tuple[tuple[int, str], ...]
     used: int = 0
 
@@ -99,7 +101,7 @@ def explain(error: ValidationError, root: Node, model: type[BaseModel], area: st
 
 def _locate(error: ErrorDetails, root: Node) -> _Complaint:
     """Walk the location down the tree; what is not on it is pydantic's name of a union's branch."""
-    path: Path = ()
+    path: Loc = ()
     tags: list[tuple[int, str]] = []
     loc = error["loc"]
     node: Node | None = root
@@ -119,7 +121,7 @@ def _locate(error: ErrorDetails, root: Node) -> _Complaint:
 def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
     """Missing items of a list of fixed length are one complaint: its length."""
     result: list[_Complaint] = []
-    longest: dict[tuple[Path, tuple[tuple[int, str], ...]], int] = {}
+    longest: dict[tuple[Loc, tuple[tuple[int, str], ...]], int] = {}
     for complaint in complaints:
         last = complaint.path[-1] if complaint.path else None
         if complaint.error["type"] == "missing" and isinstance(last, int):
@@ -144,7 +146,7 @@ def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
 def _decide(complaints: Sequence[_Complaint], root: Node) -> list[list[_Complaint]]:
     """For each union, keep the branch that was meant; branches that are all of the wrong type become one complaint."""
     decided: list[list[_Complaint]] = []
-    unions: dict[tuple[int, Path], list[_Complaint]] = {}
+    unions: dict[tuple[int, Loc], list[_Complaint]] = {}
     for complaint in complaints:
         tag = complaint.open_tag
         if tag is None:
@@ -179,8 +181,11 @@ def _finding(
     node = node_at(root, path)
     what, hint = _told(first, branches, root, model)
     at_key = kind == "extra_forbidden" or bool(first.error.get("ctx", {}).get("key", False))
-    if not at_key and hint is None:
-        hint = _origin(node, root)
+    origin = None if at_key else _origin(node, root)
+    if kind in _RANGES and hint is not None and origin is not None:
+        hint = f"{hint}; {origin}"
+    elif hint is None:
+        hint = origin
     place = key_place_at(root, path) if at_key else node.place
     where = dotted(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path)
     code = f"{area}{_MISTAKES.get(kind, 205)}"
@@ -220,7 +225,9 @@ def _told(
     if kind in _RANGES:
         field = _field(first, model)
         optional = field is not None and field.default is None
-        hint = _described(field, path) if optional else None
+        hint = _other_unit(path, context, node, model, dict(first.tags)) or (
+            _described(field, path) if optional else None
+        )
         return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", hint
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
@@ -240,7 +247,27 @@ def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
     return shape.keys_of(shape.at(model, tuple(above), dict(complaint.tags))).get(str(key))
 
 
-def _described(field: FieldInfo | None, path: Path) -> str | None:
+def _other_unit(
+    path: Loc, context: dict[str, object], node: Node, model: type[BaseModel], tags: dict[int, str]
+) -> str | None:
+    """The hint where a plain number above the most that is taken lies below it as degrees, or as millimetres."""
+    most = next((context[key] for key in ("le", "lt") if key in context), None)
+    value = node.value if isinstance(node, ScalarNode) else None
+    if not isinstance(most, int | float) or not isinstance(value, int | float):
+        return None
+    key = max(k for k, part in enumerate(path) if isinstance(part, str))  # what it is an item of
+    field = shape.keys_of(shape.at(model, path[:key], tags)).get(str(path[key]))
+    unit = unit_of(field.annotation, field.metadata) if field is not None else None
+    for dimension, what, symbol, size in _SMALLER:
+        if unit is not None and unit.dimensions == (dimension,) and value / size <= most:
+            return f"in {what}? write '{value:g} {symbol}'"
+    return None
+
+
+_SMALLER = ((ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1000.0))
+
+
+def _described(field: FieldInfo | None, path: Loc) -> str | None:
     return None if field is None or not field.description else f"{path[-1]}: {field.description}"
 
 
@@ -266,7 +293,7 @@ def _none_fits(branches: Sequence[_Complaint], node: Node) -> tuple[str, str | N
     return f"expected {one}, not {shown(node)}", next((hint for hint in hints if hint), None)
 
 
-def _unknown_key(path: Path, tags: dict[int, str], model: type[BaseModel]) -> tuple[str, str | None]:
+def _unknown_key(path: Loc, tags: dict[int, str], model: type[BaseModel]) -> tuple[str, str | None]:
     known = shape.keys_of(shape.at(model, path[:-1], tags))
     close = nearest(str(path[-1]), known)
     hint = did_you_mean(str(path[-1]), known, kind="known keys")

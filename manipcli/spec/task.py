@@ -36,7 +36,7 @@ class SimulationSpec(Model):
     """Engine and clock. `control_period` is a whole multiple of `step`; `settle` is simulated before the start."""
 
     engine: str = Field("pybullet", description="Which engine: `pybullet` (physics), `kinematic` (commands come true).")
-    step: Annotated[Time, Field(gt=0, le=0.02, description="Physics step, above 0 to 20 ms. Default 1 ms.")] = 0.001
+    step: Annotated[Time, Field(ge=1e-6, le=0.02, description="Physics step, 1 us to 20 ms. Default 1 ms.")] = 0.001
     control_period: Annotated[
         Time, Field(gt=0, le=0.05, description="Control tick, a whole multiple of `step`, to 50 ms. Default 1 ms.")
     ] = 0.001

@@ -9,7 +9,6 @@ from manipcli.core.text import escape, listed, shorten
 
 Scalar = str | int | float | bool | None
 Plain = Scalar | list["Plain"] | dict[str, "Plain"]
-Path = Loc
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from manipcli.core.errors import InvalidInput
+from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.load import load_task_text
 
@@ -16,6 +16,7 @@ scene:
   block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, pose: {}}
   ball: {sphere: {radius: 1 cm}, mass: 1, pose: {}}
   thing: {mesh: {file: a.stl, scale: 0.001}, mass: 1, pose: {}}
+simulation: {step: 1 ms, control_period: 1 ms}
 steps:
   - wait: 1 s
   - pour: {object: block, into: ball, dwell: 1 s}
@@ -23,18 +24,19 @@ steps:
 """
 
 
-def refused(written: str, instead: str) -> str:
+def refused(written: str, instead: str) -> Finding:
     with pytest.raises(InvalidInput) as told:
         load_task_text(TASK.replace(written, instead), "t.yaml", model=task_spec())
     (finding,) = told.value.findings
-    return str(finding)
+    return finding
 
 
 @pytest.mark.parametrize(
     ("written", "instead", "told"),
     [
-        ("wait: 1 s", "wait: 1e9 s", "t.yaml:9:11: error[TASK204]: steps[0].wait: must be at most 3600, not"),
+        ("wait: 1 s", "wait: 1e9 s", "t.yaml:10:11: error[TASK204]: steps[0].wait: must be at most 3600, not"),
         ("wait: 1 s", "wait: {duration: 61 min}", "must be at most 3600, not '61 min'"),
+        ("step: 1 ms", "step: 1e-9", "simulation.step: must be at least 1e-06, not 1e-09"),
         ("dwell: 1 s", "dwell: 2 h", "must be at most 3600, not '2 h'"),
         ("timeout: 10 s", "timeout: 1e9 s", "must be at most 3600, not '1e9 s'"),
         ("timeout: 10 s", "timeout: 0", "must be more than 0, not 0"),
@@ -51,7 +53,7 @@ def refused(written: str, instead: str) -> str:
     ],
 )
 def test_it_is_told_with_the_most_that_is_taken(written: str, instead: str, told: str) -> None:
-    assert told in refused(written, instead)
+    assert told in str(refused(written, instead))
 
 
 @pytest.mark.parametrize(
@@ -60,3 +62,23 @@ def test_it_is_told_with_the_most_that_is_taken(written: str, instead: str, told
 )
 def test_the_most_is_taken(written: str, instead: str) -> None:
     load_task_text(TASK.replace(written, instead), "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize(
+    ("written", "instead", "hint"),
+    [
+        ("[4 cm, 4 cm, 5 cm]", "[4 cm, 400, 5 cm]", "in millimetres? write '400 mm'"),
+        ("radius: 1 cm", "radius: 200", "in millimetres? write '200 mm'"),
+        ("dwell: 1 s", "dwell: 1 s, tilt: 120", "in degrees? write '120 deg'"),
+    ],
+)
+def test_degrees_and_millimetres_are_guessed(written: str, instead: str, hint: str) -> None:
+    assert refused(written, instead).hint == hint
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [("radius: 1 cm", "radius: 200 m"), ("radius: 1 cm", "radius: 1e7"), ("mass: 80 g", "mass: 2e5")],
+)
+def test_what_has_a_unit_or_fits_neither_way_is_not_guessed(written: str, instead: str) -> None:
+    assert "millimetres" not in (refused(written, instead).hint or "")

@@ -356,7 +356,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "scene:",
             "simulation: {step: 0}\nscene:",
-            "t.yaml:5:20: error[TASK204]: simulation.step: must be more than 0",
+            "t.yaml:5:20: error[TASK204]: simulation.step: must be at least 1e-06",
             "",
         ),
         (
