@@ -81,7 +81,20 @@ def test_what_of_an_actuator_does_not_act_is_named(found: Found) -> None:
         "position; the plan turns 'motor' at 150 (limit 50) per second"
     )
     assert (one.code, one.severity, Path(one.place.file).name) == ("CTRL158", "warning", "robot.yaml")
+    for limit, beyond in ((149, True), (151, False)):  # 3 rad/s of the joint behind a gear of 50
+        (one,) = found("command_interface: position", more=f"velocity: {limit}")
+        assert ("the plan turns 'motor' at 150" in one.message) is beyond
     (one,) = found("command_interface: position", more="latency: 3")
     assert one.message == "actuator 'motor': latency acts on effort commands alone, and 'c' commands by position"
     efforts = found("command_interface: effort, gains: {hinge: {p: 80, d: 6}}", more=more)
     assert "CTRL158" not in {each.code for each in efforts}
+
+
+def test_latency_counts_in_whole_ticks_of_the_controller(found: Found) -> None:
+    """1 ms of latency delays by a whole tick of 4 ms: v' = v - (h / I) d v_before is stable below d = I / h."""
+    controller = "command_interface: effort, update_rate: 250, gravity_compensation: true"
+    (late,) = found(f"{controller}, gains: {{hinge: {{p: 1, d: 25}}}}", more="latency: 1")
+    told = re.match(r"hinge: kd 25 is unstable above ([\d.]+) at 4 ms and 1 ticks of latency", late.message)
+    assert told is not None, late.message
+    assert float(told[1]) == pytest.approx((0.02 + 0.25**2) / 4e-3, rel=0.02)
+    assert found(f"{controller}, gains: {{hinge: {{p: 1, d: 19}}}}") == ()

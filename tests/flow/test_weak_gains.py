@@ -56,6 +56,7 @@ def told(task: Path) -> list[Finding]:
             f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity until its integral carries "
             "it, some 5 s with ki 4",
         ),
+        ("p: 20, d: 2, i: 16, i_clamp: 10", "CTRL156", "until its integral carries it, some 1.2 s with ki 16"),
     ],
 )
 def test_gains_too_weak_for_the_weight_are_told(written: Written, gains: str, code: str, message: str) -> None:
@@ -74,6 +75,7 @@ def test_gains_too_weak_for_the_weight_are_told(written: Written, gains: str, co
         "p: 20, d: 2, i: 40",
         "p: 20, d: 2, i: 40, i_clamp: 2",
         "p: 80, d: 6, u_clamp_max: 2.5, u_clamp_min: -1",
+        "p: 80, d: 6, u_clamp_max: 9, u_clamp_min: -9",
     ],
 )
 def test_gains_that_hold_it_are_not(written: Written, gains: str) -> None:
@@ -84,6 +86,24 @@ def test_a_clamp_on_the_other_side_is_told_on_the_other_side(written: Written) -
     gains = "p: 80, d: 6, u_clamp_max: 2.5, u_clamp_min: -1"
     (one,) = told(written(gains, start="back"))
     assert f"takes up to {-WEIGHT:.3g} N m, its u_clamp_min is -1" in one.message
+
+
+def test_an_integral_without_kp_is_unstable_and_nothing_else(written: Written) -> None:
+    (one,) = told(written("d: 2, i: 4, i_clamp: 1"))
+    assert one.code == "CTRL150"
+
+
+def test_a_wide_tolerance_is_no_leave_to_sink_until_the_integral_carries_it(written: Written) -> None:
+    (one,) = told(written("p: 20, d: 2, i: 4", more=", constraints: {joints: {hinge: {goal: 0.5}}}"))
+    assert "until its integral carries it" in one.message
+    assert told(written("p: 20, d: 2", more=", constraints: {joints: {hinge: {goal: 0.5}}}")) == []
+
+
+def test_what_the_effort_limit_cuts_off_is_not_told_of_the_gains_too(written: Written, pendulum: Written) -> None:
+    """It sinks for want of effort; under what effort there is, 1 N m, it gives way by 0.05 rad, half of `SAG`."""
+    task = written("p: 20, d: 2")
+    pendulum(f"{POSES}\nlimits: {{hinge: {{effort: 1}}}}")
+    assert [one.code for one in told(task)] == ["CTRL155"]
 
 
 @pytest.mark.slow
