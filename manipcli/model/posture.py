@@ -12,8 +12,8 @@ from manipcli.model.robot import Joint, RobotModel
 
 
 def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
-    """(n,) the lower and (n,) the upper limit of each joint [rad or m], infinite where it has none."""
-    ranges = [joint.limits.range for joint in joints]
+    """(n,) the least and (n,) the most of each joint [rad or m], soft limits kept; infinite where it has no limit."""
+    ranges = [joint.limits.kept for joint in joints]
     return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
 
 

@@ -113,6 +113,16 @@ class JointLimits:
         """`lower` and `upper`, infinite where there is none."""
         return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
 
+    @property
+    def kept(self) -> tuple[float, float]:
+        """The `range` within the soft limits that act: from beyond these a joint is led back."""
+        lower, upper = self.range
+        soft = self.soft
+        if soft is None or soft.k_position <= 0.0:
+            return lower, upper
+        least, most = lower if soft.lower is None else soft.lower, upper if soft.upper is None else soft.upper
+        return max(lower, least), min(upper, most)
+
     def nearest(self, position: float) -> float:
         """The position within the limits that is nearest to this one."""
         lower, upper = self.range

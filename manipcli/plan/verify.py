@@ -70,9 +70,11 @@ def verify_written(
     """
     for name, value, loc in written:
         joint = robot.joint(name)
-        lower, upper = joint.limits.range
+        lower, upper = joint.limits.kept
         if max(lower - value, value - upper) > _POSITION:
-            raise _beyond(name, value, lower, upper, when, loc, joint.meant(value))
+            side = 0 if value < lower else 1
+            kind = "" if joint.limits.kept[side] == joint.limits.range[side] else "soft "
+            raise _beyond(name, value, lower, upper, when, loc, joint.meant(value), kind)
 
 
 def _beyond(
@@ -83,10 +85,12 @@ def _beyond(
     when: str,
     loc: tuple[str | int, ...] = (),
     hint: str | None = None,
+    kind: str = "",
 ) -> NotPlannable:
     word, limit = ("lower", lower) if value < lower else ("upper", upper)
     there, most = told_apart(value, limit, form=".4f")
-    return NotPlannable(f"joint '{name}' goes to {there}{when}, beyond its {word} limit {most}", hint=hint, loc=loc)
+    message = f"joint '{name}' goes to {there}{when}, beyond its {kind}{word} limit {most}"
+    return NotPlannable(message, hint=hint, loc=loc)
 
 
 def overshoot(trajectory: JointTrajectory, limits: MotionLimits) -> Array:

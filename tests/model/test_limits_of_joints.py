@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,21 @@ def limits_of(folder: Path, text: str) -> JointLimits:
 def test_soft_limits_are_those_of_the_safety_controller(tmp_path: Path) -> None:
     assert limits_of(tmp_path, description(LIMIT + SAFETY)).soft == SOFT
     assert limits_of(tmp_path, description()).soft is None
+
+
+@pytest.mark.parametrize(
+    ("limits", "kept"),
+    [
+        (JointLimits(-1.0, 2.0, soft=SOFT), (-0.8, 1.8)),
+        (JointLimits(-1.0, 2.0), (-1.0, 2.0)),
+        (JointLimits(-1.0, 2.0, soft=SoftLimits(-0.8, 1.8, k_velocity=5.0)), (-1.0, 2.0)),  # they do not act
+        (JointLimits(-1.0, 2.0, soft=SoftLimits(None, 1.8, 20.0)), (-1.0, 1.8)),
+        (JointLimits(-1.0, 2.0, soft=SoftLimits(-3.0, 3.0, 20.0)), (-1.0, 2.0)),
+        (JointLimits(soft=SoftLimits(None, 1.8, 20.0)), (-math.inf, 1.8)),
+    ],
+)
+def test_a_joint_is_kept_within_the_soft_limits_that_act(limits: JointLimits, kept: tuple[float, float]) -> None:
+    assert limits.kept == kept
 
 
 @pytest.mark.parametrize(

@@ -110,6 +110,12 @@ def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:
     assert slow.duration > 1.2 * fast.duration
 
 
+def test_a_soft_limit_is_planned_for(bench: Make) -> None:
+    """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973: from beyond it is led back."""
+    refusal = bench("panda").refused("move", {"to": {"panda_joint1": 2.95}})
+    assert refusal.cause == "joint 'panda_joint1' goes to 2.9500, beyond its soft upper limit 2.8973"
+
+
 @pytest.mark.slow
 def test_a_move_past_a_limit_names_joint_value_and_limit(bench: Make) -> None:
     refusal = bench().refused("move", {"to": {"joint_4": 3.0}})
