@@ -16,13 +16,12 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.rows import MESSAGE_HEAD, MESSAGE_OPCODE
 
 Int = npt.NDArray[np.int64]
-_HEAD = struct.Struct("<BQHIQQ")
-_MESSAGE = 0x05
 _MAX_OTHERS = 8192
 """Schemas and channels in a chunk."""
-PAYLOAD = _HEAD.size
+PAYLOAD = MESSAGE_HEAD.size
 """From the beginning of a message record to its CDR bytes."""
 
 
@@ -70,7 +69,7 @@ def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
     at = entries[:, 1].astype(np.int64)
     lengths = _every(data, "<u8")[at + 1]
     fits = (
-        (np.frombuffer(data, dtype=np.uint8)[at] == _MESSAGE)
+        (np.frombuffer(data, dtype=np.uint8)[at] == MESSAGE_OPCODE)
         & (lengths >= PAYLOAD - 9)
         & (lengths <= size)
         & (_every(data, "<u2")[at + 9] == channel)
@@ -95,10 +94,10 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
             raise CdrError("ends too early")
         opcode, length = struct.unpack_from("<BQ", data, offset)
         end = offset + 9 + length
-        if end > len(data) or (opcode == _MESSAGE and length < PAYLOAD - 9):
+        if end > len(data) or (opcode == MESSAGE_OPCODE and length < PAYLOAD - 9):
             raise CdrError("ends too early")
-        if opcode == _MESSAGE:
-            _, _, channel, _, time, _ = _HEAD.unpack_from(data, offset)
+        if opcode == MESSAGE_OPCODE:
+            _, _, channel, _, time, _ = MESSAGE_HEAD.unpack_from(data, offset)
             rows.setdefault(channel, []).append((min(time, 2**63 - 1), offset + PAYLOAD, length - (PAYLOAD - 9)))
         elif opcode == 0 or len(others) == _MAX_OTHERS:
             raise CdrError("holds too much that is no message")

@@ -24,13 +24,13 @@ from manipcli.spec.controllers import Interface
 
 Times = npt.NDArray[np.int64]
 Field = npt.NDArray[np.number]
-RECORD_HEAD = struct.Struct("<BQHIQQ")
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")
 MESSAGE_OPCODE = 5
 
 
 def message_record(channel: int, sequence: int, ns: int, data: bytes) -> bytes:
     """One MCAP message record; log time and publish time are both `ns`."""
-    return RECORD_HEAD.pack(MESSAGE_OPCODE, 22 + len(data), channel, sequence, ns, ns) + data
+    return MESSAGE_HEAD.pack(MESSAGE_OPCODE, 22 + len(data), channel, sequence, ns, ns) + data
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class RowBlock:
         for template, start in zip(templates, self.starts, strict=True):
             self._sequences.append(self._field("<u4", start + 11))
             self._times += [self._field("<u8", start + 15), self._field("<u8", start + 23)]
-            payload = start + RECORD_HEAD.size
+            payload = start + MESSAGE_HEAD.size
             for stamp in template.stamps:
                 self._stamps.append((self._field("<i4", payload + stamp), self._field("<u4", payload + stamp + 4)))
             for offset, count in template.runs:

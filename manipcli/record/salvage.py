@@ -27,11 +27,13 @@ from manipcli.record.scan import (
     CHANNEL,
     CHUNK,
     DATA_END,
+    FOOTER_RECORD,
     HEADER,
     MAX_NAMED,
     MAX_RECORD,
     MESSAGE,
     METADATA,
+    RECORD_HEAD,
     SCHEMA,
     Record,
     is_finished,
@@ -57,12 +59,10 @@ _WORDS = {
     ATTACHMENT: "attachment",
     METADATA: "metadata record",
 }
-_HEAD = struct.Struct("<BQ")
 _WINDOW = 1 << 22
-_FOOTER = struct.Struct("<BQQQI")
 _CHUNK_MARKS = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
 """Name of the compression with its length, 28 bytes behind the body of a chunk begins."""
-_MARK_AT = _HEAD.size + 28
+_MARK_AT = RECORD_HEAD.size + 28
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,11 +159,11 @@ class Salvage:
                 return
             fault = ""
             if record is not None:
-                head = _HEAD.pack(record.opcode, len(record.body))
+                head = RECORD_HEAD.pack(record.opcode, len(record.body))
                 self._crc = zlib.crc32(record.body, zlib.crc32(head, self._crc))
                 try:
                     if record.opcode == MESSAGE:
-                        if len(record.body) < PAYLOAD - _HEAD.size:
+                        if len(record.body) < PAYLOAD - RECORD_HEAD.size:
                             raise CdrError("a message")
                         loose += head + record.body
                         if len(loose) >= LOOSE:
@@ -243,9 +243,9 @@ class Salvage:
 def _record_at(file: BinaryIO, offset: int, size: int) -> Record | None:
     """The record that begins there; None where none fits."""
     file.seek(offset)
-    head = file.read(_HEAD.size)
-    opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-    if not 0 < opcode <= _LAST_OPCODE or length > MAX_RECORD or offset + _HEAD.size + length > size:
+    head = file.read(RECORD_HEAD.size)
+    opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+    if not 0 < opcode <= _LAST_OPCODE or length > MAX_RECORD or offset + RECORD_HEAD.size + length > size:
         return None
     body = file.read(length)
     return Record(opcode, offset, body) if len(body) == length else None
@@ -273,9 +273,9 @@ def _next_chunk(file: BinaryIO, offset: int, size: int) -> int | None:
 def _is_chunk(file: BinaryIO, start: int, size: int) -> bool:
     """Whether the lengths of a chunk that begins at `start`, in the file and in itself, agree."""
     file.seek(start)
-    head = file.read(_HEAD.size + 48)
-    opcode, length = _HEAD.unpack_from(head) if len(head) == _HEAD.size + 48 else (0, 0)
-    if opcode != CHUNK or length > MAX_RECORD or start + _HEAD.size + length > size:
+    head = file.read(RECORD_HEAD.size + 48)
+    opcode, length = RECORD_HEAD.unpack_from(head) if len(head) == RECORD_HEAD.size + 48 else (0, 0)
+    if opcode != CHUNK or length > MAX_RECORD or start + RECORD_HEAD.size + length > size:
         return False
     (name,) = struct.unpack_from("<I", head, _MARK_AT)
     (packed,) = struct.unpack_from("<Q", head, _MARK_AT + 4 + name)
@@ -313,7 +313,7 @@ def _declaration(record: Record) -> Declared:
             raise CdrError(name)
         again = again[:-4]
     # The library takes what is there where less is there than a length says. Later versions of the format may append.
-    if not record.body.startswith(again[_HEAD.size :]):
+    if not record.body.startswith(again[RECORD_HEAD.size :]):
         raise CdrError(name)
     return read
 
@@ -324,13 +324,13 @@ def _index(file: BinaryIO, size: int) -> Index:
     from mcap.data_stream import ReadDataStream
     from mcap.exceptions import McapError
 
-    file.seek(size - len(MAGIC) - _FOOTER.size)
-    start, crc = _FOOTER.unpack(file.read(_FOOTER.size))[2:5:2]
-    length = size - len(MAGIC) - _FOOTER.size - start
+    file.seek(size - len(MAGIC) - FOOTER_RECORD.size)
+    start, crc = FOOTER_RECORD.unpack(file.read(FOOTER_RECORD.size))[2:5:2]
+    length = size - len(MAGIC) - FOOTER_RECORD.size - start
     if start == 0 or not 0 < length <= MAX_RECORD:
         return Index()
     file.seek(start)
-    summary = file.read(length + _FOOTER.size)
+    summary = file.read(length + FOOTER_RECORD.size)
     if crc not in (0, zlib.crc32(summary[:-4])):
         return Index()
     offsets: list[int] = []
@@ -339,9 +339,9 @@ def _index(file: BinaryIO, size: int) -> Index:
     at = 0
     try:
         while at < length:
-            opcode, size_of = _HEAD.unpack_from(summary, at)
-            body = summary[at + _HEAD.size : at + _HEAD.size + size_of]
-            at += _HEAD.size + size_of
+            opcode, size_of = RECORD_HEAD.unpack_from(summary, at)
+            body = summary[at + RECORD_HEAD.size : at + RECORD_HEAD.size + size_of]
+            at += RECORD_HEAD.size + size_of
             stream = ReadDataStream(BytesIO(body))
             if opcode == SCHEMA:
                 declared.append(records.Schema.read(stream))

@@ -32,9 +32,10 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, META
 _NO_CRC = bytes(4)
 """How other writers say that they made no checksum; ours always make one."""
 _FIRST_OPCODE, _LAST_OPCODE = 0x01, 0x7F
-_HEAD = struct.Struct("<BQ")
+RECORD_HEAD = struct.Struct("<BQ")
+"""Opcode and length of what follows."""
 _CHUNK_HEAD = struct.Struct("<QQQI")
-_FOOTER = struct.Struct("<BQQQI")
+FOOTER_RECORD = struct.Struct("<BQQQI")
 
 R = TypeVar("R")
 
@@ -50,7 +51,7 @@ class Record:
     @property
     def end(self) -> int:
         """Where the next record begins."""
-        return self.offset + _HEAD.size + len(self.body)
+        return self.offset + RECORD_HEAD.size + len(self.body)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +90,10 @@ class Scan:
         crc = zlib.crc32(start)
         offset = len(MAGIC)
         while offset < size:
-            head = file.read(_HEAD.size)
-            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-            end = offset + _HEAD.size + length
-            if len(head) == _HEAD.size and length > MAX_RECORD:
+            head = file.read(RECORD_HEAD.size)
+            opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+            end = offset + RECORD_HEAD.size + length
+            if len(head) == RECORD_HEAD.size and length > MAX_RECORD:
                 raise BadRecording(self.path, f"the record at byte {offset} is said to be {length} bytes long")
             if not _FIRST_OPCODE <= opcode <= _LAST_OPCODE or end > size:
                 self._cut(offset, finished=finished)
@@ -126,9 +127,9 @@ class Scan:
         if size - start > MAX_RECORD:
             raise BadRecording(self.path, "its summary is too large")
         rest = file.read(size - start)
-        footer = len(rest) - len(MAGIC) - _FOOTER.size
-        summary_start, crc = _FOOTER.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
-        if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + _FOOTER.size - 4])):
+        footer = len(rest) - len(MAGIC) - FOOTER_RECORD.size
+        summary_start, crc = FOOTER_RECORD.unpack_from(rest, footer)[2:5:2] if footer >= 0 else (0, 0)
+        if summary_start not in (0, start) or crc not in (0, zlib.crc32(rest[: footer + FOOTER_RECORD.size - 4])):
             raise BadRecording(self.path, "the checksum of its summary does not match: it was changed", hint=REPAIRABLE)
 
 
@@ -148,12 +149,12 @@ def open_regular(path: Path) -> BinaryIO:
 
 def is_finished(file: BinaryIO, size: int) -> bool:
     """Whether the file ends with a footer and the magic bytes."""
-    tail = _FOOTER.size + len(MAGIC)
+    tail = FOOTER_RECORD.size + len(MAGIC)
     if size < tail:
         return False
     file.seek(size - tail)
     end = file.read(tail)
-    return end.endswith(MAGIC) and end.startswith(_HEAD.pack(FOOTER, 20))
+    return end.endswith(MAGIC) and end.startswith(RECORD_HEAD.pack(FOOTER, 20))
 
 
 def records_at(path: Path, file: BinaryIO, place: ChunkPlace) -> Iterator[Record]:
@@ -165,10 +166,10 @@ def records_at(path: Path, file: BinaryIO, place: ChunkPlace) -> Iterator[Record
     file.seek(place.start)
     offset = place.start
     while offset < place.end:
-        head = file.read(_HEAD.size)
-        opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, 0)
-        body = file.read(length) if length <= place.end - offset - _HEAD.size else b""
-        if len(head) < _HEAD.size or len(body) < length or (opcode == CHUNK) != (offset == place.start):
+        head = file.read(RECORD_HEAD.size)
+        opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+        body = file.read(length) if length <= place.end - offset - RECORD_HEAD.size else b""
+        if len(head) < RECORD_HEAD.size or len(body) < length or (opcode == CHUNK) != (offset == place.start):
             raise BadRecording(path, "changed while it was read")
         record = Record(opcode, offset, body)
         yield record

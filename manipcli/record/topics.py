@@ -20,6 +20,7 @@ from manipcli.record.faults import BadRecording
 from manipcli.record.scan import (
     CHANNEL,
     CHUNK,
+    MAX_NAMED,
     MESSAGE,
     MESSAGE_INDEX,
     SCHEMA,
@@ -32,8 +33,6 @@ from manipcli.record.scan import (
     records_at,
 )
 
-MAX_NAMED = 4096
-"""Channels and schemas in one file."""
 RUN = 1 << 22
 """[byte] Messages outside chunks are taken together up to this."""
 
