@@ -11,6 +11,7 @@ import numpy.typing as npt
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform
 from manipcli.flow.log import URDF
+from manipcli.model.moments import ROUNDING
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
@@ -23,9 +24,6 @@ from manipcli.record.snapshot import snapshot
 from manipcli.record.units import joint_units
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 
-_ROUNDING = 0.5e-9
-"""[s] Recorded times are whole nanoseconds."""
-
 
 def moment(path: Path, time: float) -> Moment:
     """What a log says of `time` [s from its beginning].
@@ -34,7 +32,7 @@ def moment(path: Path, time: float) -> Moment:
         InvalidInput: the file is no log, is damaged, or ends before.
     """
     found = inventory(path)
-    if not 0.0 <= time <= found.duration + _ROUNDING:
+    if not 0.0 <= time <= found.duration + ROUNDING:
         message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
         raise InvalidInput([Finding("LOG110", message)])
     if RECORD not in found.metadata:
@@ -56,7 +54,7 @@ def _ours(path: Path, time: float) -> Moment:
     now = float(states.time[k])
     references: dict[str, float] = {}
     for trace in span.controllers:
-        row = int(np.searchsorted(trace.times, now + _ROUNDING, side="right")) - 1
+        row = int(np.searchsorted(trace.times, now + ROUNDING, side="right")) - 1
         if row >= 0:
             references |= dict(zip(trace.joints, trace.reference_position[row].tolist(), strict=True))
     units = joint_units(recording.attachments.get(URDF, b""))
@@ -105,12 +103,12 @@ def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Con
         if not len(span.states.time):
             continue
         end = float(span.states.time[-1])
-        if span.states.time[0] > time + _ROUNDING:
+        if span.states.time[0] > time + ROUNDING:
             continue
         chosen = span
-        k = int(np.searchsorted(span.states.time, time + _ROUNDING, side="right")) - 1
+        k = int(np.searchsorted(span.states.time, time + ROUNDING, side="right")) - 1
         for change in span.contacts:
-            if change.time <= time + _ROUNDING:
+            if change.time <= time + ROUNDING:
                 touched = change.contacts
     return chosen, k, touched, end
 
@@ -120,7 +118,7 @@ def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, 
     step: TaskEvent | None = None
     phase = ""
     for event in events:
-        if event.time > time + _ROUNDING:
+        if event.time > time + ROUNDING:
             break
         if event.kind == "step_started":
             step, phase = event, ""

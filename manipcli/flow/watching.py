@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.flow.live import Live, Probe
-from manipcli.judge.expectation import ROUNDING, labels
-from manipcli.model.moments import Moments
+from manipcli.judge.expectation import labels
+from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import Reading, never
 from manipcli.spec.condition import ExpectationSpec, WatchSpec
 

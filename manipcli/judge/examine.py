@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from manipcli.core.geometry import Array
-from manipcli.judge.expectation import Expected, Seams, labels, outcome
+from manipcli.judge.expectation import Expected, labels, outcome
 from manipcli.judge.moments import MomentsOfSpans, Order, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import World
+from manipcli.model.formula import Seams
 from manipcli.model.reading import NotEvaluated
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene

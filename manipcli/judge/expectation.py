@@ -9,30 +9,22 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from manipcli.core.errors import Loc
-from manipcli.core.registry import Seam
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
-from manipcli.model.condition import Condition, Problem, Setting, World
+from manipcli.model.condition import Problem, Setting, World
 from manipcli.model.conditions.step_done import StepDoneSpec
-from manipcli.model.formula import absent, opened, problems, scopes
-from manipcli.model.moments import Moments
+from manipcli.model.formula import Seams, absent, opened, problems, scopes
+from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import EDGE, Extreme, Measured, NotEvaluated, Reading, never
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
 """How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
-
-ROUNDING = 0.5e-9
-"""[s] Recorded times are whole nanoseconds."""
-
-# Any: a seam holds members of different specs; each is only ever called with its own.
-Seams = Seam[Condition[Any]]
 
 
 @dataclass(frozen=True, slots=True)

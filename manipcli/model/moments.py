@@ -15,6 +15,9 @@ import numpy.typing as npt
 from manipcli.core.geometry import Array, quat_product
 from manipcli.model.state import Contact, WorldState
 
+ROUNDING = 0.5e-9
+"""[s] Recorded times are whole nanoseconds: two that differ by no more are the same."""
+
 
 @dataclass(frozen=True, slots=True)
 class Reference:

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Array, quat_product, rotate, rotate_inverse
+from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
@@ -25,8 +26,6 @@ BRIDGED = 0.05
 SHORTEST = 0.1
 """[s] of a hold, and of a time without support."""
 ROBOT = "robot/"
-_ROUNDING = 0.5e-9
-"""[s] Recorded times are whole nanoseconds."""
 
 Ending = Literal["set down", "lost", "let go", "held to the end"]
 
@@ -120,7 +119,7 @@ def _hold(
     name: str, begin: float, stop: float, free: Sequence[tuple[float, float]], events: Sequence[TaskEvent], end: float
 ) -> Hold:
     carried = [(max(a, begin), min(b, stop)) for a, b in free if min(b, stop) - max(a, begin) >= SHORTEST]
-    boundaries = [event.time for event in events if begin - _ROUNDING <= event.time <= stop]
+    boundaries = [event.time for event in events if begin - ROUNDING <= event.time <= stop]
     if not carried:
         grasped = min(boundaries, default=begin)
         return Hold(name, grasped, None, stop, "held to the end" if stop >= end else "let go")
@@ -195,7 +194,7 @@ class HoldMeter:
         for snapshot in span.contacts:
             self._contacts(snapshot)
         times = span.states.time
-        mine = np.flatnonzero((times >= self._hold.grasped - _ROUNDING) & (times <= self._hold.until + _ROUNDING))
+        mine = np.flatnonzero((times >= self._hold.grasped - ROUNDING) & (times <= self._hold.until + ROUNDING))
         tool = self._robot.tool
         if not len(mine) or tool is None:
             return

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.model.condition import Condition, Gauge, World
-from manipcli.model.moments import Moments
+from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Time
@@ -35,7 +35,7 @@ def gauge(spec: TimeTakenSpec, world: World) -> Gauge:
         for step in moments.steps:
             if step.started is not None:
                 ended = np.inf if step.ended is None else step.ended
-                inside = (moments.times >= step.started - 0.5e-9) & (moments.times < ended - 0.5e-9)
+                inside = (moments.times >= step.started - ROUNDING) & (moments.times < ended - ROUNDING)
                 until[inside] = np.minimum(moments.times[inside] + world.period, ended)
         passed = np.round(until - started[0], 9)
 

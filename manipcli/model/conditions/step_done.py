@@ -7,7 +7,7 @@ from pydantic import Field
 
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World
-from manipcli.model.moments import Moments
+from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.spec.base import Model
 
@@ -25,11 +25,11 @@ def gauge(spec: StepDoneSpec, world: World) -> Gauge:
         step = next(one for one in moments.steps if one.id == spec.step)
         done = step.outcome == "done" and step.ended is not None
         since = step.ended if done and step.ended is not None else np.inf
-        margins = np.where(moments.times >= since - 0.5e-9, 1.0, -1.0)
+        margins = np.where(moments.times >= since - ROUNDING, 1.0, -1.0)
 
         def ahead(k: int) -> bool:
             """Whether it ended, and after this tick."""
-            return step.ended is not None and step.ended - 0.5e-9 > moments.times[k]
+            return step.ended is not None and step.ended - ROUNDING > moments.times[k]
 
         def say(k: int) -> str:
             ran = step.outcome or ("not run" if step.started is None else "not ended")
