@@ -8,10 +8,11 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
-from manipcli.control.pid import AntiWindup, Compat, Pid
+from manipcli.control.pid import AntiWindup, Pid
 from manipcli.core.errors import InvalidArgument, Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
+from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface
 
 

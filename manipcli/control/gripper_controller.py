@@ -12,9 +12,9 @@ import numpy.typing as npt
 from manipcli.control.action import ErrorCode, Feedback, FingerStop, GoalHandle, GripperGoal
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct, refuse_not_finite
 from manipcli.control.gains import build_pid, joint_gains
-from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface, Role
 
 REACHED = 1e-9

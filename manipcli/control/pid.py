@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.model.transmission import Compat
 
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
-Compat = Literal["ros1", "ros2"]
 
 
 class Pid:

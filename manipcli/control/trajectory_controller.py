@@ -15,7 +15,6 @@ from manipcli.control.controller import ControllerOutput, FeedForward, JointStat
 from manipcli.control.course import POSITION, Course
 from manipcli.control.followed_goal import FollowedGoal, Then
 from manipcli.control.gains import build_pid, joint_gains
-from manipcli.control.pid import Compat
 from manipcli.control.reference import Feeds, Reference
 from manipcli.control.tolerances import Tolerances
 from manipcli.control.trajectory_goal import (
@@ -31,6 +30,7 @@ from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.robot import JointLimits, JointType
+from manipcli.model.transmission import Compat
 from manipcli.plan.trajectory import Interpolation, JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
 

@@ -29,7 +29,7 @@ from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.flow.doubt import Doubt
-from manipcli.flow.drives import drive_doubts, driven_joints
+from manipcli.flow.drives import RINGING, drive_doubts, driven_joints
 from manipcli.flow.grips import strained, too_light, too_soft, too_swift
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan, plan_task, start_position
@@ -46,8 +46,6 @@ PER_MOTION: Final = 12
 """Postures that are looked at of each planned motion."""
 TOGETHER: Final = 16
 """Postures at which all loops are looked at together: those in which they are tightest."""
-RINGING: Final = 0.5
-"""A pole that changes its sign every tick may be no larger."""
 SWINGING: Final = 0.1
 """The least damping ratio that passes without a word: it overshoots by 73 %."""
 

@@ -23,6 +23,7 @@ from manipcli.replay.shots import Shots, telling
 from manipcli.report.facts import run_facts
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+from manipcli.report.text import STEP_WORDS
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task as load_spec
 from manipcli.spec.load import load_task_text
@@ -189,7 +190,7 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
         if step.outcome not in ("done", "not_run") and not step.tolerated:
             at = None if end is None else step.ended if step.ended is not None else end
             tries = f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
-            title = f"step '{step.id}' {_STEP_WORDS[step.outcome]}{tries}"
+            title = f"step '{step.id}' {STEP_WORDS[step.outcome]}{tries}"
             causes.append(Cause(title, step.text, at, written, hint))
             hint = ""
     for one, written in zip(verdict.expectations, places[1], strict=False):
@@ -199,9 +200,6 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
     if verdict.verdict == "failed" and not failing and _before_or_after(verdict):
         causes.insert(0, Cause(verdict.text, "", end))
     return tuple(causes)
-
-
-_STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
 
 
 def _missed(one: ExpectationOutcome) -> str:

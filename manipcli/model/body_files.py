@@ -14,12 +14,11 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.body_shapes import COLORS, BodyShape, Rgba
 from manipcli.model.coal_shape import coal_shape
 from manipcli.model.description import read_description
+from manipcli.model.mesh import SUFFIXES
 from manipcli.model.packages import Packages
 from manipcli.model.robot import Geometry, Inertial, Mesh
 from manipcli.model.urdf import read_parts
 from manipcli.spec.task import MeshSpec, UrdfSpec
-
-MESH_SUFFIXES = (".stl", ".obj", ".dae")
 
 
 def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
@@ -30,8 +29,8 @@ def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
     Raises:
         ValueError: the file is absent, of another kind, unreadable, or encloses no volume.
     """
-    if path.suffix.lower() not in MESH_SUFFIXES:
-        raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(MESH_SUFFIXES)}")
+    if path.suffix.lower() not in SUFFIXES:
+        raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(SUFFIXES)}")
     if not path.is_file():
         raise ValueError(f"there is no file '{spec.file}'")
     # As it is written; but a path that begins at the root says where things are on this machine.

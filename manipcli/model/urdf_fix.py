@@ -15,9 +15,9 @@ from manipcli.core.text import shorten
 from manipcli.model.description import Description
 from manipcli.model.located_xml import Element
 from manipcli.model.packages import NotFound, Packages
-from manipcli.model.urdf_joint import UNIT_TOLERANCE
 from manipcli.model.urdf_numbers import finite
 from manipcli.model.urdf_schema import known_elements
+from manipcli.spec.robot import UNIT_TOLERANCE
 
 _NAMES: Final = frozenset({"name", "link", "joint", "filename", "type"})
 _TAG: Final = re.compile(r"<[^\s/>]+")

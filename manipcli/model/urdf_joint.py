@@ -15,6 +15,7 @@ from manipcli.core.text import shorten
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import Joint, JointLimits, JointType, Mimic, SoftLimits, TransmissionTag
 from manipcli.model.urdf_numbers import FARTHEST, LARGEST, Reader
+from manipcli.spec.robot import UNIT_TOLERANCE
 
 _TYPES: dict[str, JointType] = {
     "revolute": "revolute",
@@ -26,8 +27,6 @@ _TYPES: dict[str, JointType] = {
 }
 _HELD = frozenset({"floating", "planar"})
 """Types of several degrees of freedom: where such a joint stands, the link is held."""
-UNIT_TOLERANCE = 1e-3
-"""How far the length of an axis may be from 1 without a word."""
 UNBOUNDED: Final = sys.float_info.max
 """Limits of a joint that has none, where URDF asks for some."""
 

@@ -49,13 +49,13 @@ def render_junit(
     skipped = str(sum(case.find("skipped") is not None for case in cases))
     totals = {name: str(count) for name, count in counts.items()} | {"time": _seconds(verdict.simulated_time)}
     suites = Element("testsuites", {"name": "manipcli", **totals})
-    suite = SubElement(suites, "testsuite", {"name": _safe(verdict.task), **totals, "skipped": skipped})
+    suite = SubElement(suites, "testsuite", {"name": safe(verdict.task), **totals, "skipped": skipped})
     properties = SubElement(suite, "properties")
     seed = str(verdict.seed) if verdict.engine else ""  # without an engine the task could not be read
     told = (("verdict", verdict.verdict), ("engine", verdict.engine), ("seed", seed), ("log", log))
     for name, value in told:
         if value:
-            SubElement(properties, "property", {"name": name, "value": _safe(value)})
+            SubElement(properties, "property", {"name": name, "value": safe(value)})
     suite.extend(cases)
     indent(suites)
     text: bytes = tostring(suites, encoding="utf-8", xml_declaration=True)
@@ -65,7 +65,7 @@ def render_junit(
 def _run(verdict: Verdict) -> Element:
     """Whether the run came to its end."""
     place = verdict.errors[0].place if verdict.errors else None
-    where = {"file": _safe(place.file), "line": str(place.line)} if place is not None and place.line > 0 else {}
+    where = {"file": safe(place.file), "line": str(place.line)} if place is not None and place.line > 0 else {}
     case = _case(verdict, "run", "run", verdict.simulated_time, where)
     if verdict.verdict == "error":
         lines = [str(finding) + (f"\nhint: {finding.hint}" if finding.hint else "") for finding in verdict.errors]
@@ -82,7 +82,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
     if step.outcome == "not_run":
         _add(case, "skipped", "not run: the run ended before", "", [])
     elif step.tolerated:
-        SubElement(case, "system-out").text = _safe(f"{step.outcome}, and the task says that it may: {step.text}")
+        SubElement(case, "system-out").text = safe(f"{step.outcome}, and the task says that it may: {step.text}")
     elif step.outcome != "done":
         word = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}[step.outcome]
         when = "" if step.ended is None else f"at {step.ended:.3f} s"
@@ -105,7 +105,7 @@ def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str
         message = f"expectation '{one.name}' was never evaluated: {one.text}"
         _add(case, "skipped" if excused else "failure", message, "not_evaluated", [])
     elif margin:
-        SubElement(case, "system-out").text = _safe(", ".join(part for part in (margin, when, one.text) if part))
+        SubElement(case, "system-out").text = safe(", ".join(part for part in (margin, when, one.text) if part))
     return case
 
 
@@ -122,15 +122,15 @@ def _unmet(verdict: Verdict) -> bool:
 
 
 def _case(verdict: Verdict, kind: str, name: str, time: float, attributes: dict[str, str]) -> Element:
-    words = {"classname": _safe(f"{verdict.task}.{kind}"), "name": _safe(name), "time": _seconds(time)}
+    words = {"classname": safe(f"{verdict.task}.{kind}"), "name": safe(name), "time": _seconds(time)}
     return Element("testcase", words | attributes)
 
 
 def _add(case: Element, kind: str, message: str, type_: str, lines: Sequence[str]) -> None:
-    words = {"message": _safe(message)} | ({"type": type_} if kind != "skipped" else {})
+    words = {"message": safe(message)} | ({"type": type_} if kind != "skipped" else {})
     told = SubElement(case, kind, words)
     if kind != "skipped":
-        told.text = "\n".join(_safe(line) for part in (message, *lines) for line in part.split("\n") if line)
+        told.text = "\n".join(safe(line) for part in (message, *lines) for line in part.split("\n") if line)
 
 
 def _attributes(written: Written, file: str) -> dict[str, str]:
@@ -138,13 +138,13 @@ def _attributes(written: Written, file: str) -> dict[str, str]:
     name, _, line = written.place.rpartition(":")
     if not line.isdecimal():
         return {}
-    return {"file": _safe(file or name), "line": line}
+    return {"file": safe(file or name), "line": line}
 
 
 def _seconds(time: float) -> str:
     return f"{time:.3f}"
 
 
-def _safe(text: str) -> str:
+def safe(text: str) -> str:
     """Without the characters that XML has no way to write."""
     return _NO_XML.sub("\ufffd", escape(text))

@@ -8,14 +8,9 @@ from dataclasses import dataclass
 from manipcli.core.geometry import Transform
 from manipcli.model.state import Contact
 from manipcli.report.json import Json, dumps, number
+from manipcli.report.quantity import CUSTOMARY
 from manipcli.report.table import table
 
-_CUSTOMARY = {
-    "rad": ("deg", math.degrees(1.0)),
-    "rad/s": ("deg/s", math.degrees(1.0)),
-    "m": ("mm", 1000.0),
-    "m/s": ("mm/s", 1000.0),
-}
 _HUGE = 1e9
 _RATE = {"rad": "rad/s", "m": "m/s"}
 _EFFORT = {"rad": "N m", "m": "N"}
@@ -180,7 +175,7 @@ def _shown(value: float | None, unit: str) -> str:
     """In the customary unit, with as many digits as its column: what is nearly nothing reads as zero."""
     if value is None:
         return ""
-    name, scale = _CUSTOMARY.get(unit, (unit, 1.0))
+    name, scale = CUSTOMARY.get(unit, (unit, 1.0))
     return f"{_fixed(scale * value, 3)} {name}".rstrip()
 
 

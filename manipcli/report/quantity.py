@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-_CUSTOMARY = {
+CUSTOMARY = {
     "m": ("mm", 1e3),
     "rad": ("deg", 180.0 / math.pi),
     "rad/s": ("deg/s", 180.0 / math.pi),
@@ -19,7 +19,7 @@ def quantity(value: float, unit: str) -> str:
     """
     if not math.isfinite(value):
         return "unlimited" if value > 0 else str(value)
-    name, scale = (unit, 1.0) if unit == "m" and abs(value) >= 1.0 else _CUSTOMARY.get(unit, (unit, 1.0))
+    name, scale = (unit, 1.0) if unit == "m" and abs(value) >= 1.0 else CUSTOMARY.get(unit, (unit, 1.0))
     number = value * scale
     size = abs(number)
     digits = f"{number:.0f}" if size >= 100 else f"{number:.1f}" if size >= 1 else f"{number:z.2g}"

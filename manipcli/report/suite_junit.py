@@ -6,15 +6,13 @@ took.
 
 from __future__ import annotations
 
-import re
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
-from manipcli.core.text import escape
+from manipcli.report.junit import safe
 from manipcli.report.suite import Case, CaseReport, Suite
 from manipcli.report.suite_text import beforehand
 
 COUNTED = ("tests", "failures", "errors", "skipped")
-_NO_XML = re.compile("[\ufffe\uffff]")
 
 
 def render_junit(suite: Suite) -> bytes:
@@ -23,7 +21,7 @@ def render_junit(suite: Suite) -> bytes:
     for report in suite.reports:
         found = fromstring(report.junit).findall("testsuite") if report.junit else [_without_verdict(report)]
         for one in found:
-            one.set("name", _safe(report.case.id))
+            one.set("name", safe(report.case.id))
             if report.outcome == "failed" and report.run is not None and report.run.verdict.verdict == "passed":
                 _add_baseline(one, report)
             _add_properties(one, report)
@@ -33,9 +31,9 @@ def render_junit(suite: Suite) -> bytes:
                 if report.case.sample is not None:
                     case.set("classname", f"{case.get('classname', '')}.sample_{report.case.sample}")
                 for told in (*case.iter("failure"), *case.iter("error")):
-                    told.text = "\n".join([told.text or "", *map(_safe, beforehand(report))])
+                    told.text = "\n".join([told.text or "", *map(safe, beforehand(report))])
             if not report.passed:
-                SubElement(one, "system-out").text = _safe(f"again: {report.command}")
+                SubElement(one, "system-out").text = safe(f"again: {report.command}")
             root.append(one)
     root.extend(_undone(suite, case) for case in suite.undone)
     for count in COUNTED[:-1]:  # a root counts no skipped ones
@@ -60,16 +58,16 @@ def _add_properties(suite: Element, report: CaseReport) -> None:
         properties = Element("properties")
         suite.insert(0, properties)
     for name, value in told.items():
-        SubElement(properties, "property", {"name": name, "value": _safe(value)})
+        SubElement(properties, "property", {"name": name, "value": safe(value)})
 
 
 def _add_baseline(suite: Element, report: CaseReport) -> None:
     """A run that passed, and is worse than its baseline: the case `baseline`, which fails."""
-    words = {"classname": _safe(f"{report.case.task}.baseline"), "name": "baseline", "time": "0.000"}
+    words = {"classname": safe(f"{report.case.task}.baseline"), "name": "baseline", "time": "0.000"}
     failure = SubElement(SubElement(suite, "testcase", words), "failure")
     failure.set("type", "baseline")
-    failure.set("message", _safe(report.text))
-    failure.text = "\n".join(_safe(f"{one.place}: {one.message}") for one in report.troubles)
+    failure.set("message", safe(report.text))
+    failure.text = "\n".join(safe(f"{one.place}: {one.message}") for one in report.troubles)
     for count in ("tests", "failures"):
         suite.set(count, str(int(suite.get(count, "0")) + 1))
 
@@ -79,17 +77,15 @@ def _without_verdict(report: CaseReport) -> Element:
     counts = dict.fromkeys(COUNTED, "0") | {"tests": "1", "errors": "1", "time": "0.000"}
     one = Element("testsuite", counts)
     place = report.troubles[0].place if report.troubles else None
-    words = {"classname": _safe(f"{report.case.task}.run"), "name": "run", "time": "0.000"}
+    words = {"classname": safe(f"{report.case.task}.run"), "name": "run", "time": "0.000"}
     if place is not None and place.line > 0:
-        words |= {"file": _safe(place.file), "line": str(place.line)}
+        words |= {"file": safe(place.file), "line": str(place.line)}
     else:  # a word of the command line is no file
-        words["file"] = _safe(report.case.file)
+        words["file"] = safe(report.case.file)
     error = SubElement(SubElement(one, "testcase", words), "error")
     error.set("type", report.outcome)
-    error.set("message", _safe(report.text))
-    error.text = "\n".join(
-        _safe(f"{one.place}: {one.message}" if one.place else one.message) for one in report.troubles
-    )
+    error.set("message", safe(report.text))
+    error.text = "\n".join(safe(f"{one.place}: {one.message}" if one.place else one.message) for one in report.troubles)
     return one
 
 
@@ -97,14 +93,9 @@ def _undone(suite: Suite, case: Case) -> Element:
     """A case that was not run, or not to its end: an error where somebody interrupted, else skipped."""
     kind, count = ("error", "errors") if suite.stopped == "interrupted" else ("skipped", "skipped")
     counts = dict.fromkeys(COUNTED, "0") | {"tests": "1", count: "1", "time": "0.000"}
-    one = Element("testsuite", {"name": _safe(case.id), **counts})
-    words = {"classname": _safe(f"{case.task}.run"), "name": "run", "time": "0.000", "file": _safe(case.file)}
+    one = Element("testsuite", {"name": safe(case.id), **counts})
+    words = {"classname": safe(f"{case.task}.run"), "name": "run", "time": "0.000", "file": safe(case.file)}
     told = SubElement(SubElement(one, "testcase", words), kind, {"message": f"not run to its end: {suite.stopped}"})
     if kind == "error":
         told.set("type", suite.stopped)
     return one
-
-
-def _safe(text: str) -> str:
-    """Without the characters that XML has no way to write."""
-    return _NO_XML.sub("\ufffd", escape(text))

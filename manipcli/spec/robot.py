@@ -40,7 +40,8 @@ Version = Annotated[
 ]
 Arguments = dict[str, str | int | float | bool]
 
-_UNIT_TOLERANCE = 1e-3
+UNIT_TOLERANCE = 1e-3
+"""How far the length of an axis or of a quaternion may be from 1 without a word."""
 
 
 class PoseSpec(Model):
@@ -62,7 +63,7 @@ class PoseSpec(Model):
             message = "the rotation is said twice: by rpy and by quat_xyzw"
             raise problem("conflict", message, at=("quat_xyzw",), key=True)
         norm = math.sqrt(sum(q * q for q in self.quat_xyzw))
-        if abs(norm - 1.0) > _UNIT_TOLERANCE:
+        if abs(norm - 1.0) > UNIT_TOLERANCE:
             hint = "the order is x, y, z, w: no rotation is [0, 0, 0, 1]"
             raise problem("range", f"not a unit quaternion: its length is {norm:.6g}", at=("quat_xyzw",), hint=hint)
         return self

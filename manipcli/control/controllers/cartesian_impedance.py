@@ -36,7 +36,6 @@ from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
-from manipcli.control.pid import Compat
 from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, Transform
@@ -44,6 +43,7 @@ from manipcli.core.text import did_you_mean, listed
 from manipcli.model.condition import Problem
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import JointLimits, JointType, RobotModel
+from manipcli.model.transmission import Compat
 from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, Interface, Role

@@ -34,11 +34,11 @@ from manipcli.control.controller import (
 )
 from manipcli.control.controllers.forward_command import finite_values
 from manipcli.control.gains import build_pid, gains_of, strangers
-from manipcli.control.pid import Compat
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
 from manipcli.model.robot import JointType, RobotModel
+from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.other_controllers import PidGainsSpec, PidSpec
 

@@ -8,6 +8,7 @@ from manipcli.model.check import Check, Subject
 from manipcli.model.samples import one_joint
 
 MAX_JOINTS: Final = 127
+"""Moving and fixed; with one more PyBullet's `getJointState` fails, with thousands the process."""
 
 
 def _find(subject: Subject) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from typing import Final
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
+from manipcli.model.checks.too_many_joints import MAX_JOINTS
 from manipcli.model.normalise import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -36,8 +37,6 @@ KNOCK: Final = 1.5
 """A contact point that carries so many times the force of the strongest one, and `KNOCK_LEAST` more, is a knock."""
 KNOCK_LEAST: Final = 1.0
 """[N]"""
-MAX_JOINTS: Final = 127
-"""Moving and fixed; with one more `getJointState` fails, with thousands the process."""
 
 
 class PybulletEngine:
