@@ -94,7 +94,7 @@ def test_of_some_channels_the_others_need_not_be_known() -> None:
 def test_of_one_channel_each_message_is_later_than_the_one_before(
     first: list[int], second: list[int], named: int
 ) -> None:
-    data = bytes(8)
+    data = bytes([0, 1, 0, 0, 0, 0, 0, 0])  # an empty CDR message
     columns = Columns("/x", lambda _: Layout((), ()), (), ())
     with pytest.raises(CdrError, match=f"time runs backwards in /x after t = {named:.3f} s"):
         for times in (first, second):
