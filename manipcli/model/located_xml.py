@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.model.bounds import bounds, raised
+from manipcli.model.xml_fault import told
 
 if TYPE_CHECKING:
     from xml.dom.minidom import Document, Node
@@ -124,11 +125,10 @@ def parse_document(data: bytes, file: str) -> Document:
     try:
         document: Document = builder.parseString(data)
     except expat.ExpatError as error:
-        message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        place = Place(file, error.lineno, error.offset + 1)
+        message, place, hint = told(error, data, file)
         begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
         other = None if begins in (b"<", b"") else "this is no XML; robot, controllers and task files: `manipcli check`"
-        raise invalid("URDF001", message, place, other or _open_element(builder.curNode)) from error
+        raise invalid("URDF001", message, place, other or hint or _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
     return document

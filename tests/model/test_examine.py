@@ -82,6 +82,34 @@ def test_an_element_that_is_never_closed_is_named(tmp_path: Path) -> None:
     assert (found.findings[0].place.line, found.findings[0].hint) == (3, "<link> of line 2 is open")
 
 
+@pytest.mark.parametrize(
+    ("broken", "message", "column", "hint"),
+    [
+        ("<!-- Größe -->".encode("latin-1"), "the byte 0xf6 is not UTF-8", 8, "save it as UTF-8"),
+        (b"<<<<<<< HEAD\n=======\n>>>>>>> other", "a merge conflict is not resolved", 1, "keep one side"),
+        (b'<link name="${1 < 2}"/>', "invalid token", 17, "&lt;"),
+        (b'<link name="a &amp; b"/><link name="a & b"/>', "invalid token", 40, "&amp;"),
+        (b"<!-- a -- b -->", "invalid token", 10, "holds no '--'"),
+        (b"<link name=a/>", "invalid token", 12, "in quotes"),
+        (b"<xacro:arg/>", "unbound prefix 'xacro'", 1, 'xmlns:xacro="http://www.ros.org/wiki/xacro"'),
+        (b"<sensor:ray/>", "unbound prefix 'sensor'", 1, 'xmlns:sensor="..."'),
+        (b'<?xml version="1.0"?>', "not at start", 1, "before '<?xml'"),
+    ],
+)
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_a_common_slip_in_xml_is_told_with_its_remedy(
+    tmp_path: Path, broken: bytes, message: str, column: int, hint: str, end: bytes
+) -> None:
+    text = b'<robot name="r">\n' + broken + b"\n</robot>\n"
+    (finding,) = look(tmp_path, text.replace(b"\n", end), "r.xacro").findings
+    assert finding.code == "URDF001"
+    assert message in finding.message
+    assert finding.place is not None
+    assert finding.place.line == 2
+    assert (finding.place.line, finding.place.column) == (2, column)
+    assert hint in (finding.hint or "")
+
+
 def test_findings_stand_in_the_order_of_the_file_and_once(tmp_path: Path) -> None:
     text = '<robot name="r">\n<link name="a" x="1"/>\n<link name="b" y="1"/>\n<linc/>\n</robot>'
     found = look(tmp_path, text)
