@@ -6,9 +6,10 @@ import struct
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_typestore
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Columns, Layout, Places, indexed, walked
+from manipcli.record.columns import Columns, Layout, Places, indexed, joint_state_layout, walked
 
 HEAD = struct.Struct("<BQHIQQ")
 """MCAP: opcode, length, channel, sequence, log time, publish time; the length counts what follows it."""
@@ -100,3 +101,24 @@ def test_of_one_channel_each_message_is_later_than_the_one_before(
         for times in (first, second):
             at = np.zeros(len(times), dtype=np.int64)
             columns.add(data, Places(np.array(times, dtype=np.int64) * 10**9, at, at + 8))
+
+
+def test_a_message_that_is_cut_takes_nothing_from_the_next() -> None:
+    """Names and counts are those of the others; the last number would lie behind its end."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kinds = store.types
+    stamp = kinds["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
+    header = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+    joint_state = kinds["sensor_msgs/msg/JointState"]
+    message = joint_state(header=header, name=["a"], position=np.ones(1), velocity=np.ones(1), effort=np.full(1, 3.0))
+    one = bytes(store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
+    times, starts = np.array([1, 2, 3]) * 10**9, np.arange(3) * len(one)
+    for lengths, whole in (([0, 0, 0], True), ([0, -8, 0], False), ([0, 0, -1], False), ([-8, -8, -8], False)):
+        columns = Columns("/joint_states", joint_state_layout, ("a",), (1, 1, 1))
+        places = Places(times, starts, np.array(lengths) + len(one))
+        if not whole:
+            with pytest.raises(CdrError, match="ends too early"):
+                columns.add(3 * one, places)
+            continue
+        columns.add(3 * one, places)
+        np.testing.assert_array_equal(columns.take(3)[1][2], np.full((3, 1), 3.0))
