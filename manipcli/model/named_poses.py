@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import Group, Joint, Link, NamedPose
 from manipcli.spec.robot import GroupSpec, RobotSpec
@@ -158,9 +159,7 @@ class _Poses:
             return {}
         return self._checked(name, dict(zip(joints, part, strict=True)), {j: (*loc, k) for k, j in enumerate(joints)})
 
-    def _checked(
-        self, name: str, values: dict[str, float], locs: Mapping[str, tuple[str | int, ...]]
-    ) -> dict[str, float]:
+    def _checked(self, name: str, values: dict[str, float], locs: Mapping[str, Loc]) -> dict[str, float]:
         for joint, value in values.items():
             limits = self._moving[joint].limits
             low = limits.lower is not None and value < limits.lower - LIMIT_TOLERANCE

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manipcli.core.errors import NotPlannable
+from manipcli.core.errors import Loc, NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.core.text import told_apart
 from manipcli.model.robot import RobotModel
@@ -54,7 +54,7 @@ def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: floa
 
 def verify_written(
     robot: RobotModel,
-    written: Sequence[tuple[str, float, tuple[str | int, ...]]],
+    written: Sequence[tuple[str, float, Loc]],
     *,
     when: str = "",
 ) -> None:
@@ -83,7 +83,7 @@ def _beyond(
     lower: float,
     upper: float,
     when: str,
-    loc: tuple[str | int, ...] = (),
+    loc: Loc = (),
     hint: str | None = None,
     kind: str = "",
 ) -> NotPlannable:
