@@ -205,8 +205,12 @@ def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path | None:
     named: str = getattr(task.spec, key)
     found = Path(os.path.normpath(path.parent / named))
     if not found.is_file():
-        hint = load.sibling(found)
-        raise InvalidInput([task.source.finding(231, (key,), f"there is no file '{found}'", hint=hint)])
+        message, hint = f"there is no file '{found}'", None
+        if found.exists():
+            message = f"'{found}' is {'a folder' if found.is_dir() else 'no regular file'}"
+        else:
+            hint = load.sibling(found)
+        raise InvalidInput([task.source.finding(231, (key,), message, hint=hint)])
     return found
 
 

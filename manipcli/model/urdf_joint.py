@@ -139,16 +139,15 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
         hint = '<limit lower="..." upper="..." velocity="..." effort="..."/>'
         reader.report("URDF010", f"joint '{name}' is {kind} and has no <limit>", element.place, hint=hint)
         return JointLimits()
-    lower = reader.number(limit, "lower", 0.0)
-    upper = reader.number(limit, "upper", 0.0)
+    lower, upper = (reader.number(limit, side) if side in limit.attributes else 0.0 for side in ("lower", "upper"))
     for side, other in (("lower", "upper"), ("upper", "lower")):
         if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
             message = f"joint '{name}': the {side} limit is missing; it counts as 0"
             reader.report("URDF036", message, limit.place, hint=f'write {side}="0" if it is', severity="note")
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
-    if kind == "continuous" or (lower == -UNBOUNDED and upper == UNBOUNDED):
+    if kind == "continuous" or lower is None or upper is None or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)
-    if lower is not None and upper is not None and lower > upper:
+    if lower > upper:
         message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"
         reader.report("URDF010", message, limit.place)
         return JointLimits(velocity=velocity, effort=effort)

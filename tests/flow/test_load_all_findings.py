@@ -307,6 +307,18 @@ def test_names_of_the_scene_are_told_where_the_robot_cannot_be_built(tmp_path: P
     ]
 
 
+@pytest.mark.parametrize(("named", "told"), [("/dev/null", "is no regular file"), ("robots", "is a folder")])
+def test_what_is_there_and_no_file_is_not_called_absent(tmp_path: Path, named: str, told: str) -> None:
+    (tmp_path / "robots").mkdir()
+    path = tmp_path / "task.yaml"
+    path.write_text(NO_ROBOT.replace("nowhere.yaml", named))
+    with pytest.raises(InvalidInput) as invalid:
+        load_task(path)
+    (finding,) = (one for one in invalid.value.findings if one.code == "TASK231")
+    assert finding.message.endswith(told)
+    assert finding.hint is None
+
+
 @pytest.mark.parametrize("file", TASKS, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_nothing_is_made_up_where_the_robot_cannot_be_built(tmp_path: Path, file: Path) -> None:
     text = re.sub(r"(?m)^robot: .*$", "robot: nowhere.yaml", file.read_text())

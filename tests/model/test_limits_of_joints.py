@@ -88,6 +88,12 @@ def test_limits_are_needed_by_a_revolute_joint_and_not_by_a_continuous_one(tmp_p
     assert "joint 'j' is revolute and has no <limit>" in error.message
 
 
+@pytest.mark.parametrize("limits", ['lower="-inf" upper="inf"', 'lower="-pi" upper="-1"', 'lower="nan" upper="1"'])
+def test_a_limit_that_is_no_number_is_told_and_nothing_follows_from_it(tmp_path: Path, limits: str) -> None:
+    findings = read(tmp_path, description(f'<limit {limits} velocity="3" effort="4"/>')).findings
+    assert {finding.code for finding in findings} == {"URDF004"}
+
+
 def interface(name: str, low: float | str, high: float | str, more: str = "") -> str:
     bounds = f'<param name="min">{low}</param><param name="max">{high}</param>'
     return f'<command_interface name="{name}">{bounds}{more}</command_interface>'
