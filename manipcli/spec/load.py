@@ -160,18 +160,23 @@ def _task_source(
 
 
 def _taken_twice(source: Source) -> Iterator[Finding]:
-    """Ids that two steps, expectations or watches have: looked for here, so that no other mistake hides them."""
-    for key, named in (("steps", "steps in the log"), ("expect", "expectations"), ("watch", "watches")):
+    """Ids that two steps, or two of expectations and watches, have: looked for here, so that no other mistake hides
+    them."""
+    judged: dict[str, str] = {}
+    for key, named, first in (
+        ("steps", "steps in the log", dict[str, str]()),
+        ("expect", "expectations", judged),
+        ("watch", "watches, beside expectations", judged),
+    ):
         items = child(source.root, key)
-        first: dict[str, int] = {}
         for k, item in enumerate(items.items if isinstance(items, SequenceNode) else ()):
             own = child(item, "id")
             if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
                 continue
             if own.value in first:
-                message = f"the id '{escape(own.value)}' is taken by {key}[{first[own.value]}]"
+                message = f"the id '{escape(own.value)}' is taken by {first[own.value]}"
                 yield source.finding(210, (key, k, "id"), message, hint=f"ids name {named}: give another")
-            first.setdefault(own.value, k)
+            first.setdefault(own.value, f"{key}[{k}]")
 
 
 def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:

@@ -467,6 +467,16 @@ def test_an_id_is_taken_once() -> None:
     assert str(finding).startswith("t.yaml:14:9: error[TASK210]: steps[2].id: the id 'last' is taken by steps[0]")
 
 
+def test_a_watch_has_no_id_of_an_expectation_for_reports_name_both_in_one_list() -> None:
+    near = "{near: {object: cup, to: start, within: 1 m}}"
+    text = "task: t\nrobot: r\ncontrollers: c\nsteps: [{wait: 1 s, id: both}]\n"
+    text += f"expect: [{{always: {near}, id: both}}]\n"
+    text += f"watch: [{{always: {near}, id: both}}, {{always: {near}, id: own}}]\n"
+    finding = only(text)
+    assert finding.message == "watch[0].id: the id 'both' is taken by expect[0]"
+    assert finding.hint == "ids name watches, beside expectations: give another"
+
+
 @pytest.mark.parametrize(
     ("expression", "value"),
     [
