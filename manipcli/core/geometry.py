@@ -96,6 +96,22 @@ def quat_product(a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
     return out
 
 
+def rotation_between(start: Array, end: Array) -> Array:
+    """Rotation vectors (..., 3) [rad] that lead from `start` to `end` (..., 4) xyzw the short way, in the frame that
+    both are given in."""
+    turn = quat_product(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))
+    turn = np.where(turn[..., 3:] < 0.0, -turn, turn)
+    sine = np.linalg.norm(turn[..., :3], axis=-1, keepdims=True)
+    small = sine < 1e-12  # towards zero, angle / sine tends to 2
+    angle = 2.0 * np.arctan2(sine, turn[..., 3:])
+    return np.asarray(turn[..., :3] * np.where(small, 2.0, angle / np.where(small, 1.0, sine)))
+
+
+def wrapped(angle: Array) -> Array:
+    """The same angles in [-pi, pi) [rad]: the short way round."""
+    return np.asarray(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
+
+
 def matrix_from_axis_angle(axis: npt.ArrayLike, angle: float) -> Array:
     """Rotation by `angle` [rad] about a unit `axis` (3,): Rodrigues' formula."""
     x, y, z = np.asarray(axis, dtype=np.float64)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Array, quat_product
+from manipcli.core.geometry import Array, rotation_between
 from manipcli.model.state import Contact, WorldState
 
 ROUNDING = 0.5e-9
@@ -113,14 +113,4 @@ class Moments:
         q = np.concatenate([before.body_quat_xyzw[None, k], states.body_quat_xyzw[:, k]])
         passed = np.diff(time)[:, None]
         passed = np.where(passed > 0.0, passed, np.inf)
-        return np.diff(p, axis=0) / passed, rotation_vector(q[:-1], q[1:]) / passed
-
-
-def rotation_vector(start: Array, end: Array) -> Array:
-    """Rotation vector (..., 3) [rad], in the frame that both (..., 4) xyzw are given in, from `start` to `end`."""
-    turn = quat_product(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))
-    turn = np.where(turn[..., 3:] < 0.0, -turn, turn)
-    sine = np.linalg.norm(turn[..., :3], axis=-1, keepdims=True)
-    small = sine < 1e-12  # towards zero, angle / sine tends to 2
-    angle = 2.0 * np.arctan2(sine, turn[..., 3:])
-    return np.asarray(turn[..., :3] * np.where(small, 2.0, angle / np.where(small, 1.0, sine)))
+        return np.diff(p, axis=0) / passed, rotation_between(q[:-1], q[1:]) / passed

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.controller import REFERENCE_ROWS, ControllerOutput
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, wrapped
 from manipcli.model.batch_kinematics import relative_batch
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
@@ -94,7 +94,7 @@ class _ControllerRows:
         reference, reference_speed = self.reference(at)
         error = reference - position[:, self._columns]
         # A joint without limits errs the short way round.
-        error[:, self._endless] = np.remainder(error[:, self._endless] + np.pi, 2 * np.pi) - np.pi
+        error[:, self._endless] = wrapped(error[:, self._endless])
         return [error, reference_speed - velocity[:, self._columns]]
 
 

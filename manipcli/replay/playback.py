@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from manipcli.core.geometry import Array, rotate
+from manipcli.core.geometry import Array, rotate, wrapped
 from manipcli.judge.verdict import Verdict
 from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
@@ -210,12 +210,12 @@ def joint_tables(
         position, velocity, effort, reference: (T, n); NaN where there is none.
     """
     slides = {joint.name for joint in robot.joints if joint.type == "prismatic"} if robot is not None else set()
-    endless = {joint.name for joint in robot.joints if joint.type == "continuous"} if robot is not None else set()
+    turning = {joint.name for joint in robot.joints if joint.type == "continuous"} if robot is not None else set()
+    endless = [k for k, name in enumerate(names) if name in turning]
     unit = tuple("m" if name in slides else "rad" for name in names)
     error = reference - position
-    wrapped = [k for k, name in enumerate(names) if name in endless]
     # A joint without limits errs the short way round.
-    error[:, wrapped] = np.remainder(error[:, wrapped] + np.pi, 2.0 * np.pi) - np.pi
+    error[:, endless] = wrapped(error[:, endless])
     tables = []
     for title, values, units in (
         ("joint position", position, unit),

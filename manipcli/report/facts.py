@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Array, frozen
+from manipcli.core.geometry import Array, frozen, wrapped
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
@@ -236,7 +236,7 @@ class _Errors:
             self.start, self._begun = float(times[0]), True
         error = references(span.controllers, self._names, len(times)) - position
         # A joint without limits errs the short way round.
-        error[:, self._endless] = np.remainder(error[:, self._endless] + np.pi, 2.0 * np.pi) - np.pi
+        error[:, self._endless] = wrapped(error[:, self._endless])
         known = np.isfinite(error)
         size = np.where(known, np.abs(error), -np.inf)
         k, columns = np.argmax(size, axis=0), np.arange(size.shape[1])

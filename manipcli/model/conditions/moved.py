@@ -8,10 +8,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, rotation_between
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.model.moments import Moments, rotation_vector
+from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, least, reading
 from manipcli.model.where import centres
 from manipcli.spec.base import Model, problem
@@ -56,7 +56,7 @@ def since_first(world: World, name: str) -> Callable[[Moments], Change]:
         if not first:
             first.append((centre[0].copy(), quat[0].copy()))
         p, q = first[0]
-        return np.linalg.norm(centre - p, axis=-1), np.linalg.norm(rotation_vector(q, quat), axis=-1)
+        return np.linalg.norm(centre - p, axis=-1), np.linalg.norm(rotation_between(q, quat), axis=-1)
 
     return changed
 

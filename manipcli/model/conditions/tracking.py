@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, wrapped
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_group
 from manipcli.model.moments import Moments
@@ -38,7 +38,7 @@ def gauge(spec: TrackingSpec, world: World) -> Gauge:
     def look(moments: Moments) -> Reading:
         reference = _references(moments, joints)
         error = reference - moments.states.position[:, columns]
-        error[:, endless] = np.remainder(error[:, endless] + np.pi, 2.0 * np.pi) - np.pi
+        error[:, endless] = wrapped(error[:, endless])
         error = np.abs(error)
         known = ~np.isnan(reference)
         worst = np.argmax(error, axis=1)
