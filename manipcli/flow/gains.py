@@ -86,7 +86,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         doubts: list[Doubt] = []
         if loops:
             load = load_of(robot, kinematics, [loop.joint for loop in loops], postures)
-            doubts += _doubts(task, loops, load, planned=plan is not None)
+            doubts += _doubts(task, loops, load, postures, planned=plan is not None)
         if drives:
             doubts += drive_doubts(task, drives, kinematics, postures, planned=plan is not None)
         # Who stays while others change is looked at again: each doubt about each of its joints is told once.
@@ -162,7 +162,9 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
     return tuple(found)
 
 
-def _doubts(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -> Iterator[Doubt]:
+def _doubts(
+    task: Task, loops: tuple[Held, ...], load: Load, postures: Postures, *, planned: bool
+) -> Iterator[Doubt]:
     where = f"{'planned' if planned else 'named'} postures"
     simulation = task.spec.simulation
     substeps = round(simulation.control_period / simulation.step)
@@ -191,7 +193,8 @@ def _doubts(task: Task, loops: tuple[Held, ...], load: Load, *, planned: bool) -
         if finding is not None:
             code, message, hint = finding
             yield Doubt(loop.joint, Finding(code, message, loop.place, hint, "warning"))
-        yield from weak(task.robot, loop, load, k, planned=planned)
+        velocity = postures.velocity[:, task.robot.joint_names.index(loop.joint)]
+        yield from weak(task.robot, loop, load, k, velocity=velocity, planned=planned)
     if sound:
         yield from _together(task, loops, load, substeps)
 

@@ -44,19 +44,22 @@ class Held:
     place: Place
 
 
-def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) -> Iterator[Doubt]:
+def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, velocity: Array, planned: bool) -> Iterator[Doubt]:
     """Too little effort for gravity or for the plan; gains and clamps too weak to stand where it shall.
 
     Args:
         robot: whose joint it is.
         loop: that holds it.
-        load: what the joints meet; this one is number `k`.
+        load: what the joints meet in T postures; this one is number `k`.
+        velocity: (T,) its own there [rad/s or m/s].
         planned: whether the postures are those of a plan.
     """
     gravity = load.gravity[:, k]
     weight, limit = float(np.abs(gravity).max()), float(load.effort[k])
     needed = float(np.abs(load.needed[:, k]).max()) if planned else 0.0
     finding = too_weak(robot, loop.joint, loop.place, weight=weight, needed=needed, limit=limit)
+    if finding is None and planned:
+        finding = _throttled(robot.joint(loop.joint), loop, load.needed[:, k], velocity)
     if finding is not None:
         yield Doubt(loop.joint, finding)
     if loop.weightless or weight <= WEIGHTLESS:
@@ -66,6 +69,23 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, planned: bool) ->
     if told is not None:
         code, message, hint = told
         yield Doubt(loop.joint, Finding(code, f"{loop.joint}: {message}", loop.place, hint, "warning"))
+
+
+def _throttled(joint: Joint, loop: Held, needed: Array, velocity: Array) -> Finding | None:
+    """Too little effort at the planned velocities (T,), where a soft limit lets through k_velocity (v_max - v) alone."""
+    soft, fastest = joint.limits.soft, joint.limits.velocity
+    if soft is None or soft.k_velocity == 0.0 or fastest is None:
+        return None
+    way = np.where(needed < 0.0, -1.0, 1.0)
+    left = np.maximum(soft.k_velocity * (fastest - way * velocity), 0.0)
+    worst = int(np.argmax(np.abs(needed) - left))
+    if abs(needed[worst]) <= left[worst] + WEIGHTLESS:
+        return None
+    unit, takes = joint.effort_unit, f"{abs(needed[worst]):.3g}"
+    message = f"{loop.joint}: at {abs(velocity[worst]):.3g} {joint.unit}/s the planned motions need {takes} {unit}; the "
+    message += f"soft limit of its velocity (k_velocity {digits(soft.k_velocity)}) leaves {left[worst]:.3g} {unit}"
+    hint = f"it will lag behind; a lower `speed` of the step, or limits.{loop.joint}.k_velocity: 0 in the robot file"
+    return Finding("CTRL169", message, loop.place, hint, "warning")
 
 
 def _cut(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | None:

@@ -88,6 +88,18 @@ def test_an_effort_limit_below_gravity_or_below_the_plan_is_told() -> None:
     assert "the planned motions need up to" in lags.message
 
 
+def test_a_soft_limit_of_the_velocity_that_leaves_too_little_effort_is_told() -> None:
+    """At v it lets k_velocity (v_max - v) through; the weight takes 27 N m at the start, and v_max is 1.5 rad/s."""
+    (slow,) = findings("robot.limits.joint_2.k_velocity=10")
+    told = re.search(r"joint_2: at ([0-9.]+) rad/s the planned .* need ([0-9.]+) N m; .* leaves ([0-9.]+) N m", str(slow))
+    assert slow.code == "CTRL169"
+    assert told is not None
+    v, needed, left = map(float, told.groups())
+    assert left == pytest.approx(10.0 * (1.5 - v), rel=0.01)
+    assert left < needed == pytest.approx(27.0, abs=0.5)
+    assert findings("robot.limits.joint_2.k_velocity=1000") == ()
+
+
 def test_a_grasp_with_more_force_than_the_jaw_has_is_told(tmp_path: Path) -> None:
     """The Panda's description limits a finger to 20 N, half of which goes to the finger that mimics it.
 
