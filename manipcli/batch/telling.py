@@ -125,7 +125,7 @@ def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
         )
     if report.verdict.verdict == "passed" and found:
         page = replace(page, verdict=replace(page.verdict, verdict="failed"), causes=_causes(page, found))
-    page = replace(page, index=job.index)
+    page = replace(page, warnings=report.warnings, index=job.index)
     job.page.parent.mkdir(parents=True, exist_ok=True)
     write_whole(job.page, render_page(page).encode())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -94,6 +95,7 @@ class Outputs:
         *,
         task: Path | None = None,
         overrides: Sequence[str] = (),
+        warnings: Sequence[Finding] = (),
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
     ) -> None:
@@ -103,6 +105,7 @@ class Outputs:
             log: that was judged.
             verdict: on it.
             task, overrides: its file and what was set in it, where the command knows it.
+            warnings: what was doubted before it was run.
             package_path, allow_outside: where the meshes may be.
         """
         from manipcli.flow.report import file_places, log_page, log_places
@@ -119,9 +122,9 @@ class Outputs:
             self._write(self._junit, render_junit(verdict, *places, log=log.name, file=file))
         if self._report is not None:
             page = log_page(log, task_file=task, package_path=package_path, allow_outside=allow_outside)
-            self._write(self._report, render_page(page).encode())
+            self._write(self._report, render_page(replace(page, warnings=tuple(warnings))).encode())
 
-    def of_refusal(self, task: Task, verdict: Verdict, file: Path) -> None:
+    def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Finding]) -> None:
         """Writes what is asked for about a task of which a step cannot be planned."""
         from manipcli.flow.report import refused_page, task_places
         from manipcli.report.html import render_page
@@ -130,7 +133,8 @@ class Outputs:
         if self._junit is not None:
             self._write(self._junit, render_junit(verdict, *task_places(task.file), file=str(file)))
         if self._report is not None:
-            self._write(self._report, render_page(refused_page(task, verdict)).encode())
+            page = replace(refused_page(task, verdict), warnings=tuple(warnings))
+            self._write(self._report, render_page(page).encode())
 
     def of_invalid(self, findings: Sequence[Finding], *, task: Path | None = None, log: Path | None = None) -> None:
         """Writes what is asked for about a task or a log that cannot be used: no page of an earlier run may stay."""

@@ -87,6 +87,7 @@ def run(
                 report.verdict,
                 task=task,
                 overrides=words,
+                warnings=report.warnings,
                 package_path=folders,
                 allow_outside=allow_outside,
             )
@@ -94,5 +95,5 @@ def run(
             refused = pipeline.load_task(
                 task, overrides=words, seed=seed, sample=sample, package_path=folders, allow_outside=allow_outside
             )
-            outputs.of_refusal(refused, report.verdict, task)
+            outputs.of_refusal(refused, report.verdict, task, report.warnings)
         return exit_code(report.verdict)

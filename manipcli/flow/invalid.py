@@ -45,7 +45,8 @@ def invalid_page(verdict: Verdict, findings: Sequence[Finding], *, log: str = ""
         log=log,
         sources=sources,
         provenance=(("manipcli", __version__), ("log", log) if log else ("run", "nothing was run")),
-        notes=tuple(str(one) for one in findings if one.severity != "error"),
+        warnings=tuple(one for one in findings if one.severity == "warning"),
+        notes=tuple(str(one) for one in findings if one.severity == "note"),
     )
 
 

@@ -14,6 +14,7 @@ from manipcli.report.run_page import RunPage
 _NAMES = (
     ("cause", "Cause"),
     ("expectations", "Expectations"),
+    ("warnings", "Warnings"),
     ("replay", "Replay"),
     ("steps", "Steps"),
     ("grasps", "Grasps"),
@@ -30,6 +31,7 @@ def render_page(page: RunPage) -> str:
     shown = {
         "cause": sections.causes(page),
         "expectations": sections.expectations(page),
+        "warnings": sections.warnings(page),
         "replay": _replay(page),
         "steps": sections.steps(page),
         "grasps": numbers.grasps(facts) if facts is not None else None,

@@ -102,6 +102,19 @@ def causes(page: RunPage) -> Markup | None:
     return element("section", heading("cause", title), element("div", *first, class_="first"), class_="why")
 
 
+def warnings(page: RunPage) -> Markup | None:
+    """What was doubted before anything moved."""
+    if not page.warnings:
+        return None
+    shown = []
+    for one in page.warnings:
+        place = element("span", str(one.place), class_="place") if one.place is not None else None
+        hint = element("p", f"hint: {one.hint}", class_="about") if one.hint else None
+        shown.append(element("div", element("p", f"{one.message} ", place, element("small", f" {one.code}")), hint))
+    title = number_of(len(shown), "warning")
+    return element("section", heading("warnings", title, "Told before the run began."), *shown, class_="warned")
+
+
 def expectations(page: RunPage) -> Markup | None:
     """Each with its signed margin, in numbers and as a bar."""
     if not page.verdict.expectations or page.facts is None:

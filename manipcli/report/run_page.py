@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from manipcli.core.errors import Finding
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.replay.playback import Playback
 from manipcli.report.facts import RunFacts
@@ -71,6 +72,7 @@ class RunPage:
         provenance: name and value of what is known of the origin: versions, seed, engine, period.
         hashes: SHA-256 of files, by name.
         notes: what is missing or unlike it was in the run, a sentence each.
+        warnings: what was doubted before the run began; none where the page is made of a log that was there already.
         index: where, from this page, the one is that leads to it and others; "" where there is none.
     """
 
@@ -89,6 +91,7 @@ class RunPage:
     provenance: tuple[tuple[str, str], ...] = ()
     hashes: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
     index: str = ""
 
     @property

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import frozen
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
@@ -153,6 +153,15 @@ def test_many_causes_are_folded_where_the_page_tells_them_again() -> None:
     assert len(folds[1]) == len(folds[0]) + 1
     assert " 8 more " in _Page(render_page(replace(_page(), causes=causes))).words
     assert " more " not in _Page(render_page(replace(_page(), causes=causes, facts=None))).words
+
+
+def test_what_was_doubted_before_the_run_is_told() -> None:
+    doubt = Finding("CTRL150", "the gains of 'j' are weak", Place("a/c.yaml", 3, 5), "raise p", "warning")
+    told = _Page(render_page(replace(_page(), warnings=(doubt,))))
+    assert "the gains of 'j' are weak a/c.yaml:3:5" in told.words
+    assert "hint: raise p" in told.words
+    assert "warnings" in told.ids()
+    assert "warnings" not in _Page(render_page(_page())).ids()
 
 
 def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
