@@ -162,9 +162,7 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
     return tuple(found)
 
 
-def _doubts(
-    task: Task, loops: tuple[Held, ...], load: Load, postures: Postures, *, planned: bool
-) -> Iterator[Doubt]:
+def _doubts(task: Task, loops: tuple[Held, ...], load: Load, postures: Postures, *, planned: bool) -> Iterator[Doubt]:
     where = f"{'planned' if planned else 'named'} postures"
     simulation = task.spec.simulation
     substeps = round(simulation.control_period / simulation.step)

@@ -72,7 +72,7 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, velocity: Array, 
 
 
 def _throttled(joint: Joint, loop: Held, needed: Array, velocity: Array) -> Finding | None:
-    """Too little effort at the planned velocities (T,), where a soft limit lets through k_velocity (v_max - v) alone."""
+    """Too little effort at the planned velocities (T,): a soft limit lets only k_velocity (v_max - v) through."""
     soft, fastest = joint.limits.soft, joint.limits.velocity
     if soft is None or soft.k_velocity == 0.0 or fastest is None:
         return None
@@ -81,8 +81,8 @@ def _throttled(joint: Joint, loop: Held, needed: Array, velocity: Array) -> Find
     worst = int(np.argmax(np.abs(needed) - left))
     if abs(needed[worst]) <= left[worst] + WEIGHTLESS:
         return None
-    unit, takes = joint.effort_unit, f"{abs(needed[worst]):.3g}"
-    message = f"{loop.joint}: at {abs(velocity[worst]):.3g} {joint.unit}/s the planned motions need {takes} {unit}; the "
+    unit, at = joint.effort_unit, f"{abs(velocity[worst]):.3g} {joint.unit}/s"
+    message = f"{loop.joint}: at {at} the planned motions need {abs(needed[worst]):.3g} {unit}; the "
     message += f"soft limit of its velocity (k_velocity {digits(soft.k_velocity)}) leaves {left[worst]:.3g} {unit}"
     hint = f"it will lag behind; a lower `speed` of the step, or limits.{loop.joint}.k_velocity: 0 in the robot file"
     return Finding("CTRL169", message, loop.place, hint, "warning")

@@ -91,7 +91,7 @@ def test_an_effort_limit_below_gravity_or_below_the_plan_is_told() -> None:
 def test_a_soft_limit_of_the_velocity_that_leaves_too_little_effort_is_told() -> None:
     """At v it lets k_velocity (v_max - v) through; the weight takes 27 N m at the start, and v_max is 1.5 rad/s."""
     (slow,) = findings("robot.limits.joint_2.k_velocity=10")
-    told = re.search(r"joint_2: at ([0-9.]+) rad/s the planned .* need ([0-9.]+) N m; .* leaves ([0-9.]+) N m", str(slow))
+    told = re.search(r"joint_2: at ([0-9.]+) rad/s the .* need ([0-9.]+) N m; .* leaves ([0-9.]+) N m", str(slow))
     assert slow.code == "CTRL169"
     assert told is not None
     v, needed, left = map(float, told.groups())
