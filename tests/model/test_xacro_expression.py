@@ -47,6 +47,8 @@ NAMES = {**math_symbols(), **python_symbols(), **OWN}
         "len({i % 2 for i in range(4)})",
         "dict([['a', 1]], b=2)",
         "len(set([1, 1]))",
+        "len(set()) + len(dict())",
+        "dict(a=1)['a']",
         "sum([1, 2], 3) + 'abc'.find('c')",
     ],
 )
