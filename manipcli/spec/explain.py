@@ -36,9 +36,10 @@ from pydantic_core import ErrorDetails
 
 from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
-from manipcli.core.units import ANGLE, LENGTH
+from manipcli.core.units import ANGLE, LENGTH, readable
 from manipcli.spec import shape
 from manipcli.spec.fields import unit_of
+from manipcli.spec.quantity import Unit
 from manipcli.spec.tree import (
     MappingNode,
     Node,
@@ -225,12 +226,13 @@ def _told(
     if kind in _RANGES:
         field = _field(first, model)
         optional = field is not None and field.default is None
-        hint = _other_unit(path, context, node, model, dict(first.tags)) or (
-            _described(field, path) if optional else None
-        )
-        return f"must be {_RANGES[kind]} {_limit(context)}, not {shown(node)}", hint
+        unit = _unit(first, model)
+        hint = _other_unit(unit, context, node) or (_described(field, path) if optional else None)
+        return f"must be {_RANGES[kind]} {_limit(context, unit)}, not {shown(node)}", hint
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
+    if kind == "none_required":
+        return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
     return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], _type_hint(kind, node)
 
@@ -247,17 +249,12 @@ def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
     return shape.keys_of(shape.at(model, tuple(above), dict(complaint.tags))).get(str(key))
 
 
-def _other_unit(
-    path: Loc, context: dict[str, object], node: Node, model: type[BaseModel], tags: dict[int, str]
-) -> str | None:
+def _other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
     """The hint where a plain number above the most that is taken lies below it as degrees, or as millimetres."""
     most = next((context[key] for key in ("le", "lt") if key in context), None)
     value = node.value if isinstance(node, ScalarNode) else None
     if not isinstance(most, int | float) or not isinstance(value, int | float):
         return None
-    key = max(k for k, part in enumerate(path) if isinstance(part, str))  # what it is an item of
-    field = shape.keys_of(shape.at(model, path[:key], tags)).get(str(path[key]))
-    unit = unit_of(field.annotation, field.metadata) if field is not None else None
     for dimension, what, symbol, size in _SMALLER:
         if unit is not None and unit.dimensions == (dimension,) and value / size <= most:
             return f"in {what}? write '{value:g} {symbol}'"
@@ -271,9 +268,24 @@ def _described(field: FieldInfo | None, path: Loc) -> str | None:
     return None if field is None or not field.description else f"{path[-1]}: {field.description}"
 
 
-def _limit(context: dict[str, object]) -> str:
+def _limit(context: dict[str, object], unit: Unit | None) -> str:
+    """A bound, with its unit: `180 deg`, `3600 s`."""
     value = next((context[key] for key in ("gt", "ge", "lt", "le", "multiple_of") if key in context), "")
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
+    if not isinstance(value, int | float):
+        return str(value)
+    if not value or unit is None or len(unit.dimensions) > 1:
+        return f"{value:g}"
+    return readable(value, "rad") if unit.dimensions == (ANGLE,) else f"{value:g} {unit.dimensions[0].symbol}".rstrip()
+
+
+def _unit(complaint: _Complaint, model: type[BaseModel]) -> Unit | None:
+    """Of the quantity that should stand there, also as an item of a list."""
+    path, tags = complaint.path, dict(complaint.tags)
+    key = max((k for k, part in enumerate(path) if isinstance(part, str)), default=None)
+    if key is None:
+        return None
+    field = shape.keys_of(shape.at(model, path[:key], tags)).get(str(path[key]))
+    return None if field is None else unit_of(field.annotation, field.metadata)
 
 
 def _expected(complaint: _Complaint) -> str:

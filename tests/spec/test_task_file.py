@@ -350,7 +350,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "scene:",
             "simulation: {step: 10 ms, control_period: 60 ms}\nscene:",
-            "t.yaml:5:43: error[TASK204]: simulation.control_period: must be at most 0.05, not '60 ms'",
+            "t.yaml:5:43: error[TASK204]: simulation.control_period: must be at most 0.05 s, not '60 ms'",
             "",
         ),
         (
