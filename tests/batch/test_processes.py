@@ -93,6 +93,22 @@ def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -
     assert Path(report.output).read_text().splitlines() == ["before", "no physics here"]
 
 
+@pytest.mark.parametrize("wanted", [None, "3"])
+def test_a_run_is_out_of_reach_of_its_terminal_and_has_one_thread_for_libraries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wanted: str | None
+) -> None:
+    """What is said of an earlier run of the same name is gone, and what somebody said of threads is kept."""
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "t0.txt").write_text("what an earlier crash left\n")
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    if wanted is not None:
+        monkeypatch.setenv("OMP_NUM_THREADS", wanted)
+    told = "{os.getsid(0) == os.getpid()} {os.environ['OMP_NUM_THREADS']} {sys.stdin.read()!r}"
+    (report,) = run(jobs(tmp_path, f"sys.exit(f{told!r})"))
+    assert report.output is not None
+    assert Path(report.output).read_text() == f"True {wanted or 1} ''\n"
+
+
 def test_a_run_whose_files_cannot_be_written_costs_itself_alone(tmp_path: Path) -> None:
     long, other = jobs(tmp_path, END, "os.abort()")
     long = replace(long, case=replace(long.case, file=f"{'x' * 245}.yaml"))
