@@ -29,7 +29,7 @@ def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Finding]:
         if name in RESERVED or "/" in name or name in spec.scene:
             message = f"a frame cannot be called '{name}': the name is taken"
             yield Finding("TASK227", message, place(("frames", name)))
-        if frame.parent in spec.frames and frame.parent not in bodies:
+        if frame.parent in spec.frames and frame.parent not in (*RESERVED, *bodies):
             message = f"'{frame.parent}' is a frame itself; the parent of a frame is `world` or a body"
             its = spec.frames[frame.parent].parent
             other = f"give it the parent '{its}', and its pose there" if its in ("world", *bodies) else None

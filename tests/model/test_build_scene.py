@@ -239,6 +239,7 @@ def test_a_frame_needs_a_parent_and_a_name_of_its_own() -> None:
     found = only({"desk": DESK}, frames={"drop": {"parent": "dsk"}})
     assert (found.code, found.hint) == ("TASK227", "did you mean 'desk'?")
     assert "taken" in only({"desk": DESK}, frames={"desk": {}}).message
+    assert "taken" in only({"desk": DESK}, frames={"world": {}, "a": {}}).message  # whose parent is the world
     found = only({"desk": DESK}, frames={"b": {"parent": "desk"}, "a": {"parent": "b"}})
     assert found.message == "'b' is a frame itself; the parent of a frame is `world` or a body"
     assert found.hint == "give it the parent 'desk', and its pose there"
