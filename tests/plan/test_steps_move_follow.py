@@ -151,6 +151,9 @@ def test_what_is_too_near_is_told_with_the_clearance_that_is_kept(bench: Make) -
     assert planner.in_the_way(overlap) == "floor and robot/base overlap by 5.0 mm"
     refusal = planner.refusal(bench().now, overlap, "is", "before it moves")
     assert "`mount` of a robot file" in (refusal.hint or "")
+    for hit, own in ((CollisionHit("robot/a", "robot/b", -0.001, time=0.2), True), (too_near, False)):
+        refusal = planner.refusal(bench().now, hit, "would come", "at t = 0.20 s of 'move'")
+        assert ("`collision_ignore`" in (refusal.hint or "")) == own
 
 
 def test_moving_while_holding_keeps_holding(bench: Make, story: Story) -> None:
