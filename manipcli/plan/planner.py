@@ -221,7 +221,7 @@ class Planner:
         if begins and held and carried is not None:
             hint = f"`lift` '{carried.body}' first"
         elif hit.a.startswith("robot/") and hit.b.startswith("robot/"):
-            hint = f"{hint}; or, if the links themselves have room there (a mesh counts as its hull): `collision_ignore`"
+            hint = f"{hint}; or `collision_ignore`, if the links have room there (a mesh counts as its hull)"
         near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
         clearance = f"{1000 * CLEARANCE:.0f} mm"
         return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)
