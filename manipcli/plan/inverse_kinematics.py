@@ -35,6 +35,8 @@ _FAR = 50.0  # m: a goal beyond this was hardly meant in metres
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
 NOT_SO = "change the orientation of the tool: the arm cannot turn it like this"
 """The hint where a pose is missed by its orientation."""
+TOUCHES = "move the goal away from what is touched, or change the orientation of the tool"
+"""The hint where a pose is reached only so that something is in the way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +170,7 @@ class InverseKinematics:
         if refusal is not None:
             raise NotPlannable(
                 f"the arm reaches ({place}) m only where {refusal}",
-                hint="move the goal away from what is touched, or change the orientation of the tool",
+                hint=TOUCHES,
             )
         hint = NOT_SO if best.angle_error > _TURNED else "move the goal nearer, or change the orientation of the tool"
         if distance > _FAR:

@@ -170,6 +170,25 @@ def test_out_of_reach_says_so_once_for_all_ways(bench: Make) -> None:
     assert refusal.hint.startswith("move 'can', or say from where and how high it is taken")
 
 
+def test_what_is_taller_than_the_fingers_is_taken_higher_from_above(bench: Make) -> None:
+    """The Panda's tool is 3.9 cm from its palm, of which 4 mm stay free: half of 9 cm is too much, a third is not."""
+    for size, height in ((0.05, 0.025), (0.09, 0.06), (0.14, 0.14 * 5 / 6)):
+        scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+        scene += f"  block: {{box: {{size: [0.04, 0.04, {size}]}}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}}\n"
+        arm = bench("panda", scene=scene)
+        end = arm.plan("pick", {"object": "block", "approach": {"from": "top"}}).end
+        assert arm.planner.tool_pose(end).p[2] - 0.2 == pytest.approx(height, abs=1e-4), size
+
+
+def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:
+    """Above its middle a ball slips out; the fingers are in the block however high."""
+    scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    scene += "  ball: {sphere: {radius: 7 cm}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
+    refusal = bench("panda", scene=scene).refused("pick", {"object": "ball", "approach": {"from": "top"}})
+    assert "36 ways tried" in refusal.cause
+    assert "`open: ...`" in refusal.hint
+
+
 def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) -> None:
     refusal = bench("panda").refused("pick", {"object": "block", "approach": {"from": "top"}, "grasp": {"height": 0}})
     assert "overlap" in refusal.cause

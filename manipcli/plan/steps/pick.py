@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Literal, get_args
 
@@ -20,7 +21,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.inverse_kinematics import NOT_SO
+from manipcli.plan.inverse_kinematics import NOT_SO, TOUCHES
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
@@ -32,10 +33,17 @@ from manipcli.spec.quantity import Angle, Length
 
 YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 """Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
+UPRIGHT = 0.99
+"""Cosine of the angle between two axes that count as one: what stands, what points straight down."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
+HIGHER = (2 / 3, 5 / 6)
+"""Shares of an object's height at which the tool takes it from above, where its middle cannot be: the palm touches."""
 
-_OTHERWISE = "say from where and how high it is taken: `approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`"
+_OTHERWISE = (
+    "say from where and how high it is taken, or how far the hand opens: "
+    "`approach: {from: ..., yaw: ...}`, `grasp: {height: ...}`, `open: ...`"
+)
 _HIGHER = "take the object where the closing fingers have room, as higher: `grasp: {height: ...}`"
 _AIM = (
     "the tool's +z has to point to the object, and the arm cannot turn it so: "
@@ -56,7 +64,9 @@ class ApproachSpec(Model):
         "from the top.",
     )
     yaw: Angle | None = Field(
-        None, description="Direction of the approach about the vertical [rad]; default: away from the robot's base."
+        None,
+        description="Direction of the approach about the vertical [rad]. Default: away from the robot's base; from "
+        "the top: as the object is turned, by quarter turns.",
     )
     distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
 
@@ -65,7 +75,11 @@ class PickGraspSpec(GraspSpec):
     """The grasp of a pick: its object is the pick's own."""
 
     object: None = Field(None, description="Nothing: the pick says it.")
-    height: Length | None = Field(None, description="Of the tool above the object's bottom [m]; default: its middle.")
+    height: Length | None = Field(
+        None,
+        description="Of the tool above the object's bottom [m]. Default: its middle; from the top higher, where that "
+        "cannot be.",
+    )
 
 
 class PickSpec(Model):
@@ -98,13 +112,17 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
-    p_WG = X_WO.apply([body.centre[0], body.centre[1], height])
-
+    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
+    goals = [(height, R_WT) for R_WT in turns]
+    if spec.grasp.height is None and body.kind != "sphere" and X_WO.R[2, 2] > UPRIGHT:
+        from_above = [R_WT for R_WT in turns if R_WT[2, 2] < -UPRIGHT]
+        goals += [(bottom + share * body.size[2], R_WT) for share in HIGHER for R_WT in from_above]
     out_of_reach: dict[int, NotPlannable | None] = {}
 
-    def attempt(candidate: tuple[tuple[int, Array], float, float]) -> StepPlan:
-        (k, R_WT), distance, slope = candidate
-        X_WG = Transform.of(xyz=p_WG, R=R_WT)
+    def attempt(candidate: tuple[int, float, float]) -> StepPlan:
+        k, distance, slope = candidate
+        height, R_WT = goals[k]
+        X_WG = Transform.of(xyz=X_WO.apply([body.centre[0], body.centre[1], height]), R=R_WT)
         draft = Draft(planner, situation)
         if k not in out_of_reach:  # said once for all distances and slopes, which it does not depend on
             out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
@@ -127,9 +145,13 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         planned = draft.plan()
         return replace(planned, motions=(*before.motions, *planned.motions))
 
-    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
-    candidates = itertools.product(enumerate(turns), spread(spec.approach.distance), slopes())
-    return first_feasible(attempt, candidates, what=f"no way to pick '{spec.object}'")
+    def candidates() -> Iterator[tuple[int, float, float]]:
+        for k in range(len(goals)):
+            if k == len(turns) and all(one is not None and one.hint != TOUCHES for one in out_of_reach.values()):
+                return  # higher up it is no nearer
+            yield from itertools.product((k,), spread(spec.approach.distance), slopes())
+
+    return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
 
 
 def _clear(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
