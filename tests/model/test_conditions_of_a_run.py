@@ -418,12 +418,15 @@ def test_parts_that_never_touch_are_refused(name: str, pair: list[str], told: st
 
 
 @pytest.mark.parametrize("written", [["robot"], [], ["robot", "desk", "cube"], [["robot", "desk"]], ["robot", 3]])
-def test_a_short_collision_is_two_names(written: Any) -> None:
+@pytest.mark.parametrize("name", ["collision", "no_collision"])
+def test_a_short_collision_is_two_names(name: str, written: Any) -> None:
+    spec = CONDITIONS[name].spec
+    assert spec.model_validate(["robot", "desk"]) == spec.model_validate({"pairs": [["robot", "desk"]]})
     with pytest.raises(ValidationError, match="expected two names") as caught:
-        CONDITIONS["collision"].spec.model_validate(written)
+        spec.model_validate(written)
     (error,) = caught.value.errors()
     assert error["loc"] == ()
-    assert "`collision: [robot, desk]`" in error["ctx"]["hint"]
+    assert "`[robot, desk]`" in error["ctx"]["hint"]
 
 
 @pytest.mark.parametrize("above", [1.0, 3.0])

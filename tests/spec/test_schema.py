@@ -60,6 +60,14 @@ def test_each_way_to_write_a_step_is_valid_in_both(step: str) -> None:
     assert _red(text) == []
 
 
+@pytest.mark.parametrize("word", ["collision", "no_collision"])
+@pytest.mark.parametrize("pairs", ["[robot, desk]", "{pairs: [[robot, desk]]}"])
+def test_a_pair_may_stand_alone(word: str, pairs: str) -> None:
+    text = f"{HEAD}steps: [wait: 1 s]\nexpect: [{{{word}: {pairs}}}]\n"
+    load_task_text(text, "t.yaml", model=task_spec())
+    assert _red(text) == []
+
+
 @pytest.mark.parametrize("normal", ["[0, 1 cm]", "{mean: 0, sd: 1 cm}"])
 def test_a_distribution_may_be_short(normal: str) -> None:
     text = f"{HEAD}steps: [wait: 1 s]\nvary: {{scene.cup.at: {{normal: {normal}}}}}\n"

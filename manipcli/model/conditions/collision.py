@@ -21,24 +21,12 @@ from manipcli.spec.quantity import Force
 Pair = tuple[str, str]
 
 
-class NoCollisionSpec(Model):
-    """None of the pairs presses on each other with more than `below`."""
+class PairsSpec(Model):
+    """Which parts, two by two; one pair may stand alone."""
 
     pairs: tuple[Pair, ...] = Field(
         min_length=1, description="Each two of: a body, `robot` (any of its links), `robot/LINK`."
     )
-    below: Annotated[Force, Field(ge=0)] = Field(
-        default=0.0, description="Largest normal force [N] that does not count. Default 0: any touch counts."
-    )
-
-
-class CollisionSpec(Model):
-    """One of the pairs presses on each other with at least `above`. Short: `collision: [robot, desk]`."""
-
-    pairs: tuple[Pair, ...] = Field(
-        min_length=1, description="Each two of: a body, `robot` (any of its links), `robot/LINK`."
-    )
-    above: Annotated[Force, Field(gt=0)] = Field(default=0.01, description="Least normal force [N]. Default 10 mN.")
 
     @model_validator(mode="before")
     @classmethod
@@ -46,7 +34,7 @@ class CollisionSpec(Model):
         if not isinstance(value, list | tuple):
             return value
         if len(value) != 2 or not all(isinstance(part, str) for part in value):
-            hint = "write `collision: [robot, desk]`, or several as `collision: {pairs: [[robot, desk], [cup, desk]]}`"
+            hint = "write `[robot, desk]`, or several as `{pairs: [[robot, desk], [cup, desk]]}`"
             raise problem("count", "expected two names: those of the parts that touch", hint=hint)
         return {"pairs": [value]}
 
@@ -54,6 +42,20 @@ class CollisionSpec(Model):
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
         names = {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2}
         return or_short(schema, handler, names)
+
+
+class NoCollisionSpec(PairsSpec):
+    """None of the pairs presses on each other with more than `below`. Short: `no_collision: [robot, desk]`."""
+
+    below: Annotated[Force, Field(ge=0)] = Field(
+        default=0.0, description="Largest normal force [N] that does not count. Default 0: any touch counts."
+    )
+
+
+class CollisionSpec(PairsSpec):
+    """One of the pairs presses on each other with at least `above`. Short: `collision: [robot, desk]`."""
+
+    above: Annotated[Force, Field(gt=0)] = Field(default=0.01, description="Least normal force [N]. Default 10 mN.")
 
 
 def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
