@@ -61,7 +61,7 @@ class Process:
         doing: the last that is known of it.
     """
 
-    def __init__(self, job: Job, *, command: tuple[str, ...] = ()) -> None:
+    def __init__(self, job: Job, *, command: tuple[str, ...]) -> None:
         """Starts it.
 
         Args:

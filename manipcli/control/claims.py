@@ -45,7 +45,7 @@ class Claims:
 
 
 def conflicts(
-    controllers: Sequence[Claimant], joints: Collection[str], following: Collection[str] = ()
+    controllers: Sequence[Claimant], joints: Collection[str], following: Collection[str]
 ) -> tuple[Finding, ...]:
     """Everything for which these controllers cannot be active at once.
 

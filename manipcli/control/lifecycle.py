@@ -45,7 +45,7 @@ def decided(
     controllers: Mapping[str, tuple[Claimant, ControllerState]],
     switch: Switch,
     joints: Collection[str],
-    following: Collection[str] = (),
+    following: Collection[str],
 ) -> SwitchResult:
     """What comes of a request; where claims clash, strict refuses it and best_effort leaves out who came later.
 

@@ -250,9 +250,9 @@ def lead_in(
     start: Array,
     facts: JointFacts,
     *,
-    ago: float = 0.0,
-    smooth: bool = False,
-    interpolation: Interpolation = "splines",
+    ago: float,
+    smooth: bool,
+    interpolation: Interpolation,
 ) -> JointTrajectory:
     """The trajectory from `start` on.
 

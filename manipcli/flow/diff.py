@@ -18,7 +18,7 @@ OUTCOME = ("verdict", JOINTS, ACTUATORS)
 """Metadata that says what came of a run, which is judged and measured anew."""
 
 
-def diff_logs(a: Path, b: Path, *, tolerance: float = 0.0) -> LogDiff:
+def diff_logs(a: Path, b: Path, *, tolerance: float) -> LogDiff:
     """Compare two logs.
 
     Args:

@@ -57,7 +57,7 @@ def default_log(task: Task) -> Path:
 
 
 def open_log(
-    task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool = False
+    task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool
 ) -> Recorder:
     """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
     meshes, too, so that the log is shown without any package.

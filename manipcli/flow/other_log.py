@@ -176,8 +176,8 @@ def open_other(
     rate: float,
     space: str | None = None,
     why: str = FOREIGN,
-    package_path: Sequence[Path] = (),
-    allow_outside: bool = False,
+    package_path: Sequence[Path],
+    allow_outside: bool,
 ) -> Playback:
     """A log of another program, as it is shown; see `open_playback`. `why` it has to be taken for one.
 

@@ -46,7 +46,7 @@ class RecordedTask:
 
 
 def recorded_task(
-    recording: Recording, path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
+    recording: Recording, path: Path, *, package_path: Sequence[Path], allow_outside: bool
 ) -> RecordedTask:
     """The task of a log.
 

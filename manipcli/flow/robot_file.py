@@ -32,8 +32,8 @@ def gather_robot(
     gathered: Gathered,
     *,
     overrides: Sequence[str] = (),
-    package_path: Sequence[Path] = (),
-    allow_outside: bool = False,
+    package_path: Sequence[Path],
+    allow_outside: bool,
 ) -> RobotFile:
     """As `read_robot`, but every error goes to `gathered`: one in the file hides none of what it says of the robot."""
     file = gathered(lambda: load_robot(path, overrides=overrides))

@@ -43,7 +43,7 @@ class Reporter:
     def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
 
-    def note(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
+    def note(self, code: str, message: str, loc: Loc, *, hint: str | None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
 
     def place(self, loc: Loc) -> Place | None:

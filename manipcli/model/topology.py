@@ -16,7 +16,7 @@ def check_tree(
     joints: Mapping[str, Joint | None],
     elements: Mapping[str, Element],
     *,
-    complete: bool = True,
+    complete: bool,
 ) -> str:
     """Name of the root link, or '' with findings: undefined links, two parents, loops, several roots.
 

@@ -97,7 +97,7 @@ class Reader:
         values = self.numbers(element, attribute, 1, most=most)
         return default if values is None else values[0]
 
-    def required(self, element: Element, attribute: str, *, most: float = math.inf) -> float | None:
+    def required(self, element: Element, attribute: str, *, most: float) -> float | None:
         """One number that must be there; None with a finding otherwise."""
         if attribute not in element.attributes:
             self.missing(element, attribute)

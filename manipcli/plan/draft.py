@@ -119,13 +119,13 @@ class Draft:
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
 
-    def straight(self, label: str, X_WT: Transform, *, speed: float = 1.0, allowed: Pairs = NOTHING) -> None:
+    def straight(self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING) -> None:
         """The tool on a straight line to a pose; one that is the step itself may lead along joint limits."""
         with self._told(label):
             trajectory = self._straight(X_WT, speed, insist=label == self._verb)
         self._add(label, trajectory, None, allowed=allowed)
 
-    def withdraw(self, X_WT: Transform, body: str, *, speed: float = 1.0, grazing: bool = False) -> None:
+    def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
         """The tool on a straight line to a pose, away from a `body` that the hand, open now, was closed on.
 
         With `grazing` the hand keeps no clearance to that body, and where they overlap it only gets no deeper: for one
@@ -144,7 +144,7 @@ class Draft:
                 raise planner.refusal(self._now, hit, "would come", f"at t = {hit.time:.2f} s of 'withdraw'")
         self._add("withdraw", trajectory, None, allowed=allowed)
 
-    def turn(self, label: str, axis: Array, angle: float, *, speed: float = 1.0) -> None:
+    def turn(self, label: str, axis: Array, angle: float, *, speed: float) -> None:
         """The tool turns in place about an `axis` (3,) of the world by `angle` [rad], which may exceed half a turn."""
         X_WT = self._planner.tool_pose(self._now)
         count = max(2, int(np.ceil(abs(angle) / ANGULAR_STEP)))
@@ -262,7 +262,7 @@ class Draft:
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
 
-    def dwell(self, label: str, duration: float, *, awaits: bool = False) -> None:
+    def dwell(self, label: str, duration: float, *, awaits: bool) -> None:
         """Hold still for `duration` [s]."""
         self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=awaits))
 

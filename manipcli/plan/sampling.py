@@ -70,7 +70,7 @@ def on_ticks(
     target: Array,
     limits: MotionLimits,
     period: float,
-    duration: float | None = None,
+    duration: float | None,
 ) -> JointTrajectory:
     """Sample `curve` over [0, nominal] at every multiple of `period`, stretched to end on a tick, at rest on `target`.
 

@@ -47,7 +47,7 @@ class Summary:
 class Container:
     """An MCAP file open for writing at `<path><suffix>`; `finish` gives it its name."""
 
-    def __init__(self, path: Path, *, overwrite: bool = False, suffix: str = PARTIAL) -> None:
+    def __init__(self, path: Path, *, overwrite: bool, suffix: str = PARTIAL) -> None:
         from zstandard import ZstdCompressor
 
         self.path = path

@@ -25,7 +25,6 @@ Kind = Literal["mp4", "webp", "gif"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 SIZE = (640, 360)
-FPS = 25.0
 MAX_FPS = 100.0
 """Above, GIF and WebP have no delays, and the clock in the picture would stand still."""
 MAX_FRAMES = 50_000
@@ -55,7 +54,7 @@ class Film:
         return [int(delay) for delay in np.diff(ends)]
 
 
-def cutting(playback: Playback, *, fps: float = FPS, speed: float = 1.0) -> Film:
+def cutting(playback: Playback, *, fps: float, speed: float = 1.0) -> Film:
     """The moments of a film from the first to the last.
 
     Raises:

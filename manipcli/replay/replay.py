@@ -35,7 +35,7 @@ class Replay(LocalServer):
         missing: what could not be drawn, a line each.
     """
 
-    def __init__(self, playback: Playback, *, port: int | None = None) -> None:
+    def __init__(self, playback: Playback, *, port: int | None) -> None:
         drawing = draw(playback.robot, playback.scene)
         self.playback = playback
         self.missing = drawing.missing

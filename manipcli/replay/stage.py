@@ -44,9 +44,7 @@ class Stage:
         floors: frames of bodies that are floors: the grid is drawn in their place, for its shadows.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, drawing: Drawing, poses: Poses, *, floors: frozenset[str] = frozenset()
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, drawing: Drawing, poses: Poses, *, floors: frozenset[str]) -> None:
         self._server = server
         self._nodes: list[viser.FrameHandle] = []
         self._layers: dict[Layer, list[_Shown]] = {layer: [] for layer in LAYERS}

@@ -31,7 +31,7 @@ class View(LocalServer):
     """
 
     def __init__(
-        self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None, port: int | None = None
+        self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None, port: int | None
     ) -> None:
         drawing, placing = draw(robot, scene), Placing(robot, scene)
         position = posture(robot) if q is None else q

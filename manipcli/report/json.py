@@ -77,7 +77,7 @@ def _object(
     real_time_factor: float | None = None,
     log: str | None = None,
     timing: Json = None,
-    errors: Sequence[Finding] = (),
+    errors: Sequence[Finding],
 ) -> dict[str, Json]:
     """The one object, its keys always there."""
     return {

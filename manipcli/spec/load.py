@@ -135,8 +135,8 @@ def salvage_task(
     path: Path,
     *,
     model: type[TaskSpec],
-    overrides: Sequence[str] = (),
-    seed: int | None = None,
+    overrides: Sequence[str],
+    seed: int | None,
 ) -> Located[TaskSpec] | None:
     """What remains of a task file that `load_task` refused, for checking it further; None where too little does."""
     try:
@@ -196,7 +196,7 @@ def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tup
     return source, [*told, *findings]
 
 
-def salvage_robot_file(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec] | None:
+def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[RobotSpec] | None:
     """What remains of a robot file that `load_robot` refused, for checking it further; None where too little does."""
     try:
         source, _ = _robot_source(read_bytes(path), str(path), overrides)

@@ -107,7 +107,7 @@ class Located(Generic[M]):
         return self.source.place(*path)
 
 
-def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()) -> Located[M]:
+def validate(source: Source, model: type[M], *, findings: Sequence[Finding]) -> Located[M]:
     """The spec that the source says.
 
     Args:
@@ -136,7 +136,7 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding] = ()
     return Located(spec, source, told)
 
 
-def apart(findings: Sequence[Finding], unknown: AbstractSet[Place] = frozenset()) -> tuple[Finding, ...]:
+def apart(findings: Sequence[Finding], unknown: AbstractSet[Place]) -> tuple[Finding, ...]:
     """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
     places = {one.place for one in findings if one.code.startswith("YAML")}
     uncomputed = {one.place for one in findings if one.code in UNCOMPUTED}
