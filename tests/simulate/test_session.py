@@ -16,7 +16,9 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Actuator, Inertial, Mimic, TransmissionTag
 from manipcli.model.state import Contact
+from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.simulate.session import BODY_SPEED, FALLEN, RUNAWAY_SPEED, SLOW, Session
+from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 
 SessionOf = Callable[..., Session]
 
@@ -285,3 +287,15 @@ def test_nothing_moves_without_goals(session_of: SessionOf) -> None:
     ticks(session, 500)
     state = session.engine.read()
     np.testing.assert_array_equal(state.position, np.zeros(3))
+
+
+def test_on_the_ideal_engine_a_path_tolerance_is_left_by_the_curvature_of_the_path_at_most(
+    session_of: SessionOf,
+) -> None:
+    """A controller at up to 2 m/s sees a T^2 / 2 <= 3.9e-6 m, not v T = 2e-3."""
+    session = session_of()
+    tight = ConstraintsSpec(joints={"slide": JointConstraintSpec(trajectory=4e-6, goal=1e-9)})
+    way = JointTrajectory(["slide"], [TrajectoryPoint([1.3], 1.0, [0.0])])
+    goal = session.manager.serving(("slide",)).send_goal(way, constraints=tight)  # type: ignore[attr-defined]
+    ticks(session, 1100)
+    assert goal.status == "succeeded"

@@ -16,7 +16,12 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 
 
 class KinematicEngine:
-    """Perfect tracking on any interface; mimic joints follow their driver exactly. Fast, for tests of all the rest."""
+    """Perfect tracking on any interface; mimic joints follow their driver exactly. Fast, for tests of all the rest.
+
+    What is written comes true in the tick that it is written in. What the next one reads, before it writes, has moved
+    on at that velocity, so that a controller on its way sees an error of a T^2 / 2 and not of v T; but where velocities
+    are commanded, for what is written there is the position one tick on already.
+    """
 
     ideal: Final = True
 
@@ -27,23 +32,35 @@ class KinematicEngine:
             for k, joint in enumerate(robot.moving_joints)
             if joint.mimic is not None
         ]
+        self._period = settings.step * settings.substeps
+        self._advanced = False
         self._version = -1
-        self._commanded = np.zeros(n, dtype=np.bool_)
+        self._commanded, self._coasts = np.zeros((2, n), dtype=np.bool_)
         state = self._state = WorldState.room(n, m)
         state.position[:] = settings.start
         for k, body in enumerate(scene.movable):
             state.body_position[k], state.body_quat_xyzw[k] = body.X_WO.p, body.X_WO.quat_xyzw
 
     def read(self, *, velocities: bool = True) -> WorldState:
+        if self._advanced:
+            self._advanced = False
+            position, velocity = self._state.position, self._state.velocity
+            np.add(position, self._period * velocity, out=position, where=self._coasts)
+            self._follow()
         return self._state
 
     def write(self, command: JointCommand) -> None:
         if command.version != self._version:
             self._version = command.version
             self._commanded = np.array([mode not in ("brake", "free") for mode in command.modes])
+            self._coasts = np.array([mode in ("position", "effort") for mode in command.modes])
         position, velocity = self._state.position, self._state.velocity
         np.copyto(position, command.reference_position, where=self._commanded)
         velocity[:] = np.where(self._commanded, command.reference_velocity, 0.0)
+        self._follow()
+
+    def _follow(self) -> None:
+        position, velocity = self._state.position, self._state.velocity
         for follower, driver, multiplier, offset in self._followers:
             position[follower] = multiplier * position[driver] + offset
             velocity[follower] = multiplier * velocity[driver]
@@ -52,7 +69,7 @@ class KinematicEngine:
         return np.zeros(6)
 
     def advance(self) -> None:
-        """Nothing moves by itself."""
+        self._advanced = True
 
     def touches_changed(self) -> bool:
         return False
