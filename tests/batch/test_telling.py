@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import fromstring
 
 import pytest
@@ -50,6 +51,21 @@ def test_a_broken_watch_is_told_at_its_line(tmp_path: Path) -> None:
         one for one in fromstring(junit(job(tmp_path), report)).iter("testcase") if one.find("failure") is not None
     ]
     assert case.get("line") == "7"
+
+
+@pytest.mark.parametrize(
+    ("changes", "places"),
+    [
+        ({"outcome": "failed"}, ["5:5", "7:5"]),
+        ({"outcome": "failed", "tolerated": True}, ["7:5"]),
+        ({"outcome": "not_run", "started": None, "ended": None}, ["7:5"]),
+        ({"outcome": "failed", "started": None, "ended": None}, ["5:5"]),  # refused: nothing ran that could be judged
+    ],
+)
+def test_only_what_is_a_reason_is_a_trouble(tmp_path: Path, changes: dict[str, Any], places: list[str]) -> None:
+    verdict = replace(VERDICT, steps=(replace(VERDICT.steps[0], **changes),))
+    assert [str(one.place) for one in troubles(job(tmp_path), verdict)] == [f"t/nod.yaml:{at}" for at in places]
+    assert troubles(job(tmp_path), replace(verdict, verdict="passed")) == ()
 
 
 def test_a_watch_that_is_worse_than_it_was_is_told_at_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,6 +101,17 @@ def test_what_a_folder_has_before_it_is_a_project_is_kept(
     assert main(["check", "tasks/pick_place.yaml"]) == 0
 
 
+def test_a_gitignore_that_leads_nowhere_is_kept_and_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".gitignore").symlink_to("gone")
+    assert main(["init"]) == 0
+    told = capsys.readouterr()
+    assert "kept: .gitignore" in told.out.splitlines()
+    assert told.err == "next: manipcli test\n"
+
+
 def test_a_folder_below_the_top_of_a_repository_is_told_where_its_workflow_belongs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

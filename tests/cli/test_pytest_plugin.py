@@ -16,6 +16,7 @@ import pytest
 import manipcli.batch.discovery
 import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
+from manipcli.batch.job import Settings
 from manipcli.cli.pytest_plugin import TaskFailed, _settings
 from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
 
@@ -173,6 +174,49 @@ def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, w
     result.stderr.fnmatch_lines(
         [f"*error: argument {words.partition('=')[0]}: '{words.partition('=')[2]}' is no number*"]
     )
+
+
+Given = list[tuple[Path, Settings]]
+
+
+@pytest.fixture
+def given(monkeypatch: pytest.MonkeyPatch) -> Given:
+    """What would be run, and how; nothing is."""
+    asked: Given = []
+
+    def run(case: Case, path: Path, settings: Settings) -> CaseReport:
+        asked.append((path, settings))
+        return CaseReport(case, "crashed", 1.0, "", "not run")
+
+    monkeypatch.setattr(f"{PLUGIN}._run", run)
+    return asked
+
+
+def test_a_python_test_finds_tasks_beside_it_then_below_the_root(pytester: pytest.Pytester, given: Given) -> None:
+    for name in ("sub/both.yaml", "both.yaml", "below.yaml"):
+        (pytester.path / name).parent.mkdir(exist_ok=True)
+        (pytester.path / name).write_text("task: t\nrobot: r.yaml\n")
+    names = ["both.yaml", "below.yaml", str(pytester.path / "both.yaml")]
+    (pytester.path / "sub" / "test_it.py").write_text(
+        f"import pytest\n@pytest.mark.parametrize('name', {names})\ndef test_it(run_task, name): run_task(name)\n"
+    )
+    result = pytester.runpytest_inprocess(*LOADED, *ALONE, "sub/test_it.py")
+    result.assert_outcomes(failed=3)
+    assert [path for path, _ in given] == [
+        pytester.path / name for name in ("sub/both.yaml", "below.yaml", "both.yaml")
+    ]
+    assert {(settings.keep_logs, settings.folder.name) for _, settings in given} == {(True, "0")}
+
+
+@pytest.mark.parametrize(("words", "folder"), [([], "runs/test"), (["--manipcli-logs", "else/where"], "else/where")])
+def test_logs_go_below_where_pytest_was_called_wherever_a_test_went(
+    pytester: pytest.Pytester, given: Given, words: list[str], folder: str
+) -> None:
+    pytester.makeconftest("import os\ndef pytest_runtest_setup(item): os.chdir('/')\n")
+    pytester.makefile(".yaml", t="task: t\nrobot: r.yaml\n")
+    pytester.runpytest_inprocess(*LOADED, *ALONE, *words).assert_outcomes(failed=1)
+    ((_, settings),) = given
+    assert (Path("/") / settings.folder, settings.keep_logs) == (pytester.path / folder, False)
 
 
 def test_the_plugin_loads_nothing_but_itself() -> None:

@@ -151,6 +151,54 @@ def test_a_silence_and_a_timeout_of_0_mean_never(folder: Path, monkeypatch: pyte
 
 
 @pytest.mark.parametrize(
+    ("words", "cores", "at_once"), [([], 2, 2), ([], 8, 3), (["-n", "1"], 2, 1), (["-n", "9"], 2, 3)]
+)
+def test_as_many_run_at_once_as_this_process_may_use_cores(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], cores: int, at_once: int
+) -> None:
+    for name in "abc":
+        write(folder, name)
+    given: list[int] = []
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
+    monkeypatch.setattr(
+        "manipcli.batch.pool.run_jobs", lambda _, at_once, **__: (one for one in given.append(at_once) or ())
+    )
+    main(["test", *words])
+    assert given == [at_once]
+
+
+@pytest.mark.parametrize(
+    ("ended", "words", "told", "summary"),
+    [
+        ("bca", [], "abc", "1 failed, 2 passed in"),
+        ("bca", ["-x"], "bc", "1 failed, 1 passed, 1 not run in"),
+        ("abc", ["-x"], "abc", "1 failed, 2 passed in"),  # nothing was left to stop
+    ],
+)
+def test_what_ran_is_told_in_the_order_of_the_tasks_however_it_ended(
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    ended: str,
+    words: list[str],
+    told: str,
+    summary: str,
+) -> None:
+    """The one in `c` fails."""
+    for name in "abc":
+        write(folder, name)
+    done = [CaseReport(Case(f"{n}.yaml", n), "failed" if n == "c" else "passed", 1.0, "") for n in ended]
+    monkeypatch.setattr("manipcli.batch.pool.run_jobs", lambda _, **__: (one for one in done))
+    assert main(["test", *words]) == 1
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert summary in last
+    assert ("first failure" in last) is ("not run" in summary)
+    assert main(["test", *words, "--format", "json"]) == 1
+    ids = [case["id"] for case in json.loads(capsys.readouterr().out)["cases"]]
+    assert ids == [f"{n}.yaml::{n}" for n in told]
+
+
+@pytest.mark.parametrize(
     ("words", "ids"),
     [
         (["--lf"], ["v.yaml::v[1]", "v.yaml::v[11]"]),
