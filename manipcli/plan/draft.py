@@ -32,16 +32,16 @@ GRAZE = 1e-4
 class Draft:
     """The motions of one step. What refuses one is told with its label, unless the step has no other."""
 
-    def __init__(self, planner: Planner, situation: Situation, *, verb: str = "") -> None:
+    def __init__(self, planner: Planner, situation: Situation, *, verb: str = "", allowed: Pairs = NOTHING) -> None:
         """
         Args:
             planner: what to plan with.
             situation: where the first motion begins.
             verb: of the step; a motion of this label is the step itself.
+            allowed: pairs that may touch in all motions.
         """
-        self._planner = planner
-        self._now = situation
-        self._verb = verb
+        self._planner, self._now = planner, situation
+        self._verb, self._allowed = verb, allowed
         self._motions: list[Motion] = []
 
     @property
@@ -55,7 +55,7 @@ class Draft:
 
     def copy(self) -> Draft:
         """To go on from here in several ways."""
-        other = Draft(self._planner, self._now, verb=self._verb)
+        other = Draft(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
 
@@ -111,7 +111,7 @@ class Draft:
         which the straight way does.
         """
         if free:
-            self._planner.free_start(self._now)
+            self._planner.free_start(self._now, self._allowed)
         solver = self._planner.solver
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._told(label):
@@ -284,7 +284,7 @@ class Draft:
         """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        query = planner.query(self._now)
+        query = planner.query(self._now, self._allowed)
 
         def refuse(q: Array) -> object | None:
             hit = query.check(q)
@@ -339,7 +339,7 @@ class Draft:
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, allowed: Pairs
     ) -> None:
         times, positions = self._swept(trajectory, grip)
-        query = self._planner.query(self._now, allowed)
+        query = self._planner.query(self._now, allowed | self._allowed)
         hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
         if hit is not None:
             when = f"at t = {hit.time:.2f} s of '{label}'"

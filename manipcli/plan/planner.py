@@ -5,6 +5,7 @@ A step asks the `Planner` about a situation, and strings motions together with a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -154,6 +155,13 @@ class Planner:
         last = self.robot.joint(self.solver.joints[-1])
         return pairs(self.robot.descendants(last.child), body)
 
+    def may_touch(self, situation: Situation, bodies: Sequence[str]) -> Pairs:
+        """Every pair of these bodies with the hand, and with what it holds."""
+        held = () if situation.carried is None else (situation.carried.body,)
+        return frozenset(
+            pair for body in bodies for pair in {*self.hand_contacts(body), *((one, body) for one in held)}
+        )
+
     def held_in_tool(self, situation: Situation) -> Transform:
         """X_TO of the held object."""
         assert situation.carried is not None  # callers ask `held` first
@@ -199,13 +207,13 @@ class Planner:
             )
         return self._queries[key]
 
-    def free_start(self, situation: Situation) -> None:
-        """Nothing, if nothing is too near already; else no search among ways from here can succeed.
+    def free_start(self, situation: Situation, allowed: Pairs = NOTHING) -> None:
+        """Nothing, if nothing but `allowed` pairs is too near already; else no search among ways from here can succeed.
 
         Raises:
             NotPlannable: names the pair.
         """
-        hit = self.query(situation).check(situation.position)
+        hit = self.query(situation, allowed).check(situation.position)
         if hit is not None:
             raise self.refusal(situation, hit, "is", "before it moves")
 

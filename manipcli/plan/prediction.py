@@ -1,14 +1,23 @@
-"""Where bodies will be: what is held goes with the hand, what lies in that goes with it, or falls into a container."""
+"""Where bodies will be: what is held goes with the hand, what lies in that goes with it, or falls into a container;
+what is pushed slides."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Final
+
+import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import Cylinder
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation
+from manipcli.plan.trajectory import JointTrajectory
+
+PRESSED: Final = 1e-3
+"""[m] Deeper in it than at the start by this the hand pushes a body: what it only leaves stays where it is."""
+_LOOKS: Final = 60  # at the way of a hand that pushes: each takes a fraction of a millisecond
 
 
 def put(planner: Planner, situation: Situation, where: Mapping[str, Transform]) -> Situation:
@@ -44,3 +53,23 @@ def spilled(planner: Planner, situation: Situation, into: str) -> Situation:
         bottom = body.centre[2] - body.size[2] / 2
         landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], -depth / 2 - bottom))
     return put(planner, situation, landed)
+
+
+def pushed(
+    planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, bodies: Iterable[str]
+) -> Situation:
+    """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it."""
+    columns = planner.robot.indices(motion.names)
+    way = np.tile(before.position, (_LOOKS, 1))
+    way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
+    end = planner.tool_pose(now).p
+    slid = {}
+    for name in bodies:
+        if planner.scene.body(name).fixed:
+            continue
+        deep = min(0.0, planner.distance(before, name)) - PRESSED
+        met = next((q for q in way if planner.distance(before.moved(q), name) < deep), None)
+        if met is not None:
+            x, y, _ = end - planner.tool_pose(before.moved(met)).p
+            slid[name] = Transform.of(xyz=(x, y, 0.0)) @ planner.body_pose(before, name)
+    return put(planner, now, slid)

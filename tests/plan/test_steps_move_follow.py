@@ -110,6 +110,31 @@ def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:
     assert slow.duration > 1.2 * fast.duration
 
 
+def test_what_a_move_touches_is_pushed_and_else_an_obstacle(bench: Make) -> None:
+    """A cube of 8 cm, met at y = -0.14 by a closed hand whose fingers reach to 1 cm on either side of its tool."""
+    scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    scene += "  cube: {box: {size: [8 cm, 8 cm, 8 cm]}, mass: 0.2, rests_on: table, at: [0.5, -0.1]}\n"
+    arm = bench("panda", scene=scene)
+
+    def to(y: float, **more: object) -> dict[str, object]:
+        pose = {"xyz": [0.5, y, 0.25], "rpy": [np.pi, 0, np.pi / 2]}
+        return {"pose": pose, "path": "linear", **more}
+
+    def cube() -> np.ndarray:
+        return np.array(arm.planner.body_pose(arm.now, "cube").p)
+
+    arm.do("grasp", {"until": "posture"})
+    arm.do("move", {**to(-0.24), "path": "free"})
+    assert "'cube'" in arm.refused("move", to(0.0)).cause
+    arm.do("move", to(0.0, touch=["cube"]))
+    pushed = cube()
+    np.testing.assert_allclose(pushed, [0.5, 0.05, 0.24], atol=0.006)
+    assert "'cube'" in arm.refused("move", {"to": "home"}).cause  # it still leans on it
+    arm.do("move", to(-0.05, touch=["cube"]))
+    np.testing.assert_array_equal(cube(), pushed)
+    arm.do("move", {"to": "home"})
+
+
 def test_a_soft_limit_is_planned_for(bench: Make) -> None:
     """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973: from beyond it is led back."""
     refusal = bench("panda").refused("move", {"to": {"panda_joint1": 2.95}})

@@ -3,22 +3,25 @@
 - move: {to: home}
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
+- move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from manipcli.model.build_scene import pose_transform
-from manipcli.model.condition import Problem
+from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import NOTHING, Planner
+from manipcli.plan.prediction import pushed
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
 from manipcli.spec.base import Model, problem
@@ -33,6 +36,9 @@ class MoveSpec(Model):
 
     After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
     of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
+
+    What `touch` names is no obstacle to the hand: it is pushed, or pressed on, and so it is to the move that leaves it.
+    It is foreseen to slide with the tool; where it does not, the steps that follow are planned again.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
@@ -44,6 +50,7 @@ class MoveSpec(Model):
         "posture. `free`: the same, to another posture where the way to the nearest one is not free. Default `free`.",
     )
     speed: Speed = 1.0
+    touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
 
     @model_validator(mode="after")
     def _one_target(self) -> MoveSpec:
@@ -61,7 +68,8 @@ class MoveSpec(Model):
 
 def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
     """One motion; a named pose that includes the hand moves the hand at the same time, unless it was closed."""
-    draft = Draft(planner, situation, verb="move")
+    allowed = planner.may_touch(situation, spec.touch) if spec.touch else NOTHING
+    draft = Draft(planner, situation, verb="move", allowed=allowed)
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
         values = dict(zip(pose.joints, pose.positions, strict=True))
@@ -77,16 +85,21 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
             draft.straight("move", X_WT, speed=spec.speed)
         else:
             draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free")
-    return draft.plan()
+    planned = draft.plan()
+    for motion in planned.motions:
+        if spec.touch and motion.trajectory is not None:
+            planned = replace(planned, end=pushed(planner, situation, planned.end, motion.trajectory, spec.touch))
+    return planned
 
 
 def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Unknown poses, joints and frames."""
+    """Unknown poses, joints, frames and bodies."""
+    found = tuple(one for k, name in enumerate(spec.touch) for one in unknown_body(scene, name, ("touch", k)))
     if isinstance(spec.to, str):
-        return unknown_pose(robot, spec.to, ("to",))
+        return found + unknown_pose(robot, spec.to, ("to",))
     if spec.to is not None:
-        return tuple(problem for name in spec.to for problem in unknown_joint(robot, name, ("to", name)))
-    return unknown_frame(scene, spec.frame, ("frame",))
+        return found + tuple(problem for name in spec.to for problem in unknown_joint(robot, name, ("to", name)))
+    return found + unknown_frame(scene, spec.frame, ("frame",))
 
 
 def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
