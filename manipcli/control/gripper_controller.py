@@ -215,6 +215,7 @@ class GripperController:
                 self._began = time
                 self._moved = [time] * len(self._fingers)
                 self._unwind(measured.position)
+                self._freeze()
             self._judge(time, period, measured, contact_force)
             if self._goal is not None:
                 self._ramp(period)
@@ -235,6 +236,7 @@ class GripperController:
         self._activated = True
         if self._pid is not None:
             self._pid.reset()
+            self._pid.freeze(False)
         self._reference[:] = measured.position
         self._velocity[:] = 0.0
         self._set_effort(self._effort if self._goal is not None else self._default_effort)
@@ -243,6 +245,14 @@ class GripperController:
         """Takes back references that push away from their targets."""
         wrong = (self._target - position) * (self._reference - position) < 0.0
         self._reference[wrong] = position[wrong]
+
+    def _freeze(self) -> None:
+        """Fingers that press as hard as asked press no harder: their integrals stay."""
+        if self._pid is not None:
+            presses = np.zeros(len(self.joints), dtype=np.bool_)
+            for finger, stop in zip(self._fingers, self._stops, strict=True):
+                presses[list(finger)] = stop == "contact"
+            self._pid.freeze(presses)
 
     def _ramp(self, period: float) -> None:
         """Moves the references of the fingers that have not stopped towards their targets."""
@@ -335,6 +345,7 @@ class GripperController:
     def _stop(self, f: int, why: FingerStop, text: str) -> None:
         self._stops[f], self._texts[f] = why, text
         self._moving[list(self._fingers[f])] = 0.0
+        self._freeze()
         self._ticks_left = 0
         self._watch()
 

@@ -129,7 +129,7 @@ class Pid:
         self._integral_min = np.where(integrates, np.minimum(self._i_min / safe_i, self._i_max / safe_i), -np.inf)
         self._integral_max = np.where(integrates, np.maximum(self._i_min / safe_i, self._i_max / safe_i), np.inf)
         self._has_i, self._has_d = bool(integrates.any()), bool(g["d"].any())
-        self._has_deadband = bool(self._deadband.any())
+        self.freeze(False)
         self._clamps_u = bool(np.isfinite(self._u_min).any() or np.isfinite(self._u_max).any())
         self._clamps_i = bool(np.isfinite(self._i_min).any() or np.isfinite(self._i_max).any())
         self._is_pd = not (self._has_i or self._clamps_u)
@@ -143,6 +143,11 @@ class Pid:
     def i_term(self) -> Array:
         """(n) the integral term I, in units of the command."""
         return self._term.copy()
+
+    def freeze(self, which: npt.ArrayLike) -> None:
+        """From now on the integrals of `which` (n), true or false, stay as they are, and no others."""
+        self._counted_above = np.where(which, np.inf, self._deadband)
+        self._has_deadband = bool(self._counted_above.any())
 
     def reset(self, keep_integral: bool = False) -> None:
         """Forgets the last error and command, and the integral too unless `keep_integral`."""
@@ -247,7 +252,7 @@ class Pid:
 
     def _counted(self, e: Array) -> Array:
         """The errors that are integrated."""
-        return np.where(np.abs(e) > self._deadband, e, 0.0) if self._has_deadband else e
+        return np.where(np.abs(e) > self._counted_above, e, 0.0) if self._has_deadband else e
 
     def _apply_finite(self, errors: Array, dt: float, command: Array) -> None:
         """NaN for the joints whose error is not finite, their state kept; the others as ever."""

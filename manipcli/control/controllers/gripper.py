@@ -10,8 +10,9 @@
         allow_stalling: true
 
 Effort: u = PID(e, de/dt), clamped to the maximum effort; what holds the fingers against gravity comes on top. Where a
-finger stops, its reference stays: the spring of the gains keeps pressing with what it had built up. Position: u = the
-reference; the joints' own effort limits say how hard it presses.
+finger stops, its reference stays: the spring of the gains keeps pressing with what it had built up, and so does the
+integral of one that presses as hard as asked. Position: u = the reference; the joints' own effort limits say how hard
+it presses.
 
 Goals, results and parameters are those of ROS's GripperCommand: a position for all joints or one each, `max_effort`,
 `stalled`, `reached_goal`, `allow_stalling`. What stalls against an object has grasped it, so that stalling is allowed

@@ -54,6 +54,23 @@ class Hand:
 FREE = [9, 9, 9, 9]
 
 
+@pytest.mark.parametrize("compat", [None, "ros1"])
+def test_an_integral_gain_does_not_press_harder_and_harder(compat):
+    """At 2 N asked; unfrozen, 3 s of the error of 0.05 rad that is left would add 6 N."""
+    controller = make(gains={j: GainsSpec(p=3.0, i=4.0, d=0.1) for j in JOINTS}, compat=compat)
+    hand = Hand([0.4, 9, 0.4, 9])
+    handle = controller.send_goal(GripperGoal(target=np.ones(4), force=2.0))
+    hand.run(controller, 0.6)
+    assert handle.result.fingers == ("contact", "contact")
+    pressed = 500.0 * (hand.q[[0, 2]] - 0.4)
+    hand.run(controller, 3.0)
+    assert 500.0 * (hand.q[[0, 2]] - 0.4) == pytest.approx(pressed, rel=0.05)
+    assert (pressed > 1.0).all()
+    controller.send_goal(GripperGoal(target=np.zeros(4)))
+    hand.run(controller, 3.0)
+    assert hand.q == pytest.approx(np.zeros(4), abs=0.02)
+
+
 def test_nothing_in_the_hand_means_every_finger_reached():
     controller, hand = make(), Hand(FREE)
     handle = controller.send_goal(GripperGoal(target=np.array([1, 0.5, 1, 0.5]), force=2.0))
