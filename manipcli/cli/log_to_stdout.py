@@ -27,7 +27,7 @@ def refuse_stdout(format_: OutputFormat) -> None:
     """
     if format_ == "json":
         message = "--log - and --format json both want stdout"
-        raise InvalidInput([Finding("USE047", message, hint="give the log a file, or leave out --format json")])
+        raise InvalidInput([Finding("USE051", message, hint="give the log a file, or leave out --format json")])
     if console.result_is_terminal():
         message = "the log would go to the terminal, which cannot show it"
         raise InvalidInput([Finding("USE048", message, hint="redirect it: --log - > run.mcap")])

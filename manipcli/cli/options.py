@@ -59,7 +59,7 @@ def seconds(word: str) -> float:
         value = float(word) if word.strip()[-1:].isdecimal() else to_si(word, TIME)
     except (ValueError, UnitError) as error:
         message = error.cause if isinstance(error, UnitError) else f"'{word}' is no time"
-        raise InvalidInput([Finding("USE046", message, hint="write 3.2, '3.2 s' or 250ms")]) from error
+        raise InvalidInput([Finding("USE050", message, hint="write 3.2, '3.2 s' or 250ms")]) from error
     return value
 
 

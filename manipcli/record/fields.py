@@ -134,7 +134,8 @@ def ways(message: Message, name: FieldName) -> tuple[Way, ...]:
 
 
 def _hint(message: Message) -> str:
-    return f"fields: {listed(numbers(message))}"
+    known = numbers(message)
+    return f"fields: {listed(known)}" if known else "none of its fields is a number"
 
 
 class _Budget:
