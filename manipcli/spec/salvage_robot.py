@@ -65,7 +65,7 @@ def _without(root: MappingNode, faults: list[Loc]) -> MappingNode:
     return root
 
 
-def _unposed(root: MappingNode, pose: str, group: str | None) -> Node:
+def _unposed(root: MappingNode, pose: str, group: str | None = None) -> Node:
     """The poses, of which this one (its part of one group) says nothing any more: others may name it."""
     poses = root.entries["poses"].node
     assert isinstance(poses, MappingNode)
@@ -78,7 +78,7 @@ def _unposed(root: MappingNode, pose: str, group: str | None) -> Node:
     return poses.with_node(pose, MappingNode({name: Entry(old.place, empty) for name in names}, old.place))
 
 
-def _ungrouped(root: MappingNode, group: str | None) -> MappingNode:
+def _ungrouped(root: MappingNode, group: str | None = None) -> MappingNode:
     """Without what poses say of a group that is not known any more, or of all of them."""
     poses = root.get("poses")
     if not isinstance(poses, MappingNode) or group is None:
