@@ -52,7 +52,12 @@ def read_parts(description: Description) -> Parts:
     links_by_name = _named(reader, root, "link", places)
     joints_by_name = _named(reader, root, "joint", places)
     if not links_by_name:
-        reader.report("URDF080", "the description has no link", root.place)
+        hint = None
+        if root.first("group") or root.first("disable_collisions"):
+            hint = "this looks like an SRDF: give the URDF that belongs to it"
+        elif description.expanded:
+            hint = "macros do nothing until they are called: give the file that calls them"
+        reader.report("URDF080", "the description has no link", root.place, hint=hint)
     materials = read_materials(reader, root)
     links = {key: read_link(reader, each, key, description.packages, materials) for key, each in links_by_name.items()}
     joints = {key: read_joint(reader, element, key) for key, element in joints_by_name.items()}

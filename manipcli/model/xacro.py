@@ -129,7 +129,7 @@ class _Expansion:
         module = self._module
         document = read_document(path)
         self._current = document.documentElement
-        module.init_stacks(str(path))
+        module.init_stacks(str(path.absolute()))
         try:
             module.process_doc(document, mappings=dict(arguments), verbosity=0)
         except InvalidInput:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Final
 
-from manipcli.core.text import any_of, did_you_mean, nearest
+from manipcli.core.text import any_of, nearest
 
 _TAGS: Final = ("arg", "attribute", "call", "element", "if", "include", "insert_block", "macro", "property", "unless")
 """Of xacro itself."""
@@ -15,9 +15,11 @@ class UnknownArgument(NameError):
     """`$(arg NAME)` of an argument that has neither a value nor a default."""
 
     def __init__(self, name: str, known: Collection[str]) -> None:
+        close = nearest(name, known)
         self.hint = (
-            did_you_mean(name, known)
-            or f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
+            f"did you mean {any_of(close)}?"
+            if close
+            else f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
         )
         super().__init__(f"argument '{name}' is not given and has no default")
 

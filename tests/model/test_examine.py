@@ -76,6 +76,21 @@ def test_a_folder_is_no_description(tmp_path: Path) -> None:
     assert "is a folder" in found.findings[0].message
 
 
+@pytest.mark.parametrize(
+    ("text", "name", "hint"),
+    [
+        ('<robot name="r"><group name="arm"/></robot>', "r.srdf", "SRDF"),
+        (f'{XACRO}<xacro:macro name="m"><link name="a"/></xacro:macro></robot>', "m.xacro", "calls them"),
+        ('<robot name="r"/>', "r.urdf", None),
+    ],
+)
+def test_a_description_without_links_is_sent_to_the_one_with_them(
+    tmp_path: Path, text: str, name: str, hint: str | None
+) -> None:
+    (finding,) = (one for one in look(tmp_path, text, name).findings if one.code == "URDF080")
+    assert (hint in (finding.hint or "")) if hint else finding.hint is None
+
+
 def test_an_element_that_is_never_closed_is_named(tmp_path: Path) -> None:
     found = look(tmp_path, '<robot name="r">\n<link name="a">\n</robot>')
     assert found.findings[0].place is not None

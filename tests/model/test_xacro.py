@@ -124,6 +124,28 @@ def test_a_pattern_includes_the_files_of_one_folder(
     assert names(expand(Path("robot"), include)) == ["a", "b"]
 
 
+@pytest.mark.parametrize("written", ["$(dirname)/part.xacro", "${abs_filename('part.xacro')}", "part.xacro"])
+def test_the_folder_of_a_description_is_that_folder_from_wherever_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str
+) -> None:
+    (tmp_path / "robot" / "deep").mkdir(parents=True)
+    deeper = HEAD + '<xacro:include filename="$(dirname)/deep/b.xacro"/></robot>'
+    (tmp_path / "robot" / "part.xacro").write_text(deeper)
+    (tmp_path / "robot" / "deep" / "b.xacro").write_text('<robot><link name="b"/></robot>')
+    monkeypatch.chdir(tmp_path)
+    include = f'<xacro:include filename="{written}"/><link name="$(dirname)"/>'
+    assert names(expand(Path("robot"), include)) == ["b", str(tmp_path / "robot")]
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("nmae", "did you mean 'name'?"), ("ip", "give it: `args: {ip: VALUE}` in a robot file, ip:=VALUE")],
+)
+def test_an_argument_that_is_missing_is_to_be_given(tmp_path: Path, name: str, hint: str) -> None:
+    finding = refused(tmp_path, f'<xacro:arg name="name" default="x"/><link name="$(arg {name})"/>').findings[0]
+    assert (finding.hint or "").startswith(hint)
+
+
 def test_packages_are_found_through_our_search(tmp_path: Path) -> None:
     (tmp_path / "stack" / "hand").mkdir(parents=True)
     (tmp_path / "stack" / "arm").mkdir()
