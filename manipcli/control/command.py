@@ -47,9 +47,8 @@ class JointCommand:
 
     def obey(self, modes: Sequence[Mode]) -> None:
         """From now on each joint obeys this; what it was told before is forgotten."""
-        if tuple(modes) != self.modes:
-            self.modes = tuple(modes)
-            self.version += 1
+        self.modes = tuple(modes)
+        self.version += 1
         for row in (self.position, self.velocity, self.acceleration, self.effort):
             row[:] = 0.0
 

@@ -44,11 +44,9 @@ HELD: Final = 0.1
 
 def cuts_of(session: Session) -> Cuts:
     """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
-    names = session.robot.joint_names
-    joints = dict(zip(names, map(int, session.saturations), strict=True))
-    efforts = dict(zip(names, map(int, session.saturated_efforts), strict=True))
+    joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return Cuts(joints, actuators, session.ticks, efforts)
+    return Cuts(joints, actuators, session.ticks)
 
 
 class StepsRun:

@@ -38,7 +38,7 @@ Version = Annotated[
     ),
     AfterValidator(_three_numbers),
 ]
-Arguments = dict[str, str | int | float | bool]
+Arguments = dict[str, bool | int | float | str]
 
 UNIT_TOLERANCE = 1e-3
 """How far the length of an axis or of a quaternion may be from 1 without a word."""
