@@ -4,46 +4,31 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Final
 
-from manipcli.control.factory import controller_findings
 from manipcli.core.errors import Finding, InvalidInput, Loc
+from manipcli.flow.agreement import disagreements, not_there
 from manipcli.flow.changed_files import Files, out_of_range
 from manipcli.flow.gathered import Gathered
 from manipcli.flow.robot_file import gather_robot
 from manipcli.flow.stand_ins import named_robot, named_scene
-from manipcli.flow.switches import foreseen
-from manipcli.flow.unjudged import unjudged
 from manipcli.flow.vary import bind
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import Drawn
-from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Problem, Setting
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.joint_units import misread_units
 from manipcli.model.packages import Packages
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.scene_names import misnamed
 from manipcli.plan import retimer
-from manipcli.plan.claims import Claims, no_hand
-from manipcli.plan.names import UnknownPosture
-from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
-from manipcli.spec.retry import retried
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.salvage import intended_ids
 from manipcli.spec.task import TaskSpec
-
-SHARED: Final = ("TASK220", "TASK227")
-"""A body or a frame, and a link of the robot, of one name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +131,11 @@ def load_task(
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
     told: tuple[Finding, ...] = ()
     if built:
-        commanding = controllers_file if controllers_file else None
-        found = unusable(read, commanding, built[0], scene or named_scene(read.spec))
+        found = disagreements(read, controllers_file or None, built[0], scene or named_scene(read.spec))
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
     else:
-        found = tuple(_unusable(read, named_robot(read.spec), scene or named_scene(read.spec), None))
-        gathered.findings += [finding for finding in found if finding.code not in SHARED]
+        gathered.findings += not_there(read, named_robot(read.spec), scene or named_scene(read.spec))
     if task is not None and robot_file and controllers_file:
         varied, wrong = bind(task, robot_file, controllers_file)
         gathered.findings += (*wrong, *out_of_range(Files(task, robot_file, controllers_file), varied))
@@ -167,22 +150,6 @@ def load_task(
         scene=scene,
         findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes, *told),
     )
-
-
-def unusable(
-    task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
-) -> tuple[Finding, ...]:
-    """What each of these is sound without and what they do not have together: names that are not there, units
-    that fit no joint, what the engine refuses, what no controller commands. Warnings and notes are among it."""
-    claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
-    misclaimed = any(finding.severity == "error" for finding in claimed)
-    claims = None if misclaimed or not controllers else Claims.of(controllers.spec)
-    unusable = _unusable(task, robot, scene, claims)
-    warned = () if unusable else unjudged(task, robot, scene)
-    misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
-    if controllers:
-        misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
-    return (*unusable, *_refused(task, robot), *claimed, *misread, *warned)
 
 
 def load_libraries(task: Task) -> None:
@@ -212,87 +179,3 @@ def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path | None:
             hint = load.sibling(found)
         raise InvalidInput([task.source.finding(231, (key,), message, hint=hint)])
     return found
-
-
-def _unusable(task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: Claims | None) -> list[Finding]:
-    """Everything that steps, conditions and expectations speak of and that is not there; of steps also what no
-    controller could carry out, where it is known who `claims` what."""
-    found: list[tuple[Loc, Problem]] = []
-    uncommanded: list[tuple[Loc, Problem]] = []
-    refused: list[tuple[Loc, Problem]] = []
-    spec = task.spec
-    ids = tuple(step.id for step in spec.steps if step.id is not None)
-    setting = Setting(robot, scene, ids)
-    if task.source.kept:
-        setting = Setting(robot, scene, intended_ids(task.source, STEPS.names), in_order=False)
-    for k, step in enumerate(spec.steps):
-        member, at = STEPS[step.verb], ("steps", k, step.verb)
-        unknown = member.check(step.body, robot, scene)
-        if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
-            unknown = (no_hand(robot), *(p for p in unknown if not isinstance(p, UnknownPosture)))
-        found += [(at, p) for p in unknown]
-        if claims is not None and not unknown:
-            without = member.uncommanded(step.body, robot, claims)
-            uncommanded += [(at, p) for p in without]
-            switch = member.request(step.body)
-            if switch is not None and not without:
-                misfits, claims = foreseen(switch, claims, robot)
-                refused += [(at, p) for p in misfits]
-        if step.until is not None:
-            found += [(("steps", k, "until"), p) for p in until_problems(step.until, step.id, setting, CONDITIONS)]
-    for key, expectations in (("expect", spec.expect), ("watch", spec.watch)):
-        for k, expected in enumerate(expectations):
-            found += [((key, k), p) for p in expectation_problems(expected, setting, CONDITIONS)]
-    again: list[Finding] = []
-    for k, step in enumerate(() if task.source.kept else spec.steps):
-        try:
-            tried = retried(task, k)
-        except InvalidInput as invalid:
-            again += [replace(one, message=f"{one.message}, when it is tried again") for one in invalid.findings]
-            continue
-        if tried is not step:
-            loc: Loc = ("steps", k, "on_fail", "with")
-            wrong = STEPS[tried.verb].check(tried.body, robot, scene)
-            wrong += () if tried.until is None else until_problems(tried.until, step.id, setting, CONDITIONS)
-            before = {p.message for at, p in found if at[:2] == loc[:2]}
-            found += [(loc, replace(p, loc=())) for p in wrong if p.message not in before]
-    findings = [
-        *again,
-        *(
-            task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
-            for number, told in ((230, found), (232, uncommanded), (233, refused))
-            for loc, p in told
-        ),
-    ]
-    links = {link.name for link in robot.links}
-    for number, key, named in ((220, "scene", scene.bodies), (227, "frames", scene.frames)):
-        message, hint = f"robot '{robot.name}' has a link of this name", "choose another: a log has one frame of a name"
-        findings += [
-            task.source.finding(number, (key, one.name), message, hint=hint) for one in named if one.name in links
-        ]
-    known = [pose.name for pose in robot.poses]
-    if spec.start is not None and spec.start not in known:
-        hint = f"poses: {', '.join(known)}"
-        message = f"robot '{robot.name}' has no pose '{spec.start}'"
-        findings.append(task.source.finding(230, ("start",), message, hint=hint))
-    if spec.simulation.engine not in ENGINES.names:
-        message = f"there is no engine '{spec.simulation.engine}'"
-        loc = ("simulation", "engine")
-        findings.append(task.source.finding(230, loc, message, hint=f"engines: {', '.join(ENGINES.names)}"))
-    return findings
-
-
-def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
-    """Why the engine of the task cannot hold its robot: told at the link, or where the task names the robot."""
-    engine = task.spec.simulation.engine
-    if engine not in ENGINES.names:
-        return ()
-    return tuple(
-        replace(finding, place=finding.place or task.place("robot")) for finding in ENGINES[engine].refuses(robot)
-    )
-
-
-def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
-    """What is wrong with who commands what, and what is only to be told."""
-    period = task.simulation.control_period
-    return controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))

@@ -11,7 +11,8 @@ from pathlib import Path
 from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
-from manipcli.flow.load import Task, unusable
+from manipcli.flow.agreement import disagreements
+from manipcli.flow.load import Task
 from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.sample import sampled
@@ -79,7 +80,7 @@ def recorded_task(
         return replace(found_scene, gravity=frozen(file.spec.simulation.gravity))  # recorded is what was drawn
 
     scene = scene_of(task)
-    found = unusable(task, controllers, robot, scene)
+    found = disagreements(task, controllers, robot, scene)
     if any(finding.severity == "error" for finding in found):
         raise InvalidInput(found)
     made = Task(
