@@ -88,7 +88,8 @@ def causes(page: RunPage) -> Markup | None:
         )
         shown.append(element("div", *lines, class_="cause"))
     cut = str(page.verdict.cuts)
-    rest = shown[1 + ALSO :] if page.facts is not None else []  # of an invalid file nothing else tells them
+    # Of an invalid file nothing else tells them; and one alone is as short as the line that it would hide behind.
+    rest = shown[1 + ALSO :] if page.facts is not None and len(shown) > 2 + ALSO else []
     folded = element("details", element("summary", f"{len(rest)} more"), *rest) if rest else None
     others = (*shown[1 : len(shown) - len(rest)], folded)
     also = element("div", element("p", "Also:", class_="about"), *others, class_="also") if shown[1:] else None

@@ -148,7 +148,7 @@ def test_many_causes_are_folded_where_the_page_tells_them_again() -> None:
     causes = tuple(Cause(f"expectation 'e{k}' fails", "") for k in range(12))
     folds = [
         [attributes for tag, attributes in _Page(render_page(page)).found if tag == "details"]
-        for page in (replace(_page(), causes=causes[:4]), replace(_page(), causes=causes))
+        for page in (replace(_page(), causes=causes[:5]), replace(_page(), causes=causes))
     ]
     assert len(folds[1]) == len(folds[0]) + 1
     assert " 8 more " in _Page(render_page(replace(_page(), causes=causes))).words
