@@ -234,7 +234,10 @@ def _told(
     if kind == "none_required":
         return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
-    return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], _type_hint(kind, node)
+    hint = _type_hint(kind, node)
+    if hint is None and kind in ("model_type", "model_attributes_type"):
+        hint = _to_write(shape.keys_of(shape.at(model, path, dict(first.tags))))
+    return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], hint
 
 
 _RANGES = {
@@ -312,6 +315,12 @@ def _unknown_key(path: Loc, tags: dict[int, str], model: type[BaseModel]) -> tup
     if close and known[close[0]].description:
         hint = f"{hint} ({close[0]}: {known[close[0]].description})"
     return f"unknown key '{dotted((path[-1],))}'", hint
+
+
+def _to_write(known: dict[str, FieldInfo]) -> str | None:
+    """How a mapping with these keys is written: `{to: ...}`."""
+    needed = [key for key, field in known.items() if field.is_required()] or list(known)[:1]
+    return f"write {{{', '.join(f'{key}: ...' for key in needed)}}}" if needed else None
 
 
 def _unknown_word(expected: str, node: Node) -> tuple[str, str | None]:

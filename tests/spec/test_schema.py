@@ -104,3 +104,18 @@ def test_what_the_program_refuses_is_red(step: str) -> None:
     with pytest.raises(InvalidInput):
         load_task_text(text, "t.yaml", model=task_spec())
     assert _red(text) != []
+
+
+@pytest.mark.parametrize(
+    ("step", "hint"),
+    [
+        ("move: home", "write {to: ...}"), ("pick: cup", "write {object: ...}"),
+        ("release: open", "write {posture: ...}"), ("pour: cup", "write {object: ..., into: ...}"),
+    ],
+)  # fmt: skip
+def test_a_word_in_place_of_a_mapping_is_told_what_to_write(step: str, hint: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        load_task_text(f"{HEAD}steps:\n  - {step}\n", "t.yaml", model=task_spec())
+    (found,) = caught.value.findings
+    assert "expected a mapping, not '" in found.message
+    assert found.hint == hint
