@@ -8,6 +8,7 @@ from manipcli.core.text import shorten
 from manipcli.model.check import Check, Subject
 from manipcli.model.control_tags import controlled_joints
 from manipcli.model.located_xml import Element
+from manipcli.model.robot import JointLimits
 from manipcli.model.samples import one_joint
 from manipcli.model.urdf_numbers import finite
 
@@ -30,49 +31,53 @@ def _find(subject: Subject) -> Iterator[Finding]:
             yield from _switch(each, "enable")
         yield from _legacy(joint.element)
         for interface in (*joint.commands, *joint.element.all("state_interface")):
-            kind = interface.attributes.get("data_type", "double").strip()
-            if kind not in TYPES:
-                message = f"joint '{joint.name}': an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
-                yield Finding("URDF324", message, interface.place, None, "warning")
-            for each in interface.all("limits"):
-                yield from _switch(each, "enable")
-            values: dict[str, float] = {}
-            size = interface.attributes.get("size", "1").strip()
-            if not _whole(size):
-                message = f"joint '{joint.name}': the size of an interface is '{size}'; expected a whole number"
-                yield Finding("URDF324", message, interface.place, None)
-            for parameter in interface.all("param"):
-                key = parameter.attributes.get("name", "")
-                value = finite(parameter.text.strip())
-                if key not in ("min", "max", "initial_value"):
-                    continue
-                if not parameter.text.strip():
-                    if key != "initial_value":  # an empty one is common, and counts as none
-                        message = f"joint '{joint.name}': <param name=\"{key}\"> is empty; expected a number"
-                        yield Finding("URDF324", message, parameter.place, "state it, or take it out")
-                    continue
-                if value is None:
-                    message = f"joint '{joint.name}': '{shorten(parameter.text.strip())}' is no finite number for {key}"
-                    yield Finding("URDF324", message, parameter.place, None)
-                else:
-                    values[key] = value
-            own = limits.get(joint.name)
-            start = values.get("initial_value")
-            if "min" in values and "max" in values and values["min"] > values["max"]:
-                message = f"joint '{joint.name}': min {values['min']:g} is above max {values['max']:g}"
-                yield Finding("URDF324", message, interface.place, None)
-            if start is None or own is None or interface.attributes.get("name") != "position":
-                continue
-            if (own.lower is not None and start < own.lower - 1e-9) or (
-                own.upper is not None and start > own.upper + 1e-9
-            ):
-                message = f"joint '{joint.name}': the initial position {start:g} is outside of its limits"
-                hint = (
-                    f"limits: {own.lower:g} to {own.upper:g}"
-                    if own.lower is not None and own.upper is not None
-                    else None
-                )
-                yield Finding("URDF324", message, interface.place, hint, "warning")
+            yield from _interface(f"joint '{joint.name}'", interface, limits.get(joint.name, JointLimits()))
+
+
+def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[Finding]:
+    kind = interface.attributes.get("data_type", "double").strip()
+    if kind not in TYPES:
+        message = f"{joint}: an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
+        yield Finding("URDF324", message, interface.place, None, "warning")
+    for each in interface.all("limits"):
+        yield from _switch(each, "enable")
+    size = interface.attributes.get("size", "1").strip()
+    if not _whole(size):
+        message = f"{joint}: the size of an interface is '{size}'; expected a whole number"
+        yield Finding("URDF324", message, interface.place, None)
+    values, wrong = _parameters(joint, interface)
+    yield from wrong
+    if "min" in values and "max" in values and values["min"] > values["max"]:
+        message = f"{joint}: min {values['min']:g} is above max {values['max']:g}"
+        yield Finding("URDF324", message, interface.place, None)
+    start = values.get("initial_value")
+    if start is None or interface.attributes.get("name") != "position":
+        return
+    lower, upper = limits.range
+    if not lower - 1e-9 <= start <= upper + 1e-9:
+        message = f"{joint}: the initial position {start:g} is outside of its limits"
+        hint = f"limits: {lower:g} to {upper:g}" if None not in (limits.lower, limits.upper) else None
+        yield Finding("URDF324", message, interface.place, hint, "warning")
+
+
+def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[Finding]]:
+    """The numbers that an interface states, and what is wrong with the others."""
+    values: dict[str, float] = {}
+    wrong = []
+    for parameter in interface.all("param"):
+        key, text = parameter.attributes.get("name", ""), parameter.text.strip()
+        value = finite(text)
+        if key not in ("min", "max", "initial_value"):
+            continue
+        if value is not None:
+            values[key] = value
+        elif text:
+            message = f"{joint}: '{shorten(text)}' is no finite number for {key}"
+            wrong.append(Finding("URDF324", message, parameter.place, None))
+        elif key != "initial_value":  # an empty one is common, and counts as none
+            message = f'{joint}: <param name="{key}"> is empty; expected a number'
+            wrong.append(Finding("URDF324", message, parameter.place, "state it, or take it out"))
+    return values, wrong
 
 
 def _switch(element: Element, attribute: str) -> Iterator[Finding]:
