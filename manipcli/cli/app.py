@@ -6,6 +6,7 @@ import errno
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Annotated, Final
@@ -127,6 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:  # this process is that of the command
         collector.spare()
+        if not os.environ.get("MANIPCLI_DEBUG"):
+            warnings.simplefilter("ignore")  # an overflow of numpy's tells users nothing that a finding does not
     console.prepare()
     try:
         code = _app(words)(args=words or ["--help"], prog_name="manipcli", standalone_mode=False)

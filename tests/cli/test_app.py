@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 
 import manipcli
 from manipcli.cli.app import COMMANDS, main
+from manipcli.core import collector
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
 from manipcli.core.geometry import Transform
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
@@ -348,3 +350,15 @@ def test_a_shell_completes_commands_and_options(run_cli: Callable[..., Any], tmp
 
     assert completions("manipcli run --se", 2) == {"--seed", "--set"}
     assert completions("manipcli che", 1) == {"check", "check-urdf"}
+
+
+@pytest.mark.parametrize("debug", [False, True])
+def test_a_command_shows_no_warning_of_a_library(monkeypatch: pytest.MonkeyPatch, debug: bool) -> None:
+    monkeypatch.setattr(sys, "argv", ["manipcli", "--version"])
+    monkeypatch.setattr(collector, "spare", lambda: None)
+    monkeypatch.setenv("MANIPCLI_DEBUG", "1" if debug else "")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert main() == 0
+        np.divide(1e308, np.array([1e-9]))
+    assert bool(told) == debug
