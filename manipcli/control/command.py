@@ -47,8 +47,9 @@ class JointCommand:
 
     def obey(self, modes: Sequence[Mode]) -> None:
         """From now on each joint obeys this; what it was told before is forgotten."""
-        self.modes = tuple(modes)
-        self.version += 1
+        if tuple(modes) != self.modes:
+            self.modes = tuple(modes)
+            self.version += 1
         for row in (self.position, self.velocity, self.acceleration, self.effort):
             row[:] = 0.0
 

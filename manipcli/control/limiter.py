@@ -157,8 +157,16 @@ class _Efforts:
             np.add(rows[4], rows[3], rows[4])
         return self._window.holds()
 
-    def cut(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+    def cut(
+        self,
+        command: JointCommand,
+        position: Array,
+        velocity: Array,
+        saturated: npt.NDArray[np.bool_],
+        by_effort: npt.NDArray[np.int64],
+    ) -> None:
         own = self._limits
+        by_effort += np.abs(command.effort) > own.effort
         limited = limit_effort(
             command.effort,
             effort=own.effort,
@@ -293,6 +301,7 @@ class JointLimiter:
 
     Attributes:
         saturations: (n) int, in how many ticks each joint's command was cut.
+        by_effort: (n) int, in how many of them it asked for more effort than the joint may give.
         saturated: (n) bool, in the last tick.
 
     Args:
@@ -313,6 +322,7 @@ class JointLimiter:
         self._others: list[_Positions | _Velocities] = []
         self._cut = False
         self.saturations = np.zeros(n, dtype=np.int64)
+        self.by_effort = np.zeros(n, dtype=np.int64)
         self.saturated = np.zeros(n, dtype=np.bool_)
 
     def reset(self) -> None:
@@ -320,6 +330,7 @@ class JointLimiter:
         for group in self._others:
             group.fresh = True
         self.saturations[:] = 0
+        self.by_effort[:] = 0
         self.saturated[:] = False
         self._cut = False
 
@@ -357,7 +368,7 @@ class JointLimiter:
             self._refuse_not_finite(command, position, velocity)
         else:
             self._refuse_not_finite(command, position, velocity)
-            self._efforts.cut(command, position, velocity, self.saturated)
+            self._efforts.cut(command, position, velocity, self.saturated, self.by_effort)
         for group in others:
             group.apply(command, position, velocity, self.saturated)
         self._cut = True

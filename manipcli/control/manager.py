@@ -254,8 +254,7 @@ class ControllerManager:
         self._active = tuple(slot for slot in self._slots.values() if slot.state == "active")
         claimed = Claims.of([slot.controller for slot in self._active])
         modes = ["free" if joint in self.following else mode_of(claimed.interfaces(joint)) for joint in self.joints]
-        if tuple(modes) != self.command.modes:
-            self.command.obey(modes)
+        self.command.obey(modes)
         self._feed_forward.serve([(s.controller, s.index, s.every, s.first) for s in self._active])
         for slot in self._active:
             slot.copies = self._copies(slot)

@@ -42,8 +42,8 @@ class MotorLimits:
         self._own = self._limits[self._at]
         self.watches = len(self._at) > 0
 
-    def count(self, effort: Array, cut: npt.NDArray[np.bool_], counts: npt.NDArray[np.int64]) -> None:
-        """Adds 1 to the `counts` (n) of joints whose motor gave all in the last tick.
+    def count(self, effort: Array, cut: npt.NDArray[np.bool_], *counts: npt.NDArray[np.int64]) -> None:
+        """Adds 1 to each of the `counts` (n) of joints whose motor gave all in the last tick.
 
         Args:
             effort: (n) measured [N m or N].
@@ -51,4 +51,7 @@ class MotorLimits:
             counts: (n), changed in place.
         """
         at = self._at
-        counts[at] += (np.abs(effort[at]) >= self._own) & ~cut[at]
+        full = (np.abs(effort[at]) >= self._own) & ~cut[at]
+        if full.any():
+            for each in counts:
+                each[at] += full

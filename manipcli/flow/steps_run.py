@@ -44,9 +44,11 @@ HELD: Final = 0.1
 
 def cuts_of(session: Session) -> Cuts:
     """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
-    joints = dict(zip(session.robot.joint_names, map(int, session.saturations), strict=True))
+    names = session.robot.joint_names
+    joints = dict(zip(names, map(int, session.saturations), strict=True))
+    efforts = dict(zip(names, map(int, session.saturated_efforts), strict=True))
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return Cuts(joints, actuators, session.ticks)
+    return Cuts(joints, actuators, session.ticks, efforts)
 
 
 class StepsRun:

@@ -118,6 +118,7 @@ def saturated_object(cuts: Cuts) -> dict[str, Json]:
     return {
         "joints": {name: count for name, count in cuts.joints.items() if count},
         "actuators": {name: count for name, count in cuts.actuators.items() if count},
+        "efforts": {name: cuts.efforts[name] for name, count in cuts.joints.items() if count and name in cuts.efforts},
     }
 
 

@@ -119,6 +119,11 @@ class Session:
         return np.where(self._counted, self._limiter.saturations, 0.0)
 
     @property
+    def saturated_efforts(self) -> Array:
+        """(n) in how many of these ticks it was more effort that was asked for than the joint may give."""
+        return np.where(self._counted, self._limiter.by_effort, 0.0)
+
+    @property
     def touching(self) -> tuple[Contact, ...]:
         """What touched when it was last looked at; at most ten ticks ago."""
         return self._touching
@@ -142,7 +147,8 @@ class Session:
         state.time[...] = time
         self._touch(state)
         if self._motors.watches:
-            self._motors.count(state.effort, self._limiter.saturated, self._limiter.saturations)
+            limiter = self._limiter
+            self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.by_effort)
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         if manager.faults:

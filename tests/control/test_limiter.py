@@ -80,6 +80,18 @@ def test_what_nobody_commands_passes_through():
     assert not limiter.saturations.any()
 
 
+def test_ticks_in_which_the_effort_was_too_much_are_counted_apart():
+    """More than 10 N m; then less, on a joint that is as fast as it may be; then both."""
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10)]), JointCommand(1)
+    command.obey(["effort"])
+    for effort, speed, counts in ((30.0, 0.0, (1, 1)), (5.0, 3.0, (2, 1)), (-30.0, 0.0, (3, 2)), (5.0, 0.0, (3, 2))):
+        command.effort[:] = effort
+        limiter.apply(command, np.zeros(1), np.array([speed]), 0.001)
+        assert (limiter.saturations[0], limiter.by_effort[0]) == counts
+    limiter.reset()
+    assert not limiter.by_effort.any()
+
+
 def test_what_goes_with_a_position_is_limited_too():
     """position + velocity + acceleration, and position + effort."""
     limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10, 5)]), JointCommand(1)

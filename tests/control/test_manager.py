@@ -14,6 +14,7 @@ from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel
+from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.controllers_file import ControllersSpec
 
@@ -301,3 +302,32 @@ def test_a_controller_cannot_change_what_was_measured():
         manager.update(0.0, world)
         assert "read-only" in manager.faults[0].message
         assert world.position.tolist() == World(2).position.tolist()
+
+
+def test_a_position_controller_is_not_told_the_velocity_and_effort_of_the_one_before():
+    """The joint obeys positions before and after; what nobody says any more is 0."""
+
+    def made(name, *interfaces):
+        return JointTrajectoryController(name=name, joints=("a",), command_interfaces=interfaces)
+
+    manager = ControllerManager([made("swift", "position", "velocity")], joints=("a",), period=0.001)
+    for name, interfaces in (("plain", ("position",)), ("strong", ("position", "effort"))):
+        manager.load(made(name, *interfaces))
+        manager.configure(name)
+    world = World(1)
+    manager.update(0.0, world)
+    manager["swift"].send_goal(JointTrajectory(["a"], [TrajectoryPoint([1.0], 1.0, [0.0])]))
+    for k in range(1, 500):
+        command = manager.update(k * 0.001, world)
+    assert command.velocity[0] > 1.0
+    manager.switch_to(["plain"], time=0.5)
+    assert manager.update(0.5, world).velocity[0] == 0.0
+    manager.switch_to(["strong"], time=0.6)
+    ahead = TrajectoryPoint([1.0], 1.0, [0.0], effort=[7.0])
+    manager["strong"].send_goal(JointTrajectory(["a"], [ahead]))
+    for k in range(600, 1500):
+        command = manager.update(k * 0.001, world)
+    assert command.effort[0] > 1.0
+    manager.switch_to(["plain"], time=1.5)
+    assert manager.update(1.5, world).effort[0] == 0.0
+    assert command.modes == ("position",)

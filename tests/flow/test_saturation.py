@@ -50,9 +50,10 @@ def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Pat
     assert report.verdict.verdict == "failed"
     assert report.verdict.cuts == judge_log(log).cuts
     assert report.verdict.cuts.joints["joint_2"] > 0
-    assert "joint 'joint_2' in" in render_text(log_info(log))
+    assert "joint 'joint_2' (effort) in" in render_text(log_info(log))
     counts = {k: int(v) for k, v in open_recording(log).metadata["saturated joints"].items()}
-    told = re.search(r"; cut at its limits: joint 'joint_2' in (\d+) of (\d+) ticks", report.verdict.steps[0].text)
+    cut = r"; cut at its limits: joint 'joint_2' \(effort\) in (\d+) of (\d+) ticks"
+    told = re.search(cut, report.verdict.steps[0].text)
     assert told is not None
     assert 0 < int(told[1]) <= min(int(told[2]), counts["joint_2"])
 
