@@ -120,7 +120,9 @@ def _decode(data: bytes, name: str) -> str:
                     "YAML101",
                     f"the byte 0x{data[error.start]:02x} is not UTF-8",
                     _place_at(before, len(before), name),
-                    hint="the file looks like latin-1; save it as UTF-8: iconv -f latin1 -t utf-8",
+                    hint="this is a binary file, and no YAML"
+                    if b"\0" in data
+                    else "the file looks like latin-1; save it as UTF-8: iconv -f latin1 -t utf-8",
                 )
             ]
         ) from None

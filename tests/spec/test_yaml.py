@@ -224,6 +224,16 @@ def test_a_reader_that_goes_on_gets_the_first_of_two_keys_and_nothing_for_no_num
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("data", "hint"),
+    [(b"a: caf\xe9", "iconv"), (b"\x89MCAP0\r\n\x01\0\0", "binary"), (b"\x7fELF\x02\x01\xff\0", "binary")],
+)
+def test_bytes_that_are_no_text_are_told_from_those_of_another_encoding(data: bytes, hint: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        parse(data, "f.yaml")
+    assert hint in (refused.value.findings[0].hint or "")
+
+
 @pytest.mark.parametrize("text", ["a: .nan\nb: [\n", "a: .nan\nb: *c\n", "a: .nan\n---\nb: 1\n"])
 def test_a_reader_that_goes_on_stops_where_the_text_is_no_yaml(text: str) -> None:
     told: list[Finding] = []
