@@ -33,6 +33,18 @@ steps:
 
 
 @pytest.fixture
+def nod(tmp_path: Path) -> Path:
+    """As short as a run can be."""
+    path = tmp_path / "nod.yaml"
+    path.write_text(
+        f"task: nod\nrobot: {ROOT}/robots/differential_wrist/robot.yaml\n"
+        f"controllers: {ROOT}/controllers/differential_wrist.yaml\n"
+        "simulation: {engine: kinematic, settle: 0 s}\nsteps: [{wait: 0.1 s}]\n"
+    )
+    return path
+
+
+@pytest.fixture
 def long_task(tmp_path: Path) -> Path:
     path = tmp_path / "long.yaml"
     path.write_text(LONG)
@@ -73,11 +85,11 @@ def test_a_terminal_gets_a_live_line_and_colour_and_the_result_last(tmp_path: Pa
 
 
 @pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
-def test_who_wants_no_colour_gets_none(tmp_path: Path, environment: dict[str, str]) -> None:
-    code, seen = on_a_terminal("run", HOME, cwd=tmp_path, **environment)
+def test_who_wants_no_colour_gets_none(nod: Path, environment: dict[str, str]) -> None:
+    code, seen = on_a_terminal("run", nod, cwd=nod.parent, **environment)
     assert code == 0
     assert "\x1b[3" not in seen
-    assert "✓ home passed" in seen
+    assert "✓ nod passed" in seen
 
 
 def test_a_narrow_terminal_is_not_wrapped(tmp_path: Path) -> None:
@@ -98,32 +110,32 @@ def test_a_narrow_terminal_is_not_wrapped(tmp_path: Path) -> None:
     assert max(map(len, live)) < 20
 
 
-def test_a_reader_that_leaves_early_changes_nothing(tmp_path: Path) -> None:
-    script = f"set -o pipefail; {' '.join(MANIPCLI)} run {HOME} | head -1"
-    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+def test_a_reader_that_leaves_early_changes_nothing(nod: Path) -> None:
+    script = f"set -o pipefail; {' '.join(MANIPCLI)} run {nod} | head -1"
+    done = subprocess.run(["bash", "-c", script], cwd=nod.parent, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.count("\n")) == (0, 1)
     assert "Traceback" not in done.stderr
     assert "Broken" not in done.stderr
-    assert (tmp_path / "runs" / "home.mcap").is_file()
+    assert (nod.parent / "runs" / "nod.mcap").is_file()
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
-def test_closed_streams_are_no_fault(tmp_path: Path, closed: str) -> None:
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_streams_are_no_fault(nod: Path, closed: str) -> None:
     done = subprocess.run(
-        ["bash", "-c", f"{' '.join(MANIPCLI)} run {HOME} {closed}"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        ["bash", "-c", f"{' '.join(MANIPCLI)} run {nod} {closed}"],
+        cwd=nod.parent, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
-    assert (tmp_path / "runs" / "home.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+    assert (nod.parent / "runs" / "nod.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
 
 
-def test_a_terminal_without_unicode_gets_escapes(tmp_path: Path) -> None:
+def test_a_terminal_without_unicode_gets_escapes(nod: Path) -> None:
     environment = {**os.environ, "LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    done = subprocess.run([*MANIPCLI, "run", HOME], cwd=tmp_path, capture_output=True, check=False, env=environment)
+    done = subprocess.run([*MANIPCLI, "run", nod], cwd=nod.parent, capture_output=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
     done.stdout.decode("ascii")
-    assert b"home passed" in done.stdout
+    assert b"nod passed" in done.stdout
 
 
 def begin(task: Path, *words: str, **options: Any) -> subprocess.Popen[str]:
@@ -194,7 +206,7 @@ def test_a_signal_while_the_program_starts_is_2_as_well(long_task: Path) -> None
             assert "Traceback" not in err
 
 
-def test_what_a_killed_run_leaves_is_readable(long_task: Path) -> None:
+def test_what_a_killed_run_leaves_is_readable(long_task: Path, nod: Path) -> None:
     process = begin(long_task)
     time.sleep(0.3)
     process.kill()
@@ -209,7 +221,7 @@ def test_what_a_killed_run_leaves_is_readable(long_task: Path) -> None:
     )
     assert judged.returncode == 3
     assert "incomplete" in judged.stdout
-    again = subprocess.run([*MANIPCLI, "run", HOME, "-q"], cwd=long_task.parent, capture_output=True, check=False)
+    again = subprocess.run([*MANIPCLI, "run", nod, "-q"], cwd=long_task.parent, capture_output=True, check=False)
     assert again.returncode == 0
 
 
