@@ -309,16 +309,20 @@ class GripperController:
                     text += f", where it felt {self._felt[f]:.3g} N of the {wanted:.3g} N asked"
                 self._stop(f, "stalled", text)
         if self._goal is not None and None not in self._stops:
-            stops = tuple(stop for stop in self._stops if stop is not None)
-            names = (self.joints[finger[0]] for finger in self._fingers)
-            text = "; ".join(f"finger of '{name}': {why}" for name, why in zip(names, self._texts, strict=True))
-            text = f"{text}; at t = {time:.3f} s"
-            if "stalled" in stops and not self._allow_stalling:
-                text = f"controller '{self.name}': {text}; stalling is not allowed"
-                self._goal.end("aborted", ErrorCode.GOAL_TOLERANCE_VIOLATED, text, time, stops)
-            else:
-                self._goal.end("succeeded", ErrorCode.SUCCESSFUL, text, time, stops)
-            self._end_motion()
+            self._end_goal(self._goal, time)
+
+    def _end_goal(self, goal: GoalHandle, time: float) -> None:
+        """With what stopped each finger."""
+        stops = tuple(stop for stop in self._stops if stop is not None)
+        names = (self.joints[finger[0]] for finger in self._fingers)
+        text = "; ".join(f"finger of '{name}': {why}" for name, why in zip(names, self._texts, strict=True))
+        text = f"{text}; at t = {time:.3f} s"
+        if "stalled" in stops and not self._allow_stalling:
+            text = f"controller '{self.name}': {text}; stalling is not allowed"
+            goal.end("aborted", ErrorCode.GOAL_TOLERANCE_VIOLATED, text, time, stops)
+        else:
+            goal.end("succeeded", ErrorCode.SUCCESSFUL, text, time, stops)
+        self._end_motion()
 
     def _winds_up(self, f: int) -> bool:
         """Whether a finger will be pushed harder: a reference is on its way, and its effort not at its maximum.
