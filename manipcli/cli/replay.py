@@ -71,14 +71,14 @@ def replay(
     if not verify and (allow_different or format_ == "json"):
         word = "--allow-different" if allow_different else "--format json"
         raise InvalidInput([Finding("USE080", f"{word} is for --verify alone")])
+    files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.verify import verify as verified
 
-            shown = [one for one, given in (("--html", html), ("--picture", picture), ("--sheet", sheet)) if given]
-            shown += ["--video"] if video else []
-            if shown:
-                raise InvalidInput([Finding("USE080", f"--verify shows nothing: leave out {', '.join(shown)}")])
+            asked = [option for option, file in files if file is not None]
+            if asked:
+                raise InvalidInput([Finding("USE080", f"--verify shows nothing: leave out {', '.join(asked)}")])
             return verified(
                 log,
                 allow_different=allow_different,
@@ -91,7 +91,7 @@ def replay(
         from manipcli.cli.pictures import Pictures
         from manipcli.flow.replay import open_playback
 
-        check_outputs(("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video), reads=(log,))
+        check_outputs(*files, reads=(log,))
 
         pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
         playback = open_playback(

@@ -54,7 +54,7 @@ def simulate(
     manager: ControllerManager,
     recorder: Recorder,
     progress: Progress | None,
-    replanning: Stopwatch | None = None,
+    replanning: Stopwatch,
 ) -> None:
     """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
 
@@ -83,8 +83,7 @@ def simulate(
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
             onlooker = Onlooker(recorder, live, progress, simulation.control_period)
             session.restart_clock(onlooker)
-            watch = replanning if replanning is not None else Stopwatch()
-            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal, replanning=watch)
+            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal, replanning=replanning)
             try:
                 run.steps()
             finally:
