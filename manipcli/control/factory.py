@@ -72,8 +72,8 @@ def controller_findings(
     spec: ControllersSpec, robot: RobotModel, period: float, place: Where = _nowhere
 ) -> tuple[Finding, ...]:
     """Errors: unknown, fixed, mimic or repeated joints; what two active controllers both claim; an update rate that
-    does not divide the control rate; what the types object to. Warnings: joints that nobody commands, and joints that
-    follow two."""
+    does not divide the control rate; what the types object to. Warnings: joints that nobody commands, joints that
+    follow two, and positions that are commanded at a lower rate than the control rate."""
     return tuple(_findings(spec, robot, period, place))
 
 
@@ -96,13 +96,7 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
                 yield from _claim_findings(name, one, joint, owners, where)
                 together |= {(other, name, joint) for other in before if name in owners[joint].values()}
         commanded.update(one.joints if one.interfaces else ())
-        if one.update_rate is not None:
-            try:
-                ticks_between(one.update_rate, period)
-            except InvalidArgument as refused:
-                where = place((*at, "update_rate"))
-                (why,) = refused.findings
-                yield Finding(why.code, f"controller '{name}': {why.message}", where, hint=why.hint)
+        yield from _rate_findings(name, one, robot, period, place((*at, "update_rate")))
         for problem in CONTROLLERS[one.type].check(one, robot):
             message = f"controller '{name}': {problem.message}"
             yield Finding(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
@@ -116,6 +110,30 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
             hint=f"add {'it' if len(idle) == 1 else 'them'} to a controller; what nobody commands is braked",
             severity="warning",
         )
+
+
+def _rate_findings(
+    name: str, spec: ControllerSpec, robot: RobotModel, period: float, place: Place | None
+) -> Iterator[Finding]:
+    """A rate that does not divide the control rate; positions that are commanded in steps."""
+    if spec.update_rate is None:
+        return
+    try:
+        ticks = ticks_between(spec.update_rate, period)
+    except InvalidArgument as refused:
+        (why,) = refused.findings
+        yield Finding(why.code, f"controller '{name}': {why.message}", place, hint=why.hint)
+        return
+    limited = [
+        joint.name
+        for joint in robot.moving_joints
+        if joint.name in spec.joints and joint.limits.acceleration is not None
+    ]
+    if ticks > 1 and "position" in spec.interfaces and limited:
+        message = f"controller '{name}' commands positions once in {ticks} control ticks: the acceleration limits of "
+        message += f"{listed(limited, most=3)} cut such steps, and they lag"
+        hint = "leave `update_rate` out; positions are commanded at every tick then"
+        yield Finding("CTRL170", message, place, hint, "warning")
 
 
 def _claim_findings(

@@ -210,6 +210,23 @@ def test_two_that_follow_with_one_joint_are_a_warning_and_a_feed_forward_is_none
     assert warned(arm=arm, push=push | {"active": False}) == warned(arm=arm, add=add) == []
 
 
+@pytest.mark.parametrize(
+    ("interface", "rate", "told"),
+    [("position", 100, True), ("position", 1000, False), ("effort", 100, False), ("velocity", 100, False)],
+)
+def test_positions_in_steps_that_the_limits_of_accelerations_cut_are_a_warning(interface, rate, told):
+    model = robot()
+    quick = tuple(replace(j, limits=replace(j.limits, acceleration=5.0)) for j in model.joints)
+    both = ["shoulder", "elbow"]
+    arm = {"type": "joint_trajectory", "joints": both, "command_interface": interface, "update_rate": rate}
+    arm |= {} if interface == "position" else {"gains": gains(both)}
+    written = ControllersSpec.model_validate({"controllers": {"arm": arm}})
+    for joints, expected in ((quick, told), (model.joints, False)):
+        found = controller_findings(written, replace(model, joints=joints), 0.001)
+        texts = [f.message for f in found if (f.code, f.severity) == ("CTRL170", "warning")]
+        assert [("once in 10 control ticks" in text, "shoulder" in text) for text in texts] == [(True, True)] * expected
+
+
 def test_all_findings_of_a_file_come_at_once_each_with_its_place():
     asked = []
 
