@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.body_shapes import COLORS, BodyShape, Rgba
+from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.coal_shape import coal_shape
 from manipcli.model.description import read_description
 from manipcli.model.mesh import SUFFIXES
 from manipcli.model.packages import Packages
-from manipcli.model.robot import Geometry, Inertial, Mesh
+from manipcli.model.robot import Geometry, Inertial, Mesh, Rgba
 from manipcli.model.urdf import read_parts
 from manipcli.spec.task import MeshSpec, UrdfSpec
 

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Shape, Sphere
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Rgba, Shape, Sphere
 from manipcli.model.scene import Interior
 from manipcli.spec.task import BoxSpec, CupSpec, CylinderSpec, SphereSpec, TraySpec
-
-Rgba = tuple[float, float, float, float]
 
 COLORS: dict[str, Rgba] = {
     "floor": (0.80, 0.81, 0.82, 1.0),

@@ -13,7 +13,7 @@ from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
 from manipcli.model.packages import NotFound
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Rgba
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.model.scene_names import Locate, misnamed
 from manipcli.model.start_overlap import overlaps
@@ -126,7 +126,7 @@ class _Builder:
             hint = "say `mass: 150 g`, or `fixed: true`"
             self._error("TASK223", f"body '{name}' can move and has no mass", loc, hint)
 
-    def _made(self, spec: BodySpec, rgba: body_shapes.Rgba) -> BodyShape:
+    def _made(self, spec: BodySpec, rgba: Rgba) -> BodyShape:
         """Raises ValueError when the numbers contradict each other or a file cannot be used."""
         if spec.box is not None:
             return body_shapes.box(spec.box, rgba)

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.mesh_fault import MAX_TRIANGLES, Colours, Faces, Rgba, UnusableMesh
+from manipcli.model.mesh_fault import MAX_TRIANGLES, Colours, Faces, UnusableMesh
+from manipcli.model.robot import Rgba
 
 MAX_ELEMENTS = 200_000
 MAX_DEPTH = 64

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from manipcli.model.robot import Rgba
+
 MAX_BYTES = 256_000_000
 MAX_TRIANGLES = 2_000_000
 
 Faces = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 """(m, 3): each row the vertices of a triangle."""
-Rgba = tuple[float, float, float, float]
 Colours = tuple[tuple[int, Rgba | None], ...]
 """Index of the first face of each run of one colour, with the colour (0 to 1), or None where the file says none."""
 

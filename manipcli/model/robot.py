@@ -17,6 +17,10 @@ from manipcli.core.geometry import Array, Transform
 JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
 
 
+Rgba = tuple[float, float, float, float]
+"""A colour: red, green, blue and opacity, 0 to 1."""
+
+
 @dataclass(frozen=True, slots=True)
 class Box:
     """Centred at its frame; `size` (3,) [m]: full edge lengths along x, y, z."""
@@ -57,7 +61,7 @@ class Geometry:
 
     X_LS: Transform
     shape: Shape
-    rgba: tuple[float, float, float, float] | None = None
+    rgba: Rgba | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,11 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.located_xml import Element
 from manipcli.model.packages import Packages
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Shape, Sphere
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Rgba, Shape, Sphere
 from manipcli.model.urdf_mesh import read_mesh_element
 from manipcli.model.urdf_numbers import FARTHEST, LARGEST, Reader
 from manipcli.model.urdf_schema import is_foreign
 
-Rgba = tuple[float, float, float, float]
 TRIANGLE_TOLERANCE = 1e-2
 """By which share one principal moment may exceed the sum of the others: descriptions are written with 2-3 digits."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")

@@ -30,7 +30,8 @@ from manipcli.record.goals import GoalLog
 from manipcli.record.recording import TaskEvent
 from manipcli.record.rows import message_record
 from manipcli.record.schemas import schema_text
-from manipcli.record.selection import EVERYTHING, JUDGED, Selection, word
+from manipcli.record.selection import EVERYTHING, Selection, word
+from manipcli.spec.task import JUDGED
 
 BLOCK_SECONDS = 0.5
 

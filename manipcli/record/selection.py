@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 
 from manipcli.record.channels import Channel
 
-JUDGED = ("joint_states", "tf", "controller_state")
-"""What the judge looks at together: at the ticks at which all of them are recorded."""
 PLOTTED = ("reference", "error", "actuator_states")
 """What only serves viewers."""
 PLOT_PERIOD = 0.01

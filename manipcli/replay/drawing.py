@@ -14,8 +14,7 @@ import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.core.text import listed
-from manipcli.model.mesh_fault import Rgba
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, RobotModel, Shape, Sphere
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, Rgba, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.replay.bones import bones
 from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces

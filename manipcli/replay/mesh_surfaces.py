@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from manipcli.model.mesh import TriangleMesh, read_mesh
-from manipcli.model.mesh_fault import Rgba, UnusableMesh
+from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.robot import Rgba
 from manipcli.replay.surface import Surface, smoothed
 
 MAX_MATERIAL_BYTES = 1_000_000

@@ -29,8 +29,6 @@ FINER = 2
 """Rendered this many times larger."""
 MAX_VERTICES = 60_000
 """Of one surface in Bullet, whose commands hold some more than twice as many."""
-FLOOR = "floor"
-"""The kind of body that everything stands on."""
 
 
 TO_LIGHT = (0.35, 0.55, 1.0)

@@ -13,8 +13,9 @@ from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
 from manipcli.replay.drawing import draw
+from manipcli.replay.ground import FLOOR
 from manipcli.replay.image import Image
-from manipcli.replay.picture import FLOOR, Studio
+from manipcli.replay.picture import Studio
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
 

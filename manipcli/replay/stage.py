@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from manipcli.core.geometry import Transform
-from manipcli.model.mesh_fault import Rgba
+from manipcli.model.robot import Rgba
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
 from manipcli.replay.ground import ground_height

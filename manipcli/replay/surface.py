@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.mesh_fault import Rgba
-from manipcli.model.robot import Box, Cylinder, Sphere
+from manipcli.model.robot import Box, Cylinder, Rgba, Sphere
 
 Faces = npt.NDArray[np.int32]
 

@@ -189,6 +189,7 @@ ChosenTopic = Literal[
 ]
 """Topics that a task may leave out; `goals` are the action topics of the controllers."""
 JUDGED: Final = ("joint_states", "tf", "controller_state")
+"""What the judge looks at together: at the ticks at which all of them are recorded."""
 
 
 class RecordSpec(Model):
