@@ -311,7 +311,7 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
         if outside:
             within = interval(base.lower, base.upper)
             message = f"joint '{joint.name}': {key} {bound:g} is outside of the description's {within}"
-            hint = "the robot file may only narrow it"
+            hint = joint.meant(bound) or "the robot file may only narrow it"
             reporter.error("ROBOT305", message, ("limits", joint.name, key), hint=hint)
         elif key == "lower":
             lower = bound

@@ -187,6 +187,12 @@ class ActuatorSpec(Model):
     )
 
 
+def _begins_names(prefix: str) -> str:
+    if not re.fullmatch(r"[\w./-]{0,100}", prefix):
+        raise problem("conflict", f"'{shorten(prefix)}' cannot begin names", hint="write letters, digits and '_'")
+    return prefix
+
+
 class AttachSpec(Model):
     """A further description welded onto this one: its root link at `pose` of the link `parent`."""
 
@@ -194,7 +200,9 @@ class AttachSpec(Model):
     args: Arguments = Field({}, description="Arguments of the xacro file.")
     parent: str = Field(description="The link that it is welded to.")
     pose: PoseSpec = Field(PoseSpec(), description="Of its root link in `parent`. Default: coincident.")
-    prefix: str = Field("", description="Put before each of its link and joint names. Default: nothing.")
+    prefix: Annotated[str, AfterValidator(_begins_names)] = Field(
+        "", description="Put before each of its link and joint names. Default: nothing."
+    )
 
 
 PosePart = tuple[JointValue, ...] | dict[str, JointValue] | str

@@ -193,6 +193,7 @@ def test_limits_narrow_and_complete_the_description(file: Path) -> None:
     [
         ({"j1": {"lower": -2.0}}, "lower -2 is outside of the description's -1 to 1"),
         ({"j1": {"upper": 1.1}}, "upper 1.1 is outside"),
+        ({"j1": {"upper": 45.0}}, "in degrees? write '45 deg'"),
         ({"j1": {"upper": -2.0}}, "upper -2 is outside"),
         ({"j11": {"upper": 0.1}}, "did you mean 'j1'"),
         ({"end": {"velocity": 0.1}}, "not a moving joint"),

@@ -60,3 +60,11 @@ def test_a_tolerance_of_zero_is_told_what_leaving_it_out_means() -> None:
 
 def test_a_number_out_of_range_that_may_not_be_left_out_has_no_such_hint() -> None:
     assert refused(f"{ROBOT}default_acceleration: -1\n").hint is None
+
+
+@pytest.mark.parametrize("prefix", ["b/ \\n", " b_", "b\\u202e", "b" * 101])
+def test_a_prefix_makes_names_that_can_be_written(prefix: str) -> None:
+    block = f'attach: [{{description: h.urdf, parent: a, prefix: "{prefix}"}}]\n'
+    finding = refused(ROBOT + block)
+    assert (finding.code, finding.hint) == ("ROBOT208", "write letters, digits and '_'")
+    load_robot_text(ROBOT + block.replace(prefix, "left_arm/"), "r.yaml")
