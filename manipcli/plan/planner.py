@@ -30,6 +30,8 @@ CLEARANCE = 0.004
 TOUCHING = 0.0045
 """Bodies nearer than this [m] count as touching: what a held object may leave or come to. Above the clearance, so that
 nothing can stand too near to be left and too far to be left out."""
+NO_WAY_AROUND = "no way around is searched for: `move` to a pose from which the way is free"
+"""The hint where something is in the way of a motion."""
 _QUERIES = 8  # kept; the candidates of a step ask the same few
 
 
@@ -225,7 +227,7 @@ class Planner:
             hint = "put them apart: `start: POSE` of a task begins elsewhere, `mount` of a robot file moves its base"
             overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
             return NotPlannable(f"{overlap} already, {when}", hint=hint)
-        hint = "no way around is searched for: `move` to a pose from which the way is free"
+        hint = NO_WAY_AROUND
         if begins and held and carried is not None:
             hint = f"`lift` '{carried.body}' first"
         elif hit.a.startswith("robot/") and hit.b.startswith("robot/"):

@@ -296,3 +296,25 @@ def test_what_leans_stands_on_its_lowest_edge_however_it_is_turned(yaw: float, k
     assert X_WO.apply(corners if kind == "box" else rim)[:, 2].min() == pytest.approx(0.4, abs=1e-6)
     assert np.degrees(np.arccos(X_WO.R[2, 2])) == pytest.approx(4.0)
     assert (X_WO @ X_OT).R[2, 2] == pytest.approx(-np.sin(np.radians(4.0))), "the hand points down"
+
+
+@pytest.mark.slow
+def test_what_is_in_the_way_of_a_place_is_told_with_what_a_place_can_do(bench: Make) -> None:
+    """A wall of 30 cm on the way; a narrow tray, into which the hand fits when it is turned."""
+    table = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    block = "  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.2]}\n"
+    wall = "  wall: {box: {size: [0.5, 2 cm, 30 cm]}, rests_on: table, at: [0.55, 0], fixed: true}\n"
+    tray = "  tray: {tray: {size: [20 cm, 13 cm, 5 cm]}, rests_on: table, at: [0.5, 0.2], fixed: true}\n"
+    over = {"object": "block", "at": [0.5, 0.2], "on": "table"}
+    into = {"object": "block", "at": [0.5, 0.2], "on": "tray"}
+    for thing, lift, spec, told, cure in (
+        (wall, 0.14, over, "`clearance: ...`", {"clearance": [0.3, 0.4]}),
+        (tray, 0.14, into, "`yaw: ...`", {"yaw": np.pi / 2}),
+    ):
+        arm = bench("panda", scene=table + block + thing)
+        arm.do("pick", {"object": "block", "approach": {"from": "top", "yaw": 0}})
+        arm.do("lift", {"object": "block", "by": lift})
+        assert told in arm.refused("place", spec).hint
+        if thing is wall:
+            arm.do("lift", {"object": "block", "by": 0.16})
+        arm.do("place", {**spec, **cure})

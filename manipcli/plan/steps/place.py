@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -21,7 +23,7 @@ from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
-from manipcli.plan.planner import CLEARANCE, Planner
+from manipcli.plan.planner import CLEARANCE, NO_WAY_AROUND, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
@@ -38,12 +40,17 @@ ROUND = ("cup", "cylinder", "sphere")
 """Bodies as wide along their diagonal as along their axes."""
 POINTING = 0.5
 """A tool that points less than this (cosine) along the ground points up or down."""
+_OVER = (
+    "over what is in the way: `lift: {by: ...}` it higher, and lower it from higher, `clearance: ...`; "
+    "or `move` first to a pose from which the way is free"
+)
+_ROOMIER = "put it where the opening fingers have room, turn it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
 class PlaceSpec(Model):
     """Set down what is held: carry it above its place, lower it straight, let go, and withdraw, rising.
 
-    It fails where the hand does not let go.
+    At [x, y] it stands upright, also what was picked lying. It fails where the hand does not let go.
     """
 
     object: str = Field(description="What is held and put down.")
@@ -78,7 +85,8 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         X_WL = _leaning(planner.scene.body(spec.object), X_WG, X_OT, lean)
         X_WT = X_WL @ X_OT
         draft = Draft(planner, situation)
-        draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
+        with _hinted(_OVER):
+            draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
         support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
         draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
         return draft
@@ -94,7 +102,8 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         if isinstance(down, NotPlannable):
             raise NotPlannable(down.cause, hint=down.hint)
         draft = down.copy()
-        draft.open(spec.posture, must_arrive=True)
+        with _hinted(_ROOMIER):
+            draft.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(draft.now)
         draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
         planned = draft.plan()
@@ -105,6 +114,15 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     leans = LEANS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
     candidates = itertools.product(leans, (True,) if near else (False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
+
+
+@contextmanager
+def _hinted(hint: str) -> Iterator[None]:
+    """What is in the way inside is told with this hint."""
+    try:
+        yield
+    except NotPlannable as refusal:
+        raise NotPlannable(refusal.cause, hint=hint if refusal.hint == NO_WAY_AROUND else refusal.hint) from refusal
 
 
 def _horizontal(X_WT: Transform) -> Array | None:
