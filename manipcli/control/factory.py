@@ -58,7 +58,7 @@ def build_controllers(
     manager = ControllerManager(
         joints=robot.joint_names,
         period=period,
-        following=[joint.name for joint in robot.moving_joints if joint.mimic is not None],
+        following=robot.following,
         feed_forward=ModelFeedForward(robot, fit.kinematics()) if wanted else None,
     )
     for name, controller in built.items():

@@ -70,7 +70,7 @@ def simulated_answers(
                 holders,
                 joints=robot.joint_names,
                 period=wish.period,
-                following=[joint.name for joint in robot.moving_joints if joint.mimic is not None],
+                following=robot.following,
                 feed_forward=ModelFeedForward(robot, Kinematics(robot)),
             )
             session = Session(robot=robot, scene=scene, engine=engine, manager=manager, period=wish.period)

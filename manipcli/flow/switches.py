@@ -24,8 +24,7 @@ def foreseen(switch: Switch, claims: Claims, robot: RobotModel) -> tuple[tuple[P
     controllers: dict[str, tuple[Claim, ControllerState]] = {
         one.name: (one, "active" if one.active else "inactive") for one in claims.controllers
     }
-    following = [joint.name for joint in robot.moving_joints if joint.mimic is not None]
-    decision = decided(controllers, switch, robot.joint_names, following)
+    decision = decided(controllers, switch, robot.joint_names, robot.following)
     if decision.ok:
         return (), claims.switched(decision.activated, decision.deactivated)
     hint = "say `to` for those that shall be active: it deactivates who is in their way" if not switch.to else None

@@ -298,6 +298,11 @@ class RobotModel:
         return tuple(joint.name for joint in self.moving_joints)
 
     @cached_property
+    def following(self) -> tuple[str, ...]:
+        """Names of the joints that follow others (mimic): nobody commands them."""
+        return tuple(joint.name for joint in self.moving_joints if joint.mimic is not None)
+
+    @cached_property
     def _joints(self) -> dict[str, Joint]:
         return {joint.name: joint for joint in self.joints}
 

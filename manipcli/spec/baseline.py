@@ -6,21 +6,20 @@ from typing import Annotated
 
 from pydantic import Field
 
-from manipcli.core.units import NUMBER
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Unit
+from manipcli.spec.quantity import Share
 
-Share = Annotated[float, Unit((NUMBER,)), Field(ge=0)]
+Allowance = Annotated[Share, Field(ge=0)]
 
 
 class ToleranceSpec(Model):
     """Shares of the blessed value; differences of less than 0.05 s, 1 J, 1 mm, 0.5 deg or 0.5 N never count."""
 
-    duration: Share = Field(
+    duration: Allowance = Field(
         0.05, description="How much longer the task and each step may take, 0 or more. Default 5 %."
     )
-    energy: Share = Field(0.1, description="How much more the joints may give, 0 or more. Default 10 %.")
-    margin: Share = Field(0.25, description="How much of a margin may be lost, 0 or more. Default 25 %.")
+    energy: Allowance = Field(0.1, description="How much more the joints may give, 0 or more. Default 10 %.")
+    margin: Allowance = Field(0.25, description="How much of a margin may be lost, 0 or more. Default 25 %.")
 
 
 class BaselineSpec(Model):
