@@ -91,6 +91,8 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
     assert float(felt[1]) == pytest.approx(5.0, rel=0.1)
     assert "felt" not in told_of([f"{gain}=840"])
     assert gain_findings(load_task(pick, overrides=[f"{gain}=840"])) == ()
+    winds_up = [f"{gain}=500", f"{gain[:-1]}i=100", f"{gain[:-1]}i_clamp=10"]
+    assert gain_findings(load_task(pick, overrides=winds_up)) == (), "its integral gives what lacks"
     assert gain_findings(load_task(pick, overrides=[f"{gain}=5", "simulation.engine=kinematic"])) == ()
 
 

@@ -36,7 +36,7 @@ run_task(task, log=log, force=True)
 """
 
 
-@pytest.mark.parametrize("after", [1, 700, 2300])
+@pytest.mark.parametrize("after", [1, 1500])
 def test_a_kill_costs_at_most_a_second_and_never_the_log_before(tmp_path: Path, after: int) -> None:
     log, shared = tmp_path / "run.mcap", tmp_path / "ticks"
     log.write_bytes(b"the log of an earlier run")
