@@ -180,7 +180,8 @@ class Packages:
 
     def _checked(self, path: Path, uri: str, roots: Sequence[Path]) -> Path:
         def inside(real: Path) -> bool:
-            return self._allow_outside or any(real.is_relative_to(root) for root in roots) or self._beside(real)
+            within = any(real.is_relative_to(root) for root in roots) or self._beside(real)
+            return self._allow_outside or within or _of_the_same_package(real, roots)
 
         try:
             real = path.resolve(strict=True)
@@ -249,6 +250,12 @@ class Unread(Packages):
 
 def _uri(root: Path, path: Path) -> str:
     return f"package://{root.name}/{path.relative_to(root).as_posix()}"
+
+
+def _of_the_same_package(real: Path, roots: Sequence[Path]) -> bool:
+    """In the source of a package that is installed as links to it: `colcon build --symlink-install`."""
+    names = {package_name(root) for root in roots} - {None}
+    return bool(names) and any(package_name(folder) in names for folder in list(real.parents)[:LEVELS_ABOVE])
 
 
 def _meant(path: Path) -> str | None:

@@ -112,6 +112,29 @@ def test_a_link_that_leaves_the_tree_is_refused_unless_allowed(tree: Path) -> No
     assert Packages(description, allow_outside=True).resolve("package://arm/meshes/link.stl").name == "secret.txt"
 
 
+@pytest.mark.parametrize(("source", "allowed"), [("hand", True), ("foot", False), (None, False)])
+def test_a_package_may_be_links_to_its_own_source(
+    tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, source: str | None, allowed: bool
+) -> None:
+    """As `colcon build --symlink-install` leaves it, file by file."""
+    (tmp_path / "src" / "h" / "meshes").mkdir(parents=True)
+    (tmp_path / "src" / "h" / "meshes" / "h.stl").touch()
+    if source is not None:
+        (tmp_path / "src" / "h" / "package.xml").write_text(f"<package><name>{source}</name></package>")
+    share = tmp_path / "install" / "share" / "hand"
+    (share / "meshes").mkdir(parents=True)
+    (share / "meshes" / "h.stl").symlink_to(tmp_path / "src" / "h" / "meshes" / "h.stl")
+    (share / "package.xml").write_text("<package><name>hand</name></package>")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    packages = Packages(tmp_path / "elsewhere" / "r.urdf")
+    if allowed:
+        assert packages.resolve("package://hand/meshes/h.stl") == tmp_path / "src" / "h" / "meshes" / "h.stl"
+        assert packages.resolve(str(share / "meshes" / "h.stl")).name == "h.stl"  # as $(find hand)/meshes/h.stl
+    else:
+        with pytest.raises(NotFound, match="outside"):
+            packages.resolve("package://hand/meshes/h.stl")
+
+
 @pytest.mark.parametrize("target", ["gone.stl", "link.stl"])
 def test_a_link_that_leads_to_no_file_is_called_one(tree: Path, target: str) -> None:
     (tree / "arm" / "meshes" / "link.stl").symlink_to(target)
