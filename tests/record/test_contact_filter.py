@@ -43,6 +43,33 @@ def test_pairs_are_followed_at_once_and_forces_at_their_pace() -> None:
     assert contacts.changed(0.033, []) is None
 
 
+@pytest.mark.parametrize(
+    ("after", "was", "least"),
+    [
+        (1, 10.0, 6.0),  # a knock: half of it and 1 N
+        (1, 0.0, 1.0),
+        (10, 10.0, 1.05),  # a tenth and 0.05 N
+        (10, 0.1, 0.06),
+        (100, 10.0, 0.105),  # a hundredth and 0.005 N
+        (100, 0.1, 0.006),
+    ],
+)
+def test_by_how_much_a_force_must_differ(after: int, was: float, least: float) -> None:
+    for factor, written in ((0.98, False), (1.02, True)):
+        filtered = ContactFilter()
+        filtered.changed(0.0, [Contact("a", "b", was, 0.0)])
+        told = filtered.changed(after * TICK, [Contact("a", "b", was + factor * least, 0.0)])
+        assert (told is not None) is written
+
+
+def test_by_how_much_a_contact_must_be_deeper() -> None:
+    for depth, written in ((1.9e-4, False), (2.1e-4, True)):
+        filtered = ContactFilter()
+        filtered.changed(0.0, [Contact("a", "b", 1.0, 0.001)])
+        assert (filtered.changed(TICK, [Contact("a", "b", 1.0, 0.001 - depth)]) is not None) is written
+        assert filtered.changed(2 * TICK, [Contact("a", "b", 1.0, 0.01)]) is None, "it leaves"
+
+
 @pytest.mark.parametrize("change", [0.05, -0.05, 0.09, -0.03])
 def test_a_force_that_changes_a_little_and_stays_is_known_within_a_tenth_of_a_second(change: float) -> None:
     forces = [1.4715] * 40 + [1.4715 * (1 + change)] * 200
@@ -60,3 +87,10 @@ def test_a_force_that_wanders_is_known_to_a_tenth_and_seldom_written() -> None:
     late = [abs(a - b) - 0.1 * a - 0.05 for a, b in zip(known, forces, strict=True)]
     assert max(late) < 0.2
     assert len(set(known)) <= 3000 / 10
+
+
+def test_another_pair_of_the_same_force_is_another_contact() -> None:
+    filtered = ContactFilter()
+    filtered.changed(0.0, [Contact("a", "b", 1.0, 0.0)])
+    other = [Contact("a", "c", 1.0, 0.0)]
+    assert filtered.changed(TICK, other) == other
