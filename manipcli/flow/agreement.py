@@ -16,6 +16,7 @@ from manipcli.model.conditions import CONDITIONS
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
+from manipcli.model.scene_names import RESERVED
 from manipcli.plan.claims import Claims, no_hand
 from manipcli.plan.names import UnknownPosture
 from manipcli.plan.steps import STEPS
@@ -120,7 +121,7 @@ def _tried_again(task: Located[TaskSpec], k: int, setting: Setting, told: Collec
 
 def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
     """Bodies and frames that have the name of a link."""
-    links = {link.name for link in robot.links}
+    links = {link.name for link in robot.links} - {*RESERVED}  # which are told without a robot
     for number, key, named in ((220, "scene", scene.bodies), (227, "frames", scene.frames)):
         message, hint = f"robot '{robot.name}' has a link of this name", "choose another: a log has one frame of a name"
         yield from (

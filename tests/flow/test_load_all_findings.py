@@ -328,3 +328,10 @@ def test_nothing_is_made_up_where_the_robot_cannot_be_built(tmp_path: Path, file
     with pytest.raises(InvalidInput) as invalid:
         load_task(path)
     assert [one.code for one in invalid.value.findings] == ["TASK231"]
+
+
+def test_a_body_called_as_a_word_and_as_a_link_is_told_once(tmp_path: Path) -> None:
+    body = "{box: {size: [1 cm, 1 cm, 1 cm]}, pose: {xyz: [1, 0, 1]}, mass: 1}"
+    told = findings(tmp_path, f"scene:\n  tool: {body}\nsteps: [wait: 1 s]\n")
+    assert [line for line, *_ in told] == [5]
+    assert "the word means something else in a task" in told[0][2]
