@@ -126,6 +126,8 @@ def test_annotations_are_what_github_reads(tmp_path: Path) -> None:
     ]
     odd = replace(CRASHED, case=Case("a,b:c.yaml", "t"))
     assert "file=a%2Cb%3Ac.yaml," in render_annotations([odd])
+    whole = replace(CRASHED, troubles=(Trouble("one\r\ntwo", Place("t.yaml", 3, 0)),))
+    assert render_annotations([whole]) == "::error file=t.yaml,line=3,col=1,title=pour crashed::one%0D%0Atwo"
 
 
 def test_what_a_word_of_the_command_line_does_is_told_with_the_task() -> None:
@@ -146,7 +148,6 @@ def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest
     assert "file=project/tasks/pour.yaml," in render_annotations([FAILED], workspace=tmp_path)
 
 
-@pytest.mark.slow
 def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
     sampled = replace(PASSED, case=replace(PASSED.case, sample=7))
     root = fromstring(render_junit(Suite((with_junit(sampled), with_junit(FAILED), CRASHED), 3, 1, 1.0)))
@@ -164,6 +165,19 @@ def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
     assert error is not None
     assert (error.get("type"), error.get("message")) == ("crashed", "crashed by signal 11 (SIGSEGV)")
     assert "again: manipcli run tasks/pour.yaml" in [one.text for one in suites[2].findall("system-out")]
+
+
+def test_a_run_that_passed_and_is_worse_than_its_baseline_is_one_failure_more() -> None:
+    """Its own suite says that all is well."""
+    at = Place("tasks/pour.yaml", 9, 5)
+    worse = replace(with_junit(PASSED), outcome="failed", text="worse", troubles=(Trouble("takes 7 s", at),))
+    (suite,) = root = fromstring(render_junit(Suite((worse,), 1, 1, 1.0)))
+    cases = suite.findall("testcase")
+    assert suite.get("tests") == root.get("tests") == str(len(cases))
+    assert suite.get("failures") == root.get("failures") == "1"
+    (failure,) = cases[-1]
+    assert (cases[-1].get("classname"), failure.get("message")) == ("pour.baseline", "worse")
+    assert str(failure.text).splitlines()[0] == "tasks/pour.yaml:9:5: takes 7 s"
 
 
 @pytest.mark.parametrize(("stopped", "errors", "skipped"), [("interrupted", "2", "0"), ("first failure", "0", "2")])
