@@ -43,8 +43,10 @@ def test_the_report_of_a_failed_run_leads_to_its_moments(browser: Page, tmp_path
         assert browser.evaluate(now) == pytest.approx(at, abs=1e-3), which
     browser.evaluate(f"document.querySelector('{steps} a.place').click()")
     assert browser.evaluate("document.querySelector('details:has(.source)').open") is True
-    for width in (360, 1280):
+    tables = "document.querySelectorAll('section:has(#expectations, #steps, #grasps, #joints) .scroll')"
+    for width in (360, 800, 1280):
         browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=800, deviceScaleFactor=1, mobile=False)
         assert browser.evaluate("document.documentElement.scrollWidth <= window.innerWidth") is True, width
+        assert browser.evaluate(f"[...{tables}].every(e => e.scrollWidth <= e.clientWidth)") is True, width
     assert browser.complaints == []
     assert [one for one in browser.requests if not one.startswith(("data:", "file:"))] == []
