@@ -117,24 +117,14 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     assert float(left[1]) == pytest.approx((float(force[2]) - 1.47) / 0.15, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("posture", "told"),
-    [
-        (
-            "closed",
-            r"open: the hand did not open: finger of 'panda_finger_joint1': stalled 0\.02\d* before .*; the hand",
-        ),
-        ("barely", r"the hand"),
-    ],
-)
-def test_a_hand_that_does_not_let_go_is_told(run: Run, posture: str, told: str) -> None:
-    """Fingers that press on, and fingers that come to within 2 mm of a pose that is too narrow."""
+def test_a_hand_that_does_not_let_go_is_told(run: Run) -> None:
+    """Fingers that come to within 2 mm of a pose that is too narrow; deeper in the block none is planned."""
     task = (ROOT / "tasks" / "pick_place.yaml").read_text(encoding="utf-8").partition("  - lift:")[0]
-    task = f"{task.replace('../', f'{ROOT}/')}  - release: {{posture: {posture}}}\n"
+    task = f"{task.replace('../', f'{ROOT}/')}  - release: {{posture: barely}}\n"
     verdict = run(task, "robot.poses.barely={hand: [0.02]}")
     assert outcomes(verdict) == ["done", "failed"]
     held = r"still holds 'block', between 'robot/panda_(left|right)finger' and 'robot/panda_(left|right)finger'"
-    assert re.fullmatch(f"step 'release_1' failed: {told} {held}", verdict.text), verdict.text
+    assert re.fullmatch(f"step 'release_1' failed: the hand {held}", verdict.text), verdict.text
 
 
 CUP = Mover("pick_1", ("cup", "ball"), (0.0, -0.1, 0.0))
