@@ -12,6 +12,9 @@ from manipcli.report.html_parts import heading, meter, number, of_limit, percent
 from manipcli.report.markup import Markup, element, joined
 from manipcli.report.quantity import quantity
 
+AT_LIMIT = 1e-6
+"""[rad, m] A joint that is as near as this to its limit is told to be at it."""
+
 
 def grasps(facts: RunFacts) -> Markup | None:
     """What was held, how hard, and how it moved in the hand."""
@@ -107,9 +110,10 @@ def _position(joint: JointFacts) -> Markup:
     use = joint.position
     if use is None:
         return joined(element("small", "no limit"))
-    away = quantity(abs(use.limit - use.value), joint.unit)
+    away = abs(use.limit - use.value)
     where = "beyond" if use.share > 1.0 else "left to"
-    return _meter(use, f"{away} {where} {readable(use.limit, joint.unit)}".replace("-", "−"))
+    told = f"{quantity(away, joint.unit)} {where}" if away > AT_LIMIT else "at"
+    return _meter(use, f"{told} {readable(use.limit, joint.unit)}".replace("-", "−"))
 
 
 def _use(use: Use | None, unit: str) -> Markup:

@@ -193,6 +193,22 @@ def test_numbers_are_those_of_the_facts() -> None:
 
 
 @pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        (0.04 + 4.6e-8, "at 40 mm"),
+        (0.04 - 4.6e-8, "at 40 mm"),
+        (0.041, "1.0 mm beyond 40 mm"),
+        (0.03, "10.0 mm left to"),
+    ],
+)
+def test_a_joint_that_rests_on_its_limit_is_at_it(value: float, told: str) -> None:
+    page, facts = _page(), _facts()
+    use = Use(value / 0.04, value, 0.04, 1.0)
+    joint = replace(facts.joints[0], unit="m", position=use)
+    assert told in _Page(render_page(replace(page, facts=replace(facts, joints=(joint,))))).words
+
+
+@pytest.mark.parametrize(
     ("shown", "text"),
     [
         (signed(-0.0161, "m"), "−16.1 mm"), (signed(0.0, "N"), "0 N"), (signed(2.0, "s"), "+2.0 s"),
