@@ -42,5 +42,5 @@ def check(
     failed = any(finding.severity == "error" for finding in findings)
     kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if "controllers" in kinds and "task" not in kinds:
-        console.talk("joints and gains of controllers were compared with no robot: check a task that names both")
+        console.talk("joints and gains of controllers were not compared with a robot: check a task that names both")
     return ExitCode.FAILED if failed else ExitCode.PASSED

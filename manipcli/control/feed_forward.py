@@ -53,8 +53,8 @@ class ModelFeedForward:
         M(q) a + C(q, v) v + g(q) + D v_r
 
     with the wanted acceleration a, and the viscous damping D of the joints at the reference velocity v_r: at the
-    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate, but
-    those that follow one (mimic): they move with it, and what they need is its to give.
+    measured one it would undo a damping that the loop is glad of. All other joints are taken not to accelerate,
+    except those that follow one (mimic): they move with it, and what they need is its to give.
     """
 
     def __init__(self, robot: RobotModel, kinematics: Kinematics) -> None:

@@ -10,6 +10,7 @@ from manipcli.core.errors import Place
 if TYPE_CHECKING:
     from xml.parsers.expat import ExpatError
 
+_DECLARED: Final = re.compile(rb"""\s*<\?xml\s[^>]*\bencoding\s*=""")
 _XACRO: Final = "http://www.ros.org/wiki/xacro"
 
 
@@ -34,20 +35,20 @@ def told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | N
     elif words == errors.XML_ERROR_INVALID_TOKEN:
         if line.startswith(b"<<<<<<<"):
             return "a merge conflict is not resolved", Place(file, error.lineno, 1), "keep one side, and no '<<<<<<<'"
-        byte = _not_utf8(data, file)
+        byte = None if _DECLARED.match(data) else _not_utf8(data, file)
         if byte is not None and byte[1].line == error.lineno:
             hint = (
                 'save it as UTF-8: iconv -f latin1 -t utf-8; or name its encoding: <?xml version="1.0" encoding=...?>'
             )
             return byte[0], byte[1], hint
         if here == b"<":
-            hint = "inside of a value, < is written &lt;; or a quote before it is not closed"
+            hint = "write < as &lt; inside a value, or close the quote before it"
         elif here == b"&" or before.endswith(b"&"):
-            hint = "& is written &amp;, and < inside of a value &lt;"
+            hint = "write & as &amp;, and < inside a value as &lt;"
         elif before.endswith(b"="):
-            hint = 'a value stands in quotes: "..."'
+            hint = 'put the value in quotes: "..."'
         elif before.endswith(b"--"):
-            hint = "a comment holds no '--'"
+            hint = "take '--' out of the comment"
     return message, place, hint
 
 

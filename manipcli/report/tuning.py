@@ -37,8 +37,8 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
         "that it meets, without gravity."
     )
     lines.append(
-        "Frequency: the natural one, which --bandwidth asks for; -3 dB: that up to which a joint follows its reference "
-        "with 1 / sqrt 2 of the swing or more."
+        "Frequency: the natural one, which --bandwidth asks for; -3 dB: where a joint follows its reference "
+        "with 1 / sqrt 2 of the swing."
     )
     if simulated:
         lines.append("Simulated: the whole robot in the engine, with gravity, the other joints held by these gains.")

@@ -10,7 +10,7 @@ from manipcli.cli.app import main
 
 ROOT = Path(__file__).parents[2]
 CONTROLLERS = str(ROOT / "controllers" / "arm7_hand3.yaml")
-SAID = "joints and gains of controllers were compared with no robot: check a task that names both\n"
+SAID = "joints and gains of controllers were not compared with a robot: check a task that names both\n"
 
 
 def test_controllers_alone_are_compared_with_no_robot_and_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:

@@ -104,7 +104,7 @@ def test_an_element_that_is_never_closed_is_named(tmp_path: Path) -> None:
         (b"<<<<<<< HEAD\n=======\n>>>>>>> other", "a merge conflict is not resolved", 1, "keep one side"),
         (b'<link name="${1 < 2}"/>', "invalid token", 17, "&lt;"),
         (b'<link name="a &amp; b"/><link name="a & b"/>', "invalid token", 40, "&amp;"),
-        (b"<!-- a -- b -->", "invalid token", 10, "holds no '--'"),
+        (b"<!-- a -- b -->", "invalid token", 10, "take '--' out"),
         (b"<link name=a/>", "invalid token", 12, "in quotes"),
         (b"<xacro:arg/>", "unbound prefix 'xacro'", 1, 'xmlns:xacro="http://www.ros.org/wiki/xacro"'),
         (b"<sensor:ray/>", "unbound prefix 'sensor'", 1, 'xmlns:sensor="..."'),
@@ -123,6 +123,12 @@ def test_a_common_slip_in_xml_is_told_with_its_remedy(
     assert finding.place.line == 2
     assert (finding.place.line, finding.place.column) == (2, column)
     assert hint in (finding.hint or "")
+
+
+def test_a_declared_encoding_is_not_to_blame_for_another_slip(tmp_path: Path) -> None:
+    text = '<?xml version="1.0" encoding="iso-8859-1"?>\n<robot name="é" x=3/>\n'.encode("latin-1")
+    (finding,) = look(tmp_path, text).findings
+    assert finding.hint == 'put the value in quotes: "..."'
 
 
 def test_findings_stand_in_the_order_of_the_file_and_once(tmp_path: Path) -> None:
