@@ -189,7 +189,9 @@ class ActuatorSpec(Model):
 
 def _begins_names(prefix: str) -> str:
     if not re.fullmatch(r"[\w./-]{0,100}", prefix):
-        raise problem("conflict", f"'{shorten(prefix)}' cannot begin names", hint="write letters, digits and '_'")
+        raise problem(
+            "conflict", f"'{shorten(prefix)}' cannot begin names", hint="write letters, digits and '_', '.', '/', '-'"
+        )
     return prefix
 
 
@@ -201,7 +203,8 @@ class AttachSpec(Model):
     parent: str = Field(description="The link that it is welded to.")
     pose: PoseSpec = Field(PoseSpec(), description="Of its root link in `parent`. Default: coincident.")
     prefix: Annotated[str, AfterValidator(_begins_names)] = Field(
-        "", description="Put before each of its link and joint names. Default: nothing."
+        "",
+        description="Put before each of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: nothing.",
     )
 
 
