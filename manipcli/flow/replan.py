@@ -20,7 +20,6 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
 from manipcli.flow.plan import plan_step
 from manipcli.model.collision import Carried
-from manipcli.model.posture import position_limits
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.simulate.session import Session
@@ -126,7 +125,7 @@ class Measured:
         return replace(now, bodies=tuple(moved))
 
     def _commanded(self, measured: Array) -> Array:
-        """(n) where joints are commanded to be if that is near, else where they are; within their limits."""
+        """(n) where joints are commanded to be if that is near, else where they are, also beyond soft limits."""
         session, robot = self._session, self._planner.robot
         position = measured.copy()
         manager = session.manager
@@ -136,7 +135,8 @@ class Measured:
             columns = robot.indices(controller.joints)
             near = np.abs(output.position - measured[columns]) <= self._limits.joints
             position[columns] = np.where(near, output.position, measured[columns])
-        return frozen(np.clip(position, *position_limits(robot.moving_joints)))
+        lower, upper = np.transpose([joint.limits.range for joint in robot.moving_joints])
+        return frozen(np.clip(position, lower, upper))
 
     def _joints(self, planned: Situation, now: Situation) -> Iterator[str]:
         """The joint that is furthest off. Fingers of a closed hand are where the object lets them be."""

@@ -237,6 +237,15 @@ def test_a_trajectory_begins_at_what_is_commanded_and_not_at_the_error_of_the_co
     assert told == (f"joint 'panda_joint4' is at {planned[joint] + 0.1:.4f} rad and not at {planned[joint]:.4f} rad",)
 
 
+def test_a_joint_beyond_a_soft_limit_is_where_it_is_and_one_beyond_a_hard_limit_is_at_it(world_at: WorldOf) -> None:
+    """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973."""
+    world = world_at(PICK)
+    joint = world.task.robot.joint_names.index("panda_joint1")
+    for there, found in ((2.93, 2.93), (2.99, 2.9671)):
+        world.session.engine.read().position[joint] = there
+        assert world.measured.situation(world.before(PICK)).position[joint] == found
+
+
 def test_without_physics_bodies_are_where_they_were_predicted(world_at: WorldOf) -> None:
     world = world_at(PLACE)
     before = world.before(PLACE)
