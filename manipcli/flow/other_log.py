@@ -113,7 +113,7 @@ class _Log:
         shown = {"", space, *(self.spaces if len(self.spaces) == 1 else ())}
         wanted = {name: one.usual for name, one in known.items() if one.namespace in shown}
         self.unshown = [name for name in known if name not in wanted]
-        there = {one.usual for one in known.values()}
+        there = {one.usual for name, one in known.items() if space is None or name in wanted}
         self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
         begin = self._first(topics, wanted)
         for topic, data, places in topics.messages(wanted):
@@ -187,14 +187,16 @@ def open_other(
     topics = open_topics(path)
     log = _Log(topics, space)
     notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
-    notes += [f"it has no {name} ({TYPES[name]})" for name in log.lacks]
+    subject = "it" if space is None else f"'{space}'"
+    notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
     several = f"it tells of several robots, in {listed(log.spaces)}" if len(log.spaces) > 1 else ""
     notes += [f"{several}: what {listed(log.unshown)} say is not shown"] if several else []
     if not np.isfinite(log.start):
-        what = several or f"it has neither {channels.JOINT_STATES} nor {channels.TF}"
+        unchosen = several if space is None else ""
+        what = unchosen or f"{subject} has neither {channels.JOINT_STATES} nor {channels.TF}"
         message = f"{path.name}: nothing to show: {what}"
         hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
-        if several:
+        if unchosen:
             hint = f"show one of them with --robot, as in --robot {log.spaces[0]}"
         raise InvalidInput([Finding("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))

@@ -237,10 +237,11 @@ def _foreign(
     gaps: bool = False,
     spaces: tuple[str, ...] = ("",),
     one_tf: bool = False,
+    without: tuple[str, ...] = (),
 ) -> Path:
     """A second of a log as rosbag2 writes one, times since 1970; `turn` = sin(t), `push` = 0.1 t; a camera flies by.
     With `gaps` the second joint comes late, and the first is NaN for a while. `spaces`: before the names of topics, but
-    with `one_tf` not before `/tf`; the base of the n-th stands at x = 1 + n."""
+    with `one_tf` not before `/tf`; the base of the n-th stands at x = 1 + n. `without`: topics that are not there."""
     message = TYPES.types
     with path.open("wb") as file:
         writer = Writer(file)
@@ -249,7 +250,7 @@ def _foreign(
 
         def put(usual: str, kind: str, ns: int, content: object, spaces: tuple[str, ...] = spaces) -> None:
             data = bytes(TYPES.serialize_cdr(content, kind))
-            for topic in (space + usual for space in spaces):
+            for topic in (space + usual for space in spaces if space + usual not in without):
                 if topic not in ids:
                     schema = writer.register_schema(kind, "ros2msg", schema_text(kind).encode())
                     ids[topic] = writer.register_channel(topic, "cdr", schema)
@@ -376,6 +377,20 @@ def test_of_several_robots_one_is_chosen(tmp_path: Path, one_tf: bool) -> None:
         open_playback(path, space="/r3")
     with pytest.raises(InvalidInput, match="no robot in '/r2'"):
         open_playback(tmp_path / "bag.mcap", space="/r2")
+
+
+def test_of_a_chosen_robot_it_is_told_what_it_has_not(tmp_path: Path) -> None:
+    """Whatever the others have."""
+    lacks = ("/r2/robot_description", "/r2/tf")
+    shown = open_playback(_foreign(tmp_path / "two.mcap", spaces=("/r1", "/r2"), without=lacks), rate=10.0, space="/r2")
+    assert [note.split(" (")[0] for note in shown.notes if note.startswith("'/r2'")] == [
+        "'/r2' has no /robot_description",
+        "'/r2' has no /tf",
+    ]
+    still = _foreign(tmp_path / "still.mcap", spaces=("/r1", "/r2"), without=("/r2/joint_states", "/r2/tf"))
+    with pytest.raises(InvalidInput, match="nothing to show: '/r2' has neither /joint_states nor /tf") as refused:
+        open_playback(still, space="/r2")
+    assert "--robot" not in str(refused.value.findings[0].hint)
 
 
 def test_an_overview_shows_the_joints_of_every_robot(tmp_path: Path) -> None:
