@@ -13,7 +13,7 @@ from manipcli.model.robot import Joint, RobotModel
 
 def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
     """(n,) the least and (n,) the most of each joint [rad or m], soft limits kept; infinite where it has no limit."""
-    ranges = [joint.limits.kept for joint in joints]
+    ranges = [joint.limits.within_soft for joint in joints]
     return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
 
 
@@ -42,7 +42,7 @@ def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = 
     """
     q = np.array(zero_posture(robot) if rest is None else rest)
     if pose is None:
-        pose = next((known.name for known in robot.poses if known.name == "home"), None)
+        pose = "home" if any(known.name == "home" for known in robot.poses) else None
     if pose is not None:
         named = robot.pose(pose)
         q[robot.indices(named.joints)] = named.positions

@@ -118,8 +118,8 @@ class JointLimits:
         return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
 
     @property
-    def kept(self) -> tuple[float, float]:
-        """The `range` within the soft limits that act: from beyond these a joint is led back."""
+    def within_soft(self) -> tuple[float, float]:
+        """The part of the `range` within the soft limits that act: from beyond these a joint is led back."""
         lower, upper = self.range
         soft = self.soft
         if soft is None or soft.k_position <= 0.0:

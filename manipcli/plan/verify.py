@@ -70,10 +70,10 @@ def verify_written(
     """
     for name, value, loc in written:
         joint = robot.joint(name)
-        lower, upper = joint.limits.kept
+        lower, upper = joint.limits.within_soft
         if max(lower - value, value - upper) > _POSITION:
             side = 0 if value < lower else 1
-            kind = "" if joint.limits.kept[side] == joint.limits.range[side] else "soft "
+            kind = "" if joint.limits.within_soft[side] == joint.limits.range[side] else "soft "
             raise _beyond(name, value, lower, upper, when, loc, joint.meant(value), kind)
 
 

@@ -49,7 +49,7 @@ def test_soft_limits_are_those_of_the_safety_controller(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limits", "kept"),
+    ("limits", "within"),
     [
         (JointLimits(-1.0, 2.0, soft=SOFT), (-0.8, 1.8)),
         (JointLimits(-1.0, 2.0), (-1.0, 2.0)),
@@ -59,8 +59,8 @@ def test_soft_limits_are_those_of_the_safety_controller(tmp_path: Path) -> None:
         (JointLimits(soft=SoftLimits(None, 1.8, 20.0)), (-math.inf, 1.8)),
     ],
 )
-def test_a_joint_is_kept_within_the_soft_limits_that_act(limits: JointLimits, kept: tuple[float, float]) -> None:
-    assert limits.kept == kept
+def test_a_joint_is_kept_within_the_soft_limits_that_act(limits: JointLimits, within: tuple[float, float]) -> None:
+    assert limits.within_soft == within
 
 
 @pytest.mark.parametrize(
