@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from manipcli.cli.interrupts import Interrupts
 from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, PagePort
 from manipcli.cli.serving import stay
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.text import listed
 
 
 def replay(
@@ -68,17 +70,14 @@ def replay(
 
     Needs nothing but the log and the packages of its meshes. Ctrl-C ends it. With --verify: 0 identical, 1 not.
     """
-    if not verify and (allow_different or format_ == "json"):
-        word = "--allow-different" if allow_different else "--format json"
-        raise InvalidInput([Finding("USE080", f"{word} is for --verify alone")])
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
+    shows = (*files, ("--at", at), ("--size", size), ("--robot", robot), ("--port", port), ("--open", open_ or None))
+    verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
+    _check_options(verify=verify, shows=shows, verifies=verifies)
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.verify import verify as verified
 
-            asked = [option for option, file in files if file is not None]
-            if asked:
-                raise InvalidInput([Finding("USE080", f"--verify shows nothing: leave out {', '.join(asked)}")])
             return verified(
                 log,
                 allow_different=allow_different,
@@ -119,3 +118,26 @@ def replay(
         with Replay(playback, port=port) as page:
             stay(page, open_=open_)
     return ExitCode.PASSED
+
+
+def _check_options(
+    *, verify: bool, shows: Sequence[tuple[str, object]], verifies: Sequence[tuple[str, object]]
+) -> None:
+    """Refuses options of the other use; those that are None were not given.
+
+    Args:
+        verify: whether the run is verified.
+        shows: options (name, value) of what shows a run.
+        verifies: options of what verifies one.
+
+    Raises:
+        InvalidInput: of the two uses both are meant.
+    """
+    asked = [option for option, value in (shows if verify else verifies) if value is not None]
+    if not asked:
+        return
+    if verify:
+        message = f"--verify shows nothing: leave out {listed(asked)}"
+    else:
+        message = f"{listed(asked)} {'is' if len(asked) == 1 else 'are'} for --verify alone"
+    raise InvalidInput([Finding("USE080", message)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, PackagePath, hertz, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
+
+if TYPE_CHECKING:
+    from manipcli.replay.figure import Kind
 
 
 def tune(
@@ -66,16 +69,7 @@ def tune(
 
     As much of bandwidth and damping as is stable at the control period in all postures looked at, and as efforts allow.
     """  # fmt: skip
-    if write is not None and write.exists() and not force:
-        message = f"'{write}' exists"
-        raise InvalidInput([Finding("USE070", message, hint="--force replaces it; or say another name")])
-    check_outputs(("--write", write), ("--output", output), reads=(robot,))
-    kind = None
-    if output is not None:
-        from manipcli.replay.figure import kind_of
-
-        kind = kind_of(output)
-    control_period = seconds(period)
+    kind, control_period = _checked(robot, output, write, force=force), seconds(period)
     if not 1e-6 <= control_period <= 1.0:
         raise InvalidInput([Finding("USE071", f"a control period of {period}; expected 1 us to 1 s")])
     from manipcli.control.tuning import Wish
@@ -104,3 +98,20 @@ def tune(
         write_whole(write, flow.written(tuning, controllers).encode())
         console.talk(f"written: {write}")
     return ExitCode.PASSED
+
+
+def _checked(robot: Path, output: Path | None, write: Path | None, *, force: bool) -> Kind | None:
+    """What kind of figure `output` is to be, once there is a place for all that is written.
+
+    Raises:
+        InvalidInput: a file cannot be written there, or `write` is there and not to be replaced, or no such figure.
+    """
+    if write is not None and write.exists() and not force:
+        message = f"'{write}' exists"
+        raise InvalidInput([Finding("USE070", message, hint="--force replaces it; or say another name")])
+    check_outputs(("--write", write), ("--output", output), reads=(robot,))
+    if output is None:
+        return None
+    from manipcli.replay.figure import kind_of
+
+    return kind_of(output)

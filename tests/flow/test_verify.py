@@ -197,6 +197,16 @@ def test_a_log_without_its_files_and_a_foreign_one_are_refused(
     assert not (tmp_path / "x.html").exists()
 
 
+def test_options_that_show_a_run_are_refused_where_it_is_verified(capsys: pytest.CaptureFixture[str]) -> None:
+    """And those of verifying where it is shown; no log is opened."""
+    shows = ["--picture", "x.png", "--at", "1", "--size", "9x9", "--robot", "left", "--port", "8765", "--open"]
+    assert main(["replay", "absent.mcap", "--verify", *shows]) == 4
+    told = "USE080]: --verify shows nothing: leave out --picture, --at, --size, --robot, --port, --open"
+    assert told in capsys.readouterr().err
+    assert main(["replay", "absent.mcap", "--allow-different", "--format", "json"]) == 4
+    assert "--allow-different, --format json are for --verify alone" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_a_failed_run_with_physics_verifies(tmp_path: Path) -> None:
     """Contacts amplify the last bit of anything: a robot, plan or scene that came back otherwise would be seen."""
