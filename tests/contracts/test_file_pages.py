@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import runpy
 from pathlib import Path
@@ -70,3 +71,28 @@ def test_examples_of_the_robot_file_load(example: str) -> None:
 @pytest.mark.parametrize("example", examples("controllers.md"), ids=lambda e: e.split("type: ")[1].split()[0])
 def test_examples_of_the_controllers_file_load(example: str) -> None:
     assert load_controllers_text(example, "c.yaml").spec.controllers
+
+
+def test_the_program_of_the_controllers_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    links = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    joint = '<joint name="joint_{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><axis xyz="0 0 1"/>'
+    (tmp_path / "r.urdf").write_text(
+        '<robot name="r">'
+        + "".join(links.format(name) + "</inertial></link>" for name in "abc")
+        + "".join(
+            joint.format(k, *names) + '<limit lower="-3" upper="3" effort="100" velocity="2"/></joint>'
+            for k, names in enumerate(["ab", "bc"], start=1)
+        )
+        + "</robot>"
+    )
+    (tmp_path / "r.yaml").write_text("robot: r\ndescription: r.urdf\n")
+    (example,) = (one for one in examples("controllers.md") if "forward_command" in one)
+    (tmp_path / "c.yaml").write_text(example)
+    (tmp_path / "task.yaml").write_text("task: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: [wait: 1 s]\n")
+    (program,) = re.findall(r"```python\n(.*?)```", text("controllers.md"), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(program, "controllers.md", "exec"), {})
+    angles = ast.literal_eval(capsys.readouterr().out)
+    assert angles == pytest.approx({"joint_1": 0.1, "joint_2": 0.0}, abs=2e-3)
