@@ -15,13 +15,14 @@ from manipcli.spec.task import TaskSpec
 
 
 def named_scene(spec: TaskSpec) -> Scene:
-    """The names of a scene that cannot be built: bodies that could be anything, so that only unknown names are told."""
+    """The names of a scene that cannot be built: bodies that could be anything but the floor, so that only unknown names
+    are told."""
     one = Box((1.0, 1.0, 1.0))
     origin = Transform.identity()
     bodies = tuple(
         Body(
             name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
-            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=False, X_WO=origin,
+            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in spec.scene, X_WO=origin,
             interior=Interior(X_OS=origin, shape=one), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
         )
         for name in (*(("floor",) if spec.floor else ()), *spec.scene)

@@ -307,6 +307,16 @@ def test_names_of_the_scene_are_told_where_the_robot_cannot_be_built(tmp_path: P
     ]
 
 
+def test_the_floor_of_a_scene_that_cannot_be_built_is_no_body_to_pick(tmp_path: Path) -> None:
+    path = tmp_path / "task.yaml"
+    path.write_text(NO_ROBOT.replace("expect:", "  - pick: {object: floor}\nexpect:") + "  - no_such: {}\n")
+    with pytest.raises(InvalidInput) as invalid:
+        load_task(path)
+    (finding,) = (one for one in invalid.value.findings if "'floor'" in one.message)
+    assert finding.message.endswith("'floor' is not a movable body of the scene")
+    assert finding.hint is not None and "floor" not in finding.hint
+
+
 @pytest.mark.parametrize(("named", "told"), [("/dev/null", "is no regular file"), ("robots", "is a folder")])
 def test_what_is_there_and_no_file_is_not_called_absent(tmp_path: Path, named: str, told: str) -> None:
     (tmp_path / "robots").mkdir()
