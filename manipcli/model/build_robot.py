@@ -43,6 +43,9 @@ class Reporter:
     def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
 
+    def warning(self, code: str, message: str, loc: Loc, *, hint: str) -> None:
+        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="warning"))
+
     def note(self, code: str, message: str, loc: Loc, *, hint: str | None) -> None:
         self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
 

@@ -168,4 +168,11 @@ class _Poses:
                 within = interval(limits.lower, limits.upper)
                 message = f"pose '{name}': joint '{joint}' at {value:g} is outside of {within}"
                 self._reporter.error("ROBOT323", message, locs[joint], hint=self._moving[joint].meant(value))
+                continue
+            least, most = limits.within_soft
+            if value < least - LIMIT_TOLERANCE or value > most + LIMIT_TOLERANCE:
+                word, limit = ("lower", least) if value < least else ("upper", most)
+                message = f"pose '{name}': joint '{joint}' at {value:g} is beyond its soft {word} limit {limit:g}"
+                hint = f"no motion of an arm begins or ends there: change the pose, `soft_{word}` or `k_position`"
+                self._reporter.warning("ROBOT324", message, locs[joint], hint=hint)
         return values

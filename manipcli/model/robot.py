@@ -127,6 +127,10 @@ class JointLimits:
         least, most = lower if soft.lower is None else soft.lower, upper if soft.upper is None else soft.upper
         return max(lower, least), min(upper, most)
 
+    def is_soft(self, side: int) -> bool:
+        """Whether the lower (0) or the upper (1) end of `within_soft` is a soft limit."""
+        return self.within_soft[side] != self.range[side]
+
     def nearest(self, position: float) -> float:
         """The position within the limits that is nearest to this one."""
         lower, upper = self.range

@@ -22,6 +22,7 @@ class MotionLimits:
         lower, upper: position.
         velocity, acceleration: finite and positive.
         jerk: infinite where none is stated.
+        soft: (joint, side) of those position limits that are soft ones; `lower` is side 0, `upper` side 1.
     """
 
     names: tuple[str, ...]
@@ -30,6 +31,7 @@ class MotionLimits:
     velocity: Array
     acceleration: Array
     jerk: Array
+    soft: frozenset[tuple[str, int]] = frozenset()
 
     @staticmethod
     def of(
@@ -63,4 +65,10 @@ class MotionLimits:
             velocity=frozen(np.array(velocity) * velocity_scale),
             acceleration=frozen(np.array(acceleration) * acceleration_scale),
             jerk=frozen([np.inf if limit.jerk is None else limit.jerk * acceleration_scale for limit in limits]),
+            soft=frozenset(
+                (name, side)
+                for name, limit in zip(joints, limits, strict=True)
+                for side in (0, 1)
+                if limit.is_soft(side)
+            ),
         )

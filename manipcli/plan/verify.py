@@ -73,24 +73,28 @@ def verify_written(
         lower, upper = joint.limits.within_soft
         if max(lower - value, value - upper) > _POSITION:
             side = 0 if value < lower else 1
-            kind = "" if joint.limits.within_soft[side] == joint.limits.range[side] else "soft "
-            raise _beyond(name, value, lower, upper, when, loc, joint.meant(value), kind)
+            refusal = _beyond(
+                name, value, (lower, upper)[side], side, joint.limits.is_soft(side), f"goes to {{}}{when}"
+            )
+            raise NotPlannable(refusal.cause, hint=joint.meant(value) or refusal.hint, loc=loc)
 
 
 def _beyond(
     name: str,
     value: float,
-    lower: float,
-    upper: float,
-    when: str,
-    loc: Loc = (),
-    hint: str | None = None,
-    kind: str = "",
+    limit: float,
+    side: int,
+    soft: bool,
+    does: str,
+    *,
+    change: str = "the goal",
 ) -> NotPlannable:
-    word, limit = ("lower", lower) if value < lower else ("upper", upper)
+    """What to tell of a joint that `does` something at a position, {}, beyond this limit; `change` what instead."""
+    word = ("lower", "upper")[side]
     there, most = told_apart(value, limit, form=".4f")
-    message = f"joint '{name}' goes to {there}{when}, beyond its {kind}{word} limit {most}"
-    return NotPlannable(message, hint=hint, loc=loc)
+    message = f"joint '{name}' {does.format(there)}, beyond its {'soft ' if soft else ''}{word} limit {most}"
+    hint = f"plans stay within soft limits: change {change}, or `soft_{word}` or `k_position` in the robot file"
+    return NotPlannable(message, hint=hint if soft else None)
 
 
 def overshoot(trajectory: JointTrajectory, limits: MotionLimits) -> Array:
@@ -110,8 +114,11 @@ def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
     q, outside = trajectory.positions, _outside(trajectory, limits)
     k, i = np.unravel_index(int(np.argmax(outside)), outside.shape)
     if outside[k, i] > _POSITION:
-        when = f" at t = {trajectory.times[k]:.3f} s"
-        raise _beyond(trajectory.names[i], q[k, i], limits.lower[i], limits.upper[i], when)
+        name, value, side = trajectory.names[i], float(q[k, i]), 0 if q[k, i] < limits.lower[i] else 1
+        limit, soft = (limits.lower, limits.upper)[side][i], (name, side) in limits.soft
+        if k == 0:
+            raise _beyond(name, value, limit, side, soft, "begins at {}", change="that pose, or the task's `start`")
+        raise _beyond(name, value, limit, side, soft, f"goes to {{}} at t = {trajectory.times[k]:.3f} s")
 
 
 def _bounded(word: str, values: Array, limit: Array, times: Array, names: tuple[str, ...], tolerance: float) -> None:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from manipcli.model.collision import CollisionHit
+from manipcli.plan.limits import MotionLimits
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.follow import FollowSpec
 from manipcli.plan.steps.move import MoveSpec
@@ -139,6 +140,10 @@ def test_a_soft_limit_is_planned_for(bench: Make) -> None:
     """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973: from beyond it is led back."""
     refusal = bench("panda").refused("move", {"to": {"panda_joint1": 2.95}})
     assert refusal.cause == "joint 'panda_joint1' goes to 2.9500, beyond its soft upper limit 2.8973"
+    assert refusal.hint is not None
+    assert "soft_upper" in refusal.hint
+    limits = MotionLimits.of(bench("panda").robot, ("panda_joint1", "panda_finger_joint1"))
+    assert limits.soft == {("panda_joint1", 0), ("panda_joint1", 1)}
 
 
 @pytest.mark.slow

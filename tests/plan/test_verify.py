@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ T = np.arange(1001) * 1e-3
 def limits(**changed: float) -> MotionLimits:
     """One joint whose sine q = sin(2 t) touches each limit: |q| 1, |q'| 2, |q''| 4, |q'''| 8."""
     touched = {"lower": -1.0, "upper": 1.0, "velocity": 2.0, "acceleration": 4.0, "jerk": 8.0} | changed
-    return MotionLimits(("j",), **{name: np.array([value]) for name, value in touched.items()})
+    return MotionLimits(("j",), soft=frozenset(), **{name: np.array([value]) for name, value in touched.items()})
 
 
 def sine(*, velocities: bool = True, accelerations: bool = True) -> JointTrajectory:
@@ -39,7 +41,7 @@ def test_a_motion_that_touches_every_limit_passes() -> None:
     ("limit", "value", "message"),
     [
         ("upper", 0.9, r"joint 'j' goes to 1\.0000 at t = 0\.785 s, beyond its upper limit 0\.9000"),
-        ("lower", 0.1, r"joint 'j' goes to 0\.0000 at t = 0\.000 s, beyond its lower limit 0\.1000"),
+        ("lower", 0.1, r"joint 'j' begins at 0\.0000, beyond its lower limit 0\.1000"),
         ("velocity", 1.98, r"velocity 2 at t = 0\.000 s; its limit is 1\.98"),
         ("acceleration", 3.97, r"acceleration 4 at t = 0\.785 s; its limit is 3\.97"),
         ("jerk", 7.9, r"jerk 8 at t = 0\.000 s; its limit is 7\.9"),
@@ -50,6 +52,29 @@ def test_one_percent_beyond_a_limit_is_refused_with_joint_value_limit_and_time(
 ) -> None:
     with pytest.raises(NotPlannable, match=message):
         verify(sine(), limits(**{limit: value}))
+
+
+def test_a_soft_limit_is_called_so_and_the_hint_says_where_it_is_stated() -> None:
+    at_start = dataclasses.replace(limits(lower=0.1), soft=frozenset({("j", 0)}))
+    on_way = dataclasses.replace(limits(upper=0.9), soft=frozenset({("j", 1)}))
+    hard = dataclasses.replace(limits(upper=0.9), soft=frozenset({("j", 0)}))
+    told = []
+    for each in (at_start, on_way, hard):
+        with pytest.raises(NotPlannable) as refused:
+            verify(sine(), each)
+        told.append((refused.value.cause, refused.value.hint))
+    within, stated = "plans stay within soft limits: change ", "`k_position` in the robot file"
+    assert told == [
+        (
+            "joint 'j' begins at 0.0000, beyond its soft lower limit 0.1000",
+            f"{within}that pose, or the task's `start`, or `soft_lower` or {stated}",
+        ),
+        (
+            "joint 'j' goes to 1.0000 at t = 0.785 s, beyond its soft upper limit 0.9000",
+            f"{within}the goal, or `soft_upper` or {stated}",
+        ),
+        ("joint 'j' goes to 1.0000 at t = 0.785 s, beyond its upper limit 0.9000", None),
+    ]
 
 
 def test_half_a_percent_is_forgiven() -> None:
