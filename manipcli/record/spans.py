@@ -132,7 +132,7 @@ class _SpanReader:
         self._contacts: list[ContactSnapshot] = []
         self._gaps = gaps
         self._last = -1
-        self._number = 0
+        self._number: int | None = None
 
     @property
     def ready(self) -> int:
@@ -159,8 +159,9 @@ class _SpanReader:
 
     def _follow(self, numbers: Int) -> None:
         """Contacts hold until the next ones, so that nothing but their numbers tells that some are missing; those that
-        another program wrote again may all be 0."""
-        if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=self._number) == 1):
+        another program wrote again may begin at 0, or all be 0."""
+        before = min(int(numbers[0]) - 1, 0) if self._number is None else self._number
+        if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=before) == 1):
             raise _Apart
         self._number = int(numbers[-1])
 

@@ -582,14 +582,30 @@ def test_contacts_that_another_program_left_out_are_missed(
         read_recording(thinned)
 
 
-def test_contacts_of_a_program_that_numbers_nothing_are_read(
-    make_run: MakeRun, rewrite_log: Any, tmp_path: Path
+@pytest.mark.parametrize("numbered", [lambda _: 0, lambda sequence: sequence - 1], ids=["nothing", "from 0"])
+def test_contacts_that_another_program_numbers_otherwise_are_read(
+    make_run: MakeRun, rewrite_log: Any, tmp_path: Path, numbered: Callable[[int], int]
 ) -> None:
     log, again = make_run(450).write(tmp_path / "run.mcap"), tmp_path / "again.mcap"
 
-    def unnumbered(_: str, message: Message) -> bytes:
-        message.sequence = 0
+    def renumbered(_: str, message: Message) -> bytes:
+        message.sequence = numbered(message.sequence)
         return message.data
 
-    rewrite_log(log, again, message=unnumbered)
-    assert_same(read_recording(again), read_recording(log))
+    for chunk_size in (1 << 10, 1 << 20):  # one of contacts in the first, all of them
+        rewrite_log(log, again, message=renumbered, chunk_size=chunk_size)
+        assert_same(read_recording(again), read_recording(log))
+
+
+def test_contacts_left_out_are_missed_where_numbers_begin_at_0(
+    make_run: MakeRun, rewrite_log: Any, tmp_path: Path
+) -> None:
+    log, thinned = make_run(450).write(tmp_path / "run.mcap"), tmp_path / "thinned.mcap"
+
+    def kept(topic: str, message: Message) -> bytes | None:
+        message.sequence -= 1
+        return None if topic == "/contacts" and message.sequence == 1 else message.data
+
+    rewrite_log(log, thinned, message=kept)
+    with pytest.raises(Thinned, match="contacts"):
+        read_recording(thinned)
