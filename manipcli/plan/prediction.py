@@ -58,12 +58,15 @@ def spilled(planner: Planner, situation: Situation, into: str) -> Situation:
 def pushed(
     planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, bodies: Iterable[str]
 ) -> Situation:
-    """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it."""
+    """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it, and
+    what lies in it, too."""
     columns = planner.robot.indices(motion.names)
     way = np.tile(before.position, (_LOOKS, 1))
     way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
     end = planner.tool_pose(now).p
-    slid = {}
+    held = () if before.carried is None else (before.carried.body,)
+    slid: dict[str, Transform] = {}
+    taken: dict[str, Transform] = {}
     for name in bodies:
         if planner.scene.body(name).fixed:
             continue
@@ -71,5 +74,8 @@ def pushed(
         met = next((q for q in way if planner.distance(before.moved(q), name) < deep), None)
         if met is not None:
             x, y, _ = end - planner.tool_pose(before.moved(met)).p
-            slid[name] = Transform.of(xyz=(x, y, 0.0)) @ planner.body_pose(before, name)
-    return put(planner, now, slid)
+            shift = Transform.of(xyz=(x, y, 0.0))
+            slid[name] = shift @ planner.body_pose(before, name)
+            inside = [one for one in planner.contents(before, name) if one not in held]
+            taken |= {one: shift @ planner.body_pose(before, one) for one in inside}
+    return put(planner, now, taken | slid)

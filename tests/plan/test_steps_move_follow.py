@@ -136,6 +136,22 @@ def test_what_a_move_touches_is_pushed_and_else_an_obstacle(bench: Make) -> None
     arm.do("move", {"to": "home"})
 
 
+def test_what_lies_in_a_pushed_container_goes_with_it(bench: Make) -> None:
+    scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    scene += "  tray: {tray: {size: [8 cm, 8 cm, 8 cm]}, mass: 0.2, rests_on: table, at: [0.5, -0.1]}\n"
+    scene += "  ball: {sphere: {radius: 1 cm}, mass: 10 g, inside: tray}\n"
+    scene += "  other: {sphere: {radius: 1 cm}, mass: 10 g, rests_on: table, at: [0.4, -0.1]}\n"
+    arm = bench("panda", scene=scene)
+    arm.do("grasp", {"until": "posture"})
+    for y, more in ((-0.24, {}), (0.0, {"path": "linear", "touch": ["tray"]})):
+        arm.do("move", {"pose": {"xyz": [0.5, y, 0.25], "rpy": [np.pi, 0, np.pi / 2]}, **more})
+    before = dict(zip((body.name for body in arm.scene.movable), arm.start.bodies, strict=True))
+    slid = {name: arm.body(name).p - X_WO.p for name, X_WO in before.items()}
+    assert slid["tray"][1] > 0.14
+    np.testing.assert_allclose(slid["ball"], slid["tray"], atol=1e-12)
+    np.testing.assert_array_equal(slid["other"], np.zeros(3))
+
+
 def test_a_soft_limit_is_planned_for(bench: Make) -> None:
     """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973: from beyond it is led back."""
     refusal = bench("panda").refused("move", {"to": {"panda_joint1": 2.95}})
