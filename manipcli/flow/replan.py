@@ -64,7 +64,7 @@ class Measured:
         bodies = [
             Transform.of(xyz=p, quat_xyzw=q) for p, q in zip(state.body_position, state.body_quat_xyzw, strict=True)
         ]
-        now = Situation(position, tuple(bodies), carried=None, closed=believed.closed)
+        now = Situation(position, tuple(bodies), carried=None, closed=believed.closed, at_start=False)
         carried = believed.carried
         if carried is None:
             return now

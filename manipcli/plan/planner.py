@@ -32,6 +32,14 @@ TOUCHING = 0.0045
 nothing can stand too near to be left and too far to be left out."""
 NO_WAY_AROUND = "no way around is searched for: `move` to a pose from which the way is free"
 """The hint where something is in the way of a motion."""
+PUT_APART = "put them apart: `start: POSE` of a task begins elsewhere, `mount` of a robot file moves its base"
+"""The hint where the robot is put too near to something before it moves."""
+OF_TWO_LINKS = (
+    "`collision_ignore` in the robot file, if the links have room there (a mesh counts as its hull); "
+    "an attached hand is put right by its `pose` under `attach`"
+)
+"""The hint where two links of the robot meet."""
+ROBOT = "robot/"
 _QUERIES = 8  # kept; the candidates of a step ask the same few
 
 
@@ -223,15 +231,21 @@ class Planner:
         """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`."""
         carried = situation.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
-        if begins and hit.distance < 0.0 and not held:
-            hint = "put them apart: `start: POSE` of a task begins elsewhere, `mount` of a robot file moves its base"
-            overlap = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm"
-            return NotPlannable(f"{overlap} already, {when}", hint=hint)
         hint = NO_WAY_AROUND
         if begins and held and carried is not None:
             hint = f"`lift` '{carried.body}' first"
-        elif hit.a.startswith("robot/") and hit.b.startswith("robot/"):
-            hint = f"{hint}; or `collision_ignore`, if the links have room there (a mesh counts as its hull)"
+        elif hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
+            hint = OF_TWO_LINKS if begins else f"{NO_WAY_AROUND}; or {OF_TWO_LINKS}"
+        elif begins and situation.at_start:
+            hint = PUT_APART
+        elif begins:
+            body = hit.b if hit.a.startswith(ROBOT) else hit.a
+            if frozenset((hit.a, hit.b)) in map(frozenset, self.hand_contacts(body)):
+                hint = f"`touch: [{body}]` of the `move` that leaves it lets it"
+        if begins and hit.distance < 0.0 and not held:
+            return NotPlannable(
+                f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm already, {when}", hint=hint
+            )
         near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
         clearance = f"{1000 * CLEARANCE:.0f} mm"
         return NotPlannable(f"'{hit.a}' {verb} within {clearance} of '{hit.b}' ({near}) {when}", hint=hint)

@@ -37,16 +37,18 @@ class Situation:
         bodies: `X_WO` of every movable body, in the order of `Scene.movable`.
         carried: what the hand holds.
         closed: the hand was closed to hold something, and not opened since; moves leave it as it is.
+        at_start: the robot has not moved since the task began: it stands where the files put it.
     """
 
     position: Array
     bodies: tuple[Transform, ...]
     carried: Carried | None = None
     closed: bool = False
+    at_start: bool = True
 
     def moved(self, position: Array) -> Situation:
         """The same with the robot at `position`."""
-        return replace(self, position=position)
+        return replace(self, position=position, at_start=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

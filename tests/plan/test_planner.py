@@ -12,6 +12,7 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform, frozen
+from manipcli.model.collision import CollisionHit
 from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.draft import Draft
@@ -146,3 +147,27 @@ def test_a_robot_that_begins_in_something_is_told_so(bench: Make) -> None:
     refusal = arm.refused("move", {"to": {"joint_1": 0.3}})
     assert re.match(r"'robot/\w+' and 'wall' overlap by [\d.]+ mm already, at t = 0.00 s of 'move'$", refusal.cause)
     assert refusal.hint is not None and "`start: POSE`" in refusal.hint
+
+
+def test_a_later_step_that_begins_in_something_is_told_what_lets_it_leave(bench: Make) -> None:
+    """A hand that pressed on the desk; `start` and `mount` change nothing there."""
+    arm = bench()
+    above = {"xyz": [0.7, -0.2, 0.54], "rpy": [0, "90 deg", 0]}
+    arm.do("move", {"pose": above})
+    arm.do("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear", "touch": ["desk"]})
+    refusal = arm.refused("move", {"pose": above})
+    assert "'desk' and 'robot/" in refusal.cause
+    assert "already, before it moves" in refusal.cause
+    assert refusal.hint == "`touch: [desk]` of the `move` that leaves it lets it"
+    arm.do("move", {"pose": above, "path": "linear", "touch": ["desk"]})
+
+
+def test_links_that_overlap_are_told_of_the_robot_file(bench: Make) -> None:
+    """Wherever it is: no other start or mount takes them apart."""
+    arm = bench()
+    hit = CollisionHit("robot/link_7", "robot/palm", -0.002)
+    for now in (arm.start, arm.start.moved(arm.start.position)):
+        hint = arm.planner.refusal(now, hit, "is", "before it moves").hint or ""
+        assert "`collision_ignore`" in hint
+        assert "`attach`" in hint
+        assert "`start: POSE`" not in hint
