@@ -97,8 +97,7 @@ def check_urdf(
         if inspection.examination.errors:
             console.talk(f"not drawn: {file} has errors")
         else:
-            for line in describe.draw(inspection, picture):
-                console.talk(f"not drawn: {line}")
+            console.not_drawn(describe.draw(inspection, picture))
             console.talk(f"drawn: {picture}")
     return ExitCode.PASSED if passed else ExitCode.FAILED
 

@@ -19,6 +19,8 @@ from typing import TextIO
 
 from manipcli.core.text import escape
 
+MOST_NOT_DRAWN = 5
+"""Lines that are told of what a picture lacks."""
 STDOUT = "standard output"
 """What stdout is called where it cannot be written."""
 _COLOURS = {"✓": "32", "✗": "31", "error[": "31", "warning[": "33", "note[": "36", "hint:": "36"}
@@ -79,6 +81,15 @@ def result_bytes(path: Path) -> None:
 def talk(text: str) -> None:
     """Everything else, to stderr."""
     _write(sys.stderr, f"{_dressed(text, sys.stderr)}\n")
+
+
+def not_drawn(lines: Sequence[str]) -> None:
+    """What a picture lacks: some of it, and how much more."""
+    shown = lines if len(lines) <= MOST_NOT_DRAWN else lines[: MOST_NOT_DRAWN - 1]
+    for line in shown:
+        talk(f"not drawn: {line}")
+    if len(shown) < len(lines):
+        talk(f"not drawn: {len(lines) - len(shown)} more")
 
 
 def is_live() -> bool:

@@ -101,7 +101,7 @@ class Pictures:
                 whole_file(self._picture) as partial,
                 Shots(playback, size=size or SIZE, towards=towards) as shots,
             ):
-                _tell_missing(shots)
+                console.not_drawn(shots.missing)
                 partial.write_bytes(png_bytes(shots.at(when)))
             console.result(str(self._picture))
         if self._sheet is not None:
@@ -119,7 +119,7 @@ class Pictures:
 
         film = films.cutting(playback, fps=self._fps, speed=self._speed)
         with Shots(playback, size=size or films.SIZE, towards=towards) as shots, _FilmProgress() as progress:
-            _tell_missing(shots)
+            console.not_drawn(shots.missing)
             films.write_film(path, shots, film, progress=progress)
         rate = len(film.times) / progress.seconds
         console.talk(f"{len(film.times)} frames, {film.duration:.2f} s, drawn at {rate:.1f} frames/s")
@@ -150,8 +150,3 @@ class _FilmProgress:
         if self._live and self.seconds >= self._next:
             self._next = self.seconds + REDRAW_PERIOD
             console.redraw(f"frame {done} of {total}  {done / self.seconds:.1f} frames/s")
-
-
-def _tell_missing(shots: Shots) -> None:
-    for line in shots.missing:
-        console.talk(f"not drawn: {line}")

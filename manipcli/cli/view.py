@@ -40,7 +40,6 @@ def view(
         for finding in sight.findings:
             console.talk(text.describe(finding))
         with View(sight.robot, sight.scene, q=sight.q, port=port) as page:
-            for line in page.missing:
-                console.talk(f"not drawn: {line}")
+            console.not_drawn(page.missing)
             stay(page, open_=open_)
     return ExitCode.PASSED

@@ -17,7 +17,7 @@ class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
     What the log carries itself is taken from there. Packages are looked for as for a description beside the log, and in
-    the working directory and its folders. What is not found keeps its URI as its path: whoever draws it draws something
+    the working directory and its folders, and in the folders of the one that holds `runs/`. What is not found keeps its URI as its path: whoever draws it draws something
     else.
 
     Args:
@@ -40,7 +40,8 @@ class MeshSearch:
         allow_outside: bool = False,
     ) -> None:
         here = Path.cwd()
-        places = [*package_path, here, *_folders(here), *_folders(log.resolve().parent)]
+        runs = log.resolve().parent
+        places = [*package_path, here, *_folders(here), *_folders(runs), *_folders(runs.parent)]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
         self._hashes = hashes
         self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None

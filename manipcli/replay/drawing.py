@@ -106,7 +106,7 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
                 bare.append(link.name)
         if bare:
             drawables += (bone for name in bare for bone in _bones(robot, name))
-            missing.append(f"bones between joints stand in for {listed(bare)}")
+            missing.insert(0, f"bones between joints stand in for {listed(bare)}")
         if robot.tool is not None:
             marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
     if scene is not None:

@@ -64,3 +64,14 @@ def test_what_the_encoding_lacks_is_written_as_its_code(monkeypatch: pytest.Monk
     console.prepare()
     console.result("✓ \udc80")
     assert raw.getvalue() == b"\\u2713 \\udc80\n"
+
+
+@pytest.mark.parametrize(("count", "told"), [(0, 0), (5, 5), (6, 5), (40, 5)])
+def test_of_much_that_is_not_drawn_some_is_told_and_the_rest_counted(
+    capsys: pytest.CaptureFixture[str], count: int, told: int
+) -> None:
+    console.not_drawn([f"shape {k}" for k in range(count)])
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == told
+    if count > told:
+        assert lines[-1] == f"not drawn: {count - told + 1} more"

@@ -181,6 +181,16 @@ def test_a_package_that_is_not_there_is_told_and_something_is_drawn_all_the_same
     assert {f"robot/{name}" for name in simple} <= {one.frame for one in draw(robot).layer("visual")}
 
 
+def test_meshes_of_the_project_that_holds_the_runs_are_found_from_anywhere(
+    log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    shutil.copytree(ROOT / "robots", tmp_path / "project" / "robots")
+    (tmp_path / "project" / "runs").mkdir()
+    assert open_playback(Path(shutil.copy(log, tmp_path / "project" / "runs" / "lift.mcap"))).notes == ()
+
+
 def test_a_mesh_that_is_another_file_than_in_the_run_is_told(log: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "robots" / "arm7_hand3", tmp_path / "arm7_hand3")
     victim = tmp_path / "arm7_hand3" / "meshes" / "palm.stl"
