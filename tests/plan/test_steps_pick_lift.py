@@ -88,6 +88,9 @@ def test_what_cannot_be_taken_from_the_side_is_taken_from_above_unless_the_side_
     panda = bench("panda")
     refusal = panda.refused("pick", {"object": "block", "approach": {"from": "side"}})
     assert "table" in refusal.cause
+    # A direction about the vertical is one from the side, too.
+    refusal = panda.refused("pick", {"object": "block", "approach": {"yaw": "0 deg"}})
+    assert "table" in refusal.cause
     before = panda.now
     plan = panda.do("pick", {"object": "block"})
     X = panda.tools(before, plan, "approach")

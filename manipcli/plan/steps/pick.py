@@ -29,7 +29,7 @@ from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import Speed
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Length
+from manipcli.spec.quantity import Length, Turn
 
 YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 """Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
@@ -61,14 +61,19 @@ class ApproachSpec(Model):
         None,
         alias="from",
         description="`side`: horizontally, `top`: from straight above. Default: from the side where that can be, else "
-        "from the top.",
+        "from the top; with `yaw`: from the side.",
     )
-    yaw: Angle | None = Field(
+    yaw: Turn | None = Field(
         None,
-        description="Direction of the approach about the vertical [rad]. Default: away from the robot's base; from "
-        "the top: as the object is turned, by quarter turns.",
+        description="Direction of the approach about the vertical [rad]; from the top: the turn of the hand. Default: "
+        "away from the robot's base; from the top: as the object is turned, by quarter turns.",
     )
     distance: Annotated[Range, Field(description="Length of the straight approach [m].")] = (0.08, 0.14)
+
+    @property
+    def direction(self) -> Direction | None:
+        """From where the hand comes; None where that is open."""
+        return "side" if self.from_ is None and self.yaw is not None else self.from_
 
 
 class PickGraspSpec(GraspSpec):
@@ -130,7 +135,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
             if refusal.hint == NOT_SO:
-                others = [word for word in get_args(Direction) if spec.approach.from_ not in (None, word)]
+                others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise NotPlannable(refusal.cause, hint=hint)
         draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
@@ -184,7 +189,7 @@ def slopes() -> tuple[float, ...]:
 def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[Array]:
     """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z)."""
     found = []
-    if spec.from_ != "top":
+    if spec.direction != "top":
         away = X_WO.p - X_WB.p
         nominal = math.atan2(away[1], away[0]) if spec.yaw is None else spec.yaw
         turns = YAWS_DEG if spec.yaw is None else (0.0,)
@@ -193,7 +198,7 @@ def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[
             z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
             x = np.array([0.0, 0.0, -1.0])
             found += [_frame(x, z), _frame(-x, z)]
-    if spec.from_ != "side":
+    if spec.direction != "side":
         nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
         for turn in (0.0, 90.0, 180.0, -90.0) if spec.yaw is None else (0.0, 180.0):
             yaw = nominal + math.radians(turn)
