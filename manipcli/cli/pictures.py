@@ -12,7 +12,6 @@ from manipcli.core.errors import Finding, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.replay.playback import Playback
-    from manipcli.replay.shots import Shots
 
 REDRAW_PERIOD = 0.2
 """[s] between two reports of how far a film is."""

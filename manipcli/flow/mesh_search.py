@@ -17,8 +17,8 @@ class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
     What the log carries itself is taken from there. Packages are looked for as for a description beside the log, and in
-    the working directory and its folders, and in the folders of the one that holds `runs/`. What is not found keeps its URI as its path: whoever draws it draws something
-    else.
+    the working directory, its folders, and those of the folder that holds `runs/`. What is not found keeps its URI as
+    its path: whoever draws it draws something else.
 
     Args:
         log: where the log is.

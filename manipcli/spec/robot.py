@@ -11,13 +11,13 @@ from pydantic import AfterValidator, Field, model_validator
 from manipcli.core.text import shorten
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
-    Angle,
     JointAcceleration,
     JointEffort,
     JointJerk,
     JointValue,
     JointVelocity,
     Length,
+    Turn,
 )
 
 Vector3 = tuple[Length, Length, Length]
@@ -48,7 +48,7 @@ class PoseSpec(Model):
     """A pose: translation, and at most one way to say the rotation (fixed-axis roll, pitch, yaw; or a quaternion)."""
 
     xyz: Vector3 = Field((0.0, 0.0, 0.0), description="Translation [m]. Default [0, 0, 0].")
-    rpy: tuple[Angle, Angle, Angle] | None = Field(
+    rpy: tuple[Turn, Turn, Turn] | None = Field(
         None, description="Roll, pitch, yaw about the fixed x, y, z axes [rad]. Default: no rotation."
     )
     quat_xyzw: tuple[float, float, float, float] | None = Field(
@@ -204,7 +204,8 @@ class AttachSpec(Model):
     pose: PoseSpec = Field(PoseSpec(), description="Of its root link in `parent`. Default: coincident.")
     prefix: Annotated[str, AfterValidator(_begins_names)] = Field(
         "",
-        description="Put before each of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: nothing.",
+        description="Put before each of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: "
+        "nothing.",
     )
 
 

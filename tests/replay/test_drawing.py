@@ -179,7 +179,7 @@ def test_what_cannot_be_drawn_is_left_out_and_told(two: Sight, tmp_path: Path) -
     gone = dataclasses.replace(link.visuals[0], shape=Mesh("gone.stl", tmp_path / "gone.stl"))
     links = tuple(dataclasses.replace(one, visuals=(gone,)) if one is link else one for one in two.robot.links)
     drawing = draw(dataclasses.replace(two.robot, links=links))
-    line, stands_in = drawing.missing
+    stands_in, line = drawing.missing
     assert "robot/finger" in line and "gone.stl" in line
     assert stands_in.startswith("bones") and stands_in.endswith("finger")
     assert Box((0.2, 0.2, 0.1)) == two.robot.link("base").collisions[0].shape
