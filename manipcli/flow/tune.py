@@ -248,10 +248,11 @@ class _Tuner:
     def _pressing(self, controller: str, joint: str) -> float:
         """p with which the joint of a hand gives its effort over its travel; 0 of others, and where one is unknown."""
         spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
-        if not isinstance(spec, GripperSpec) or limits.lower is None or limits.upper is None:
+        if not isinstance(spec, GripperSpec):
             return 0.0
         effort = min((each for each in (limits.effort, spec.max_effort) if each), default=0.0)
-        return effort / (limits.upper - limits.lower) if limits.upper > limits.lower else 0.0
+        lower, upper = limits.range
+        return effort / (upper - lower) if 0.0 < upper - lower < np.inf else 0.0
 
     def _step_of(self, joint: str) -> float:
         return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)
@@ -266,11 +267,8 @@ class _Tuner:
     def _range(self) -> tuple[Array, Array]:
         """(n), (n) the least and the greatest of the joints."""
         start = posture(self._robot)
-        low, high = start - WIDE, start + WIDE
-        for k, joint in enumerate(self._robot.moving_joints):
-            low[k] = low[k] if joint.limits.lower is None else joint.limits.lower
-            high[k] = high[k] if joint.limits.upper is None else joint.limits.upper
-        return low, high
+        lower, upper = np.array([joint.limits.range for joint in self._robot.moving_joints]).reshape(-1, 2).T
+        return np.where(np.isneginf(lower), start - WIDE, lower), np.where(np.isposinf(upper), start + WIDE, upper)
 
 
 def _inertia(k: int, load: Load) -> Array:

@@ -7,7 +7,6 @@ the same code.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.rows import MESSAGE_HEAD, MESSAGE_OPCODE
+from manipcli.record.scan import RECORD_HEAD
 
 Int = npt.NDArray[np.int64]
 _MAX_OTHERS = 8192
@@ -92,7 +92,7 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
     while offset < len(data):
         if offset + 9 > len(data):
             raise CdrError("ends too early")
-        opcode, length = struct.unpack_from("<BQ", data, offset)
+        opcode, length = RECORD_HEAD.unpack_from(data, offset)
         end = offset + 9 + length
         if end > len(data) or (opcode == MESSAGE_OPCODE and length < PAYLOAD - 9):
             raise CdrError("ends too early")

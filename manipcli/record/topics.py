@@ -5,7 +5,6 @@ One pass verifies the file and opens a chunk only where it does not say from out
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -23,6 +22,7 @@ from manipcli.record.scan import (
     MAX_NAMED,
     MESSAGE,
     MESSAGE_INDEX,
+    RECORD_HEAD,
     SCHEMA,
     ChunkPlace,
     Record,
@@ -214,7 +214,7 @@ class _Reader:
     def _close_run(self) -> None:
         run, self._run, self._run_size = self._run, [], 0
         if run:
-            data = b"".join(struct.pack("<BQ", one.opcode, len(one.body)) + one.body for one in run)
+            data = b"".join(RECORD_HEAD.pack(one.opcode, len(one.body)) + one.body for one in run)
             place = ChunkPlace(run[0].offset, run[-1].end)
             guarded(self._path, run[0], lambda _: self._opened(data, place, chunk=False))
 
