@@ -192,8 +192,15 @@ def _type(kind: object) -> str:
     if origin is dict:
         return f"mapping of: {_type(parts[1])}"
     if origin is tuple:
-        return f"list of: {_type(parts[0])}" if Ellipsis in parts else f"[{', '.join(map(_type, parts))}]"
+        return f"list of: {_type(parts[0])}" if Ellipsis in parts else _fixed(tuple(map(_type, parts)))
     return ELSEWHERE.get(kind) or _WORDS.get(kind, "mapping")
+
+
+def _fixed(items: tuple[str, ...]) -> str:
+    """A list of fixed length; what bounds all of its items alike is said once."""
+    word, _, bounds = next(iter(items), "").partition(", ")
+    alike = bounds.startswith(tuple(_BOUNDS.values())) and len(set(items)) == 1
+    return f"[{', '.join([word] * len(items))}], each {bounds}" if alike else f"[{', '.join(items)}]"
 
 
 _BOUNDS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}

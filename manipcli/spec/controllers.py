@@ -7,7 +7,15 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Frequency, JointAcceleration, JointEffort, JointValue, JointVelocity, Time
+from manipcli.spec.quantity import (
+    Frequency,
+    JointAcceleration,
+    JointEffort,
+    JointTolerance,
+    JointValue,
+    JointVelocity,
+    Time,
+)
 
 Interface = Literal["position", "velocity", "acceleration", "effort"]
 Role = Literal["follower", "hand", "other"]
@@ -86,11 +94,11 @@ class GainsSpec(Model):
 class JointConstraintSpec(Model):
     """Tolerances of one joint, rad or m; absent means not enforced."""
 
-    trajectory: Annotated[JointValue, Field(gt=0)] | None = Field(
-        None, description="On the way [rad or m], above 0. Left out: not enforced."
+    trajectory: JointTolerance | None = Field(
+        None, description="On the way [rad or m], above 0 to pi. Left out: not enforced."
     )
-    goal: Annotated[JointValue, Field(gt=0)] | None = Field(
-        None, description="At the end [rad or m], above 0. Left out: not enforced."
+    goal: JointTolerance | None = Field(
+        None, description="At the end [rad or m], above 0 to pi. Left out: not enforced."
     )
     max_deceleration_on_cancel: Annotated[JointAcceleration, Field(ge=0)] = Field(
         0.0, description="After a cancel [rad/s^2 or m/s^2], 0 or more. Default 0: the joint's acceleration limit."
@@ -212,8 +220,8 @@ class GripperSpec(ControllerSpec):
     allow_stalling: bool = Field(
         True, description="Whether a stalled finger has grasped; otherwise its goal is aborted. Default true."
     )
-    goal_tolerance: Annotated[JointValue, Field(gt=0)] | None = Field(
-        None, description="Distance that counts as arrived, above 0. Default 0.05 rad or 2 mm."
+    goal_tolerance: JointTolerance | None = Field(
+        None, description="Distance that counts as arrived, above 0 to pi. Default 0.05 rad or 2 mm."
     )
 
     @property

@@ -253,15 +253,17 @@ def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
 
 
 def _other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
-    """The hint where a plain number above the most that is taken lies below it as degrees, or as millimetres."""
-    most = next((context[key] for key in ("le", "lt") if key in context), None)
+    """The hint where a plain number beyond what is taken lies within it as degrees, or as millimetres."""
+    most = next((context[key] for key in ("le", "lt", "ge") if key in context), None)
     value = node.value if isinstance(node, ScalarNode) else None
-    if not isinstance(most, int | float) or not isinstance(value, int | float):
+    if not isinstance(most, int | float) or not isinstance(value, int | float) or value * most <= 0:
         return None
-    for dimension, what, symbol, size in _SMALLER:
-        if unit is not None and unit.dimensions == (dimension,) and value / size <= most:
-            return f"in {what}? write '{value:g} {symbol}'"
-    return None
+    guesses = [
+        f"in {what}? write '{value:g} {symbol}'"
+        for dimension, what, symbol, size in _SMALLER
+        if unit is not None and dimension in unit.dimensions and abs(value) > abs(most) >= abs(value) / size
+    ]
+    return "; ".join(guesses) or None
 
 
 _SMALLER = ((ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1000.0))
@@ -276,9 +278,10 @@ def _limit(context: dict[str, object], unit: Unit | None) -> str:
     value = next((context[key] for key in ("gt", "ge", "lt", "le", "multiple_of") if key in context), "")
     if not isinstance(value, int | float):
         return str(value)
-    if not value or unit is None or len(unit.dimensions) > 1:
+    if not value or unit is None:
         return f"{value:g}"
-    return readable(value, "rad") if unit.dimensions == (ANGLE,) else f"{value:g} {unit.dimensions[0].symbol}".rstrip()
+    symbols = " or ".join(dimension.symbol for dimension in unit.dimensions)
+    return readable(value, "rad") if unit.dimensions == (ANGLE,) else f"{value:g} {symbols}".rstrip()
 
 
 def _unit(complaint: _Complaint, model: type[BaseModel]) -> Unit | None:

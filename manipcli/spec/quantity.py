@@ -88,6 +88,12 @@ Share = Annotated[float, Unit((units.NUMBER,))]
 """`0.1` or `"10 %"`."""
 JointValue = Annotated[float, Unit((units.ANGLE, units.LENGTH))]
 """Position of a joint, revolute or prismatic."""
+Turn = Annotated[Angle, Field(ge=-6.2832, le=6.2832)]
+"""To which angle something is turned: a whole turn either way; rounded up, as it may be written."""
+AngleTolerance = Annotated[Angle, Field(gt=0, le=3.1416)]
+"""A difference of two directions: half a turn at most, so that degrees without their unit are not taken."""
+JointTolerance = Annotated[JointValue, Field(gt=0, le=3.1416)]
+"""A difference of two positions of a joint, likewise."""
 JointVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY, units.SPEED))]
 JointAcceleration = Annotated[float, Unit((units.ANGULAR_ACCELERATION, units.ACCELERATION))]
 JointJerk = Annotated[float, Unit((units.ANGULAR_JERK, units.JERK))]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, JointValue, Length
+from manipcli.spec.quantity import AngleTolerance, JointTolerance, Length
 
 Then = Literal["stop", "continue"]
 
@@ -16,10 +16,10 @@ class ReplanSpec(Model):
     """How far things may be from where a step was planned to begin; where one is further, it is planned again."""
 
     position: Annotated[Length, Field(gt=0, description="Of a body [m], above 0. Default 5 mm.")] = 0.005
-    rotation: Annotated[Angle, Field(gt=0, description="Of a body [rad], above 0. Default 2 deg.")] = 0.035
+    rotation: Annotated[AngleTolerance, Field(description="Of a body [rad], above 0 to pi. Default 2 deg.")] = 0.035
     slip: Annotated[Length, Field(gt=0, description="Of what is held, in the hand [m], above 0. Default 1 mm.")] = 0.001
     joints: Annotated[
-        JointValue, Field(gt=0, description="Of a joint that is commanded [rad or m], above 0. Default 0.05.")
+        JointTolerance, Field(description="Of a joint that is commanded [rad or m], above 0 to pi. Default 0.05.")
     ] = 0.05
 
 

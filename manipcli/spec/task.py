@@ -18,7 +18,7 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ID, ID_HINT, ConditionSpec, ExpectationSpec, KeyedSpec, WatchSpec
 from manipcli.spec.expression import NAME as PARAM
-from manipcli.spec.quantity import Acceleration, Angle, Frequency, Length, Mass, Pause, Time
+from manipcli.spec.quantity import Acceleration, Frequency, Length, Mass, Pause, Time, Turn
 from manipcli.spec.reactions import OnFail, ReplanSpec, RetrySpec
 from manipcli.spec.robot import PoseSpec, Vector3, Version
 from manipcli.spec.vary import VarySpec
@@ -130,7 +130,7 @@ class BodySpec(Model):
     at: tuple[Length, Length] | None = Field(
         None, description="x, y in the world [m]: needed with `rests_on`, and with `inside` where not in its middle."
     )
-    yaw: Angle = Field(0.0, description="About the world's z axis [rad]. Default 0.")
+    yaw: Turn = Field(0.0, description="About the world's z axis [rad]. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
     fixed: bool = Field(False, description="Never moves. Default false.")
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(

@@ -87,6 +87,45 @@ def test_degrees_and_millimetres_are_guessed(written: str, instead: str, hint: s
 
 
 @pytest.mark.parametrize(
+    ("block", "most"),
+    [
+        ("watch: [{always: {upright: {object: block, within: 30}}}]", "at most 180 deg, not 30"),
+        ("expect: [{unmoved: {object: block, within: 1 cm, turn: 30}}]", "at most 180 deg, not 30"),
+        ("expect: [{moved: {object: block, turn: 30}}]", "at most 180 deg, not 30"),
+        ("watch: [{always: {slip: {object: block, within: 1 cm, turn: 30}}}]", "at most 180 deg, not 30"),
+        ("expect: [{at_pose: {pose: home, within: 30}}]", "at most 180 deg, not 30"),
+        ("expect: [{tracking: {group: arm, within: 30}}]", "at most 3.1416 rad or m, not 30"),
+        ("replan: {rotation: 30}", "at most 180 deg, not 30"),
+        ("replan: {joints: 30}", "at most 3.1416 rad or m, not 30"),
+        ("frames: {f: {pose: {rpy: [30, 0, 0]}}}", "frames.f.pose.rpy[0]: must be at most 360 deg, not 30"),
+        ("frames: {f: {pose: {rpy: [0, 0, -30]}}}", "frames.f.pose.rpy[2]: must be at least -360 deg, not -30"),
+    ],
+)
+def test_degrees_without_their_unit_make_no_condition_that_always_holds(block: str, most: str) -> None:
+    finding = refused("steps:", f"{block}\nsteps:")
+    number = most.rpartition(" ")[2]
+    assert most in finding.message
+    assert (finding.hint or "").startswith(f"in degrees? write '{number} deg'")
+    tried = f"{block.replace(number, f'{number} deg')}\nsteps:"
+    load_task_text(TASK.replace("steps:", tried), "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize(
+    ("written", "instead"),
+    [
+        ("mass: 80 g", "mass: 80 g, yaw: 45"),
+        ("- wait: 1 s", "- pick: {object: block, approach: {yaw: 45}}"),
+        ("- wait: 1 s", "- place: {object: block, yaw: 45}"),
+    ],
+)
+def test_a_yaw_is_a_turn_at_most(written: str, instead: str) -> None:
+    assert refused(written, instead).hint == "in degrees? write '45 deg'"
+    for yaw in ("-360 deg", "6.2832", "1 rev"):
+        text = TASK.replace(written, instead.replace("45", yaw))
+        load_task_text(text, "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize(
     ("written", "instead"),
     [("radius: 1 cm", "radius: 200 m"), ("radius: 1 cm", "radius: 1e7"), ("mass: 80 g", "mass: 2e5")],
 )

@@ -55,7 +55,19 @@ def test_a_tolerance_of_zero_is_told_what_leaving_it_out_means() -> None:
     with pytest.raises(InvalidInput) as error:
         load_controllers_text(f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}", "c.yaml")
     (finding,) = error.value.findings
-    assert (finding.code, finding.hint) == ("CTRL204", "goal: At the end [rad or m], above 0. Left out: not enforced.")
+    assert (finding.code, finding.hint) == (
+        "CTRL204",
+        "goal: At the end [rad or m], above 0 to pi. Left out: not enforced.",
+    )
+
+
+def test_a_tolerance_in_degrees_is_told_to_say_so() -> None:
+    constraints = "constraints: {joints: {a: {trajectory: 15, goal: 2}}}"
+    with pytest.raises(InvalidInput) as error:
+        load_controllers_text(f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}", "c.yaml")
+    (finding,) = error.value.findings
+    assert finding.message == "controllers.c.constraints.joints.a.trajectory: must be at most 3.1416 rad or m, not 15"
+    assert finding.hint == "in degrees? write '15 deg'; in millimetres? write '15 mm'"
 
 
 def test_a_number_out_of_range_that_may_not_be_left_out_has_no_such_hint() -> None:
@@ -66,5 +78,5 @@ def test_a_number_out_of_range_that_may_not_be_left_out_has_no_such_hint() -> No
 def test_a_prefix_makes_names_that_can_be_written(prefix: str) -> None:
     block = f'attach: [{{description: h.urdf, parent: a, prefix: "{prefix}"}}]\n'
     finding = refused(ROBOT + block)
-    assert (finding.code, finding.hint) == ("ROBOT208", "write letters, digits and '_'")
+    assert (finding.code, finding.hint) == ("ROBOT208", "write letters, digits and '_', '.', '/', '-'")
     load_robot_text(ROBOT + block.replace(prefix, "left_arm/"), "r.yaml")

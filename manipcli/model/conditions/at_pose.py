@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from pydantic import Field
 
@@ -14,7 +12,7 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle
+from manipcli.spec.quantity import AngleTolerance
 
 
 class AtPoseSpec(Model):
@@ -22,7 +20,7 @@ class AtPoseSpec(Model):
 
     pose: str = Field(description="A named pose of the robot.")
     group: str | None = Field(default=None, description="Only this group's joints; default: all that the pose names.")
-    within: Annotated[Angle, Field(gt=0)] = Field(default=0.02, description="Largest difference [rad]. Default 0.02.")
+    within: AngleTolerance = Field(default=0.02, description="Largest difference [rad], to pi. Default 0.02.")
 
 
 def gauge(spec: AtPoseSpec, world: World) -> Gauge:

@@ -15,7 +15,7 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, least, reading
 from manipcli.model.where import centres
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import Angle, Length
+from manipcli.spec.quantity import AngleTolerance, Length
 
 
 class MovedSpec(Model):
@@ -24,7 +24,7 @@ class MovedSpec(Model):
 
     object: str = Field(description="A body of the scene that can move.")
     by: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="Least distance [m].")
-    turn: Annotated[Angle, Field(gt=0)] | None = Field(default=None, description="Least angle [rad].")
+    turn: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
 
     @model_validator(mode="after")
     def _something(self) -> MovedSpec:
@@ -38,7 +38,7 @@ class UnmovedSpec(Model):
 
     object: str = Field(description="A body of the scene that can move.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
-    turn: Annotated[Angle, Field(gt=0)] | None = Field(default=None, description="Largest angle [rad]. Default: any.")
+    turn: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
 
 
 Change = tuple[Array, Array]

@@ -19,7 +19,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.touch import held_force
 from manipcli.model.where import centres
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Force, Length
+from manipcli.spec.quantity import AngleTolerance, Force, Length
 
 LET_GO = 0.1
 """[s] An object that was not held for as long is grasped anew."""
@@ -30,7 +30,7 @@ class SlipSpec(Model):
 
     object: str = Field(description="A body of the scene that can move.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest motion of its centre [m].")
-    turn: Annotated[Angle, Field(gt=0)] | None = Field(default=None, description="Largest turn [rad]. Default: any.")
+    turn: AngleTolerance | None = Field(default=None, description="Largest turn [rad], to pi. Default: any.")
     grip: Annotated[Force, Field(gt=0)] = Field(
         default=0.1, description="It is held while two links press on it with at least this [N]. Default 0.1 N."
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from pydantic import Field
 
@@ -13,14 +11,14 @@ from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, 
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Measured, Reading
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import JointValue
+from manipcli.spec.quantity import JointTolerance
 
 
 class TrackingSpec(Model):
     """No joint of the group is further than `within` from its controller's reference."""
 
     group: str = Field(description="A group of the robot; each of its joints must have a controller.")
-    within: Annotated[JointValue, Field(gt=0)] = Field(description="Largest difference of a joint [rad or m].")
+    within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
 
 
 def gauge(spec: TrackingSpec, world: World) -> Gauge:

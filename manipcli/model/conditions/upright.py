@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -15,14 +14,14 @@ from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import body_pose
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle
+from manipcli.spec.quantity import AngleTolerance
 
 
 class UprightSpec(Model):
     """The object's z axis is at most `within` from the world's."""
 
     object: str = Field(description="A body of the scene.")
-    within: Annotated[Angle, Field(gt=0)] = Field(description="Largest tilt [rad].")
+    within: AngleTolerance = Field(description="Largest tilt [rad], to pi.")
 
 
 def gauge(spec: UprightSpec, world: World) -> Gauge:

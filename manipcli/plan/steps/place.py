@@ -30,7 +30,7 @@ from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.spec.base import Model
-from manipcli.spec.quantity import Angle, Length
+from manipcli.spec.quantity import Length, Turn
 
 UPRIGHT = np.cos(np.radians(5.0))
 """What stands straighter than this (cosine of its tilt) can be placed on."""
@@ -58,7 +58,7 @@ class PlaceSpec(Model):
         "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `on`."
     )
     on: str | None = Field(None, description="The body that takes the object at [x, y]: on its top, or inside a tray.")
-    yaw: Angle | None = Field(None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held.")
+    yaw: Turn | None = Field(None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held.")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
