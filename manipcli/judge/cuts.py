@@ -73,4 +73,6 @@ class Cuts:
         count = self.efforts.get(name)
         if count is None:
             return ""
-        return " (not effort)" if not count else " (effort)" if count >= self.joints[name] else f" (effort in {count})"
+        if not count:
+            return " (position, velocity or acceleration)"
+        return " (effort)" if count >= self.joints[name] else f" (effort in {count})"

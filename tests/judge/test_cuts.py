@@ -21,7 +21,7 @@ def test_the_worst_three_are_named_and_what_was_never_cut_is_not() -> None:
 
 def test_which_limit_it_was_is_told_where_it_is_known() -> None:
     cuts = Cuts({"a": 5, "b": 6, "c": 7, "d": 0}, {}, 2000, {"a": 5, "b": 0, "d": 0})
-    told = "joint 'c' in 7, joint 'b' (not effort) in 6, joint 'a' (effort) in 5 of 2000 ticks"
+    told = "joint 'c' in 7, joint 'b' (position, velocity or acceleration) in 6, joint 'a' (effort) in 5 of 2000 ticks"
     assert str(cuts) == f"cut at their limits: {told}"
     assert cuts.to_metadata()["saturated efforts"] == {"a": "5", "b": "0"}
     assert str(Cuts.from_metadata(cuts.to_metadata(), end=1.999, period=1e-3)) == str(cuts)
