@@ -172,10 +172,11 @@ def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path | None:
     named: str = getattr(task.spec, key)
     found = Path(os.path.normpath(path.parent / named))
     if not found.is_file():
-        message, hint = f"there is no file '{found}'", None
-        if found.exists():
-            message = f"'{found}' is {'a folder' if found.is_dir() else 'no regular file'}"
+        if found.is_dir():
+            message, hint = f"'{found}' is a folder; expected a YAML file", "name the YAML file in it"
+        elif found.exists():
+            message, hint = f"'{found}' is no regular file; expected a YAML file", None
         else:
-            hint = load.sibling(found)
+            message, hint = f"there is no file '{found}'", load.sibling(found)
         raise InvalidInput([task.source.finding(231, (key,), message, hint=hint)])
     return found

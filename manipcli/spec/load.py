@@ -163,10 +163,10 @@ def _taken_twice(source: Source) -> Iterator[Finding]:
     """Ids that two steps, or two of expectations and watches, have: looked for here, so that no other mistake hides
     them."""
     judged: dict[str, str] = {}
-    for key, named, first in (
-        ("steps", "steps in the log", dict[str, str]()),
-        ("expect", "expectations", judged),
-        ("watch", "watches, beside expectations", judged),
+    for key, why, first in (
+        ("steps", "ids name steps in the log", dict[str, str]()),
+        ("expect", "ids name expectations", judged),
+        ("watch", "expectations and watches share their ids", judged),
     ):
         items = child(source.root, key)
         for k, item in enumerate(items.items if isinstance(items, SequenceNode) else ()):
@@ -175,7 +175,7 @@ def _taken_twice(source: Source) -> Iterator[Finding]:
                 continue
             if own.value in first:
                 message = f"the id '{escape(own.value)}' is taken by {first[own.value]}"
-                yield source.finding(210, (key, k, "id"), message, hint=f"ids name {named}: give another")
+                yield source.finding(210, (key, k, "id"), message, hint=f"{why}: give another")
             first.setdefault(own.value, f"{key}[{k}]")
 
 

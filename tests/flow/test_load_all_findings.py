@@ -317,16 +317,21 @@ def test_the_floor_of_a_scene_that_cannot_be_built_is_no_body_to_pick(tmp_path: 
     assert finding.hint is not None and "floor" not in finding.hint
 
 
-@pytest.mark.parametrize(("named", "told"), [("/dev/null", "is no regular file"), ("robots", "is a folder")])
-def test_what_is_there_and_no_file_is_not_called_absent(tmp_path: Path, named: str, told: str) -> None:
+@pytest.mark.parametrize(
+    ("named", "told", "hint"),
+    [("/dev/null", "is no regular file", None), ("robots", "is a folder", "name the YAML file in it")],
+)
+def test_what_is_there_and_no_file_is_not_called_absent(
+    tmp_path: Path, named: str, told: str, hint: str | None
+) -> None:
     (tmp_path / "robots").mkdir()
     path = tmp_path / "task.yaml"
     path.write_text(NO_ROBOT.replace("nowhere.yaml", named))
     with pytest.raises(InvalidInput) as invalid:
         load_task(path)
     (finding,) = (one for one in invalid.value.findings if one.code == "TASK231")
-    assert finding.message.endswith(told)
-    assert finding.hint is None
+    assert finding.message.endswith(f"{told}; expected a YAML file")
+    assert finding.hint == hint
 
 
 @pytest.mark.parametrize("file", TASKS, ids=lambda path: f"{path.parent.name}-{path.stem}")

@@ -474,7 +474,7 @@ def test_a_watch_has_no_id_of_an_expectation_for_reports_name_both_in_one_list()
     text += f"watch: [{{always: {near}, id: both}}, {{always: {near}, id: own}}]\n"
     finding = only(text)
     assert finding.message == "watch[0].id: the id 'both' is taken by expect[0]"
-    assert finding.hint == "ids name watches, beside expectations: give another"
+    assert finding.hint == "expectations and watches share their ids: give another"
 
 
 @pytest.mark.parametrize(
