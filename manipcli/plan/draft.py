@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
-from manipcli.model.collision import RESOLUTION, Carried
+from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.posture import with_mimics
-from manipcli.plan.hand import closed_on, pressing, ramp
+from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
@@ -22,6 +22,7 @@ from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import LONGEST
 from manipcli.plan.step import Grip, Motion, Situation, StepPlan
+from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
 
@@ -40,8 +41,10 @@ class Draft:
             verb: of the step; a motion of this label is the step itself.
             allowed: pairs that may touch in all motions.
         """
-        self._planner, self._now = planner, situation
-        self._verb, self._allowed = verb, allowed
+        self._planner = planner
+        self._now = situation
+        self._verb = verb
+        self._allowed = allowed
         self._motions: list[Motion] = []
 
     @property
@@ -138,10 +141,7 @@ class Draft:
             planner = self._planner
             allowed = planner.hand_contacts(body)
             query = planner.grasping(self._now, body, margin=min(0.0, planner.distance(self._now, body)) - GRAZE)
-            times, positions = self._swept(trajectory, None)
-            hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
-            if hit is not None:
-                raise planner.refusal(self._now, hit, "would come", f"at t = {hit.time:.2f} s of 'withdraw'")
+            refuse_collision(planner, self._now, query, "withdraw", trajectory, None)
         self._add("withdraw", trajectory, None, allowed=allowed)
 
     def turn(self, label: str, axis: Array, angle: float, *, speed: float) -> None:
@@ -213,7 +213,7 @@ class Draft:
         grip = self._grip(self._posture(posture), force=force, must_hold=must_hold)
         if grip is None:
             raise _no_gripper(posture)
-        duration = self._grip_time(grip)
+        duration = grip_time(self._planner, self._now, grip)
         if body is None:
             self._accept("close", None, grip, duration)
             self._now = replace(self._now, closed=True)
@@ -227,7 +227,7 @@ class Draft:
             )
         stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
         try:
-            self._refuse_collision("close", None, stopped, planner.hand_contacts(body))
+            refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), "close", None, stopped)
         except NotPlannable as refusal:
             raise NotPlannable(refusal.cause, hint=roomier or refusal.hint) from refusal
         link = planner.tool_link
@@ -251,7 +251,8 @@ class Draft:
         allowed = NOTHING
         if self._now.carried is not None:
             held = self._now.carried.body
-            there, query = self._with(grip.joints, grip.target), self._planner.grasping(self._now, held)
+            there = self._with(grip.joints, grip.target)
+            query = self._planner.grasping(self._now, held)
             still = pressing(self._planner.robot, query, there, grip.joints) if must_arrive else None
             if still is not None:
                 message = f"with the hand in its pose '{posture}', '{still}' would still press on '{held}'"
@@ -284,7 +285,7 @@ class Draft:
         """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
-        query = planner.query(self._now, self._allowed)
+        query = self._query()
 
         def refuse(q: Array) -> object | None:
             hit = query.check(q)
@@ -296,6 +297,10 @@ class Draft:
             return None if on_way is None else f"{planner.in_the_way(on_way)}, on the way there"
 
         return planner.solver.solve(X_WT, seed, planner.rng, refuse=refuse)
+
+    def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
+        """What the arm may hit now; `allowed` pairs may touch, too."""
+        return self._planner.query(self._now, allowed | self._allowed)
 
     def _posture(self, name: str) -> dict[str, float]:
         pose = self._planner.robot.pose(name)
@@ -322,8 +327,8 @@ class Draft:
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         """Accept a motion if nothing is in its way."""
-        self._refuse_collision(label, trajectory, grip, allowed)
-        duration = 0.0 if grip is None else self._grip_time(grip)
+        refuse_collision(self._planner, self._now, self._query(allowed), label, trajectory, grip)
+        duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
         self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
 
     def _accept(self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, duration: float) -> None:
@@ -334,35 +339,6 @@ class Draft:
             self._now = self._now.moved(self._with(trajectory.names, trajectory.positions[-1]))
             self._now = carried_along(self._planner, before, self._now)
         self._motions.append(Motion(label, trajectory=trajectory, grip=grip, duration=duration))
-
-    def _refuse_collision(
-        self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, allowed: Pairs
-    ) -> None:
-        times, positions = self._swept(trajectory, grip)
-        query = self._planner.query(self._now, allowed | self._allowed)
-        hit = query.check_trajectory(range(positions.shape[1]), self._now.position, times, positions)
-        if hit is not None:
-            when = f"at t = {hit.time:.2f} s of '{label}'"
-            raise self._planner.refusal(self._now, hit, "would come", when)
-
-    def _swept(self, trajectory: JointTrajectory | None, grip: Grip | None) -> tuple[Array, Array]:
-        """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""
-        robot = self._planner.robot
-        times = np.zeros(1) if trajectory is None else trajectory.times
-        if grip is not None:
-            speed, late = self._planner.gripper_speed, self._grip_time(grip) - times[-1]
-            more = int(np.ceil(max(0.0, late) * speed / (0.5 * RESOLUTION)))
-            times = np.append(times, times[-1] + late * np.arange(1, more + 1) / max(1, more))
-        positions = np.tile(self._now.position, (len(times), 1))
-        if trajectory is not None:
-            columns = robot.indices(trajectory.names)
-            positions[:, columns] = trajectory.positions[-1]
-            positions[: len(trajectory.times), columns] = trajectory.positions
-        if grip is not None:
-            columns = robot.indices(grip.joints)
-            positions[:, columns] = ramp(self._now.position[columns], grip.target, speed * times)
-            positions = np.asarray(with_mimics(robot, positions))
-        return times, positions
 
     def _with(self, names: Sequence[str], values: npt.ArrayLike) -> Array:
         """The present position with some joints elsewhere; joints that mimic them follow."""
@@ -378,19 +354,6 @@ class Draft:
         here = dict(zip(joints, self._now.position[self._planner.robot.indices(joints)], strict=True))
         target = frozen([targets.get(name, here[name]) for name in joints])
         return Grip(joints=joints, target=target, force=force, must_hold=must_hold)
-
-    def _grip_time(self, grip: Grip) -> float:
-        """How long the references take to the target [s].
-
-        Raises:
-            NotPlannable: longer than `LONGEST`.
-        """
-        here, speed = self._now.position[self._planner.robot.indices(grip.joints)], self._planner.gripper_speed
-        duration = float(np.max(np.abs(grip.target - here))) / speed
-        if duration > LONGEST:
-            message = f"with the speed of its controller, {speed:g}, the hand takes more than {LONGEST:g} s"
-            raise NotPlannable(message, hint="raise `speed` of the gripper controller")
-        return duration
 
 
 def _no_gripper(posture: str) -> NotPlannable:
