@@ -12,6 +12,7 @@ from manipcli.control.pid import AntiWindup, Pid
 from manipcli.core.errors import InvalidArgument, Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
+from manipcli.model.robot import RobotModel
 from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface
 
@@ -86,9 +87,17 @@ def _antiwindup(gains: GainsSpec, compat: Compat | None) -> AntiWindup:
     return "conditional_integration" if compat == "ros1" and gains.antiwindup else gains.antiwindup_strategy
 
 
-def strangers(joints: Sequence[str], given: Collection[str], loc: Loc, what: str, code: str) -> Iterator[Problem]:
+def own_joints(robot: RobotModel, joints: Sequence[str]) -> tuple[str, ...]:
+    """Those that follow no other joint: one that does cannot be commanded, so nothing is asked for it."""
+    following = {joint.name for joint in robot.joints if joint.mimic is not None}
+    return tuple(joint for joint in joints if joint not in following)
+
+
+def strangers(
+    robot: RobotModel, joints: Sequence[str], given: Collection[str], loc: Loc, what: str, code: str
+) -> Iterator[Problem]:
     """Whatever (`what`: gains, tolerances) is given at `loc` to joints that are not of `joints`."""
-    without = [joint for joint in joints if joint not in given]  # only one that has none was meant
+    without = [joint for joint in own_joints(robot, joints) if joint not in given]  # only one that has none was meant
     for joint in given:
         if joint not in joints:
             near = did_you_mean(joint, without, kind=f"joints without {what}")
@@ -96,9 +105,11 @@ def strangers(joints: Sequence[str], given: Collection[str], loc: Loc, what: str
             yield Problem((*loc, joint), f"'{joint}' has {what}, but is not one of its joints", hint, code)
 
 
-def idle_gains(joints: Sequence[str], gains: Mapping[str, GainsSpec], interface: Interface) -> Iterator[Problem]:
+def idle_gains(
+    robot: RobotModel, joints: Sequence[str], gains: Mapping[str, GainsSpec], interface: Interface
+) -> Iterator[Problem]:
     """Joints that would never move: their gains are all zero, and they feed no velocity forward."""
-    for joint in joints:
+    for joint in own_joints(robot, joints):
         own = gains.get(joint)
         if own is None or own.idle:
             loc = ("gains", joint) if own is not None else ("gains",) if gains else ()

@@ -273,7 +273,9 @@ def _six(spec: TaskSpaceSpec) -> Array:
 def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
     """Tolerances of joints that it does not have; a tool that is not there, that other joints move, too, or that one of
     its joints does not move; no stiffness."""
-    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    yield from strangers(
+        robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
+    )
     if not _six(spec.stiffness).any() and spec.posture.stiffness == 0.0:
         yield Problem(("stiffness",), "no stiffness at all; it would not move", "give stiffness.translation", "CTRL185")
     link, _ = _frame(spec, robot)

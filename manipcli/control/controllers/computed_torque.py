@@ -152,8 +152,10 @@ def build(name: str, spec: ComputedTorqueSpec, fit: Fit) -> ComputedTorqueContro
 
 def check(spec: ComputedTorqueSpec, robot: RobotModel) -> Iterator[Problem]:
     """Gains and tolerances of joints that it does not have, and gains all zero."""
-    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
-    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from strangers(
+        robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
+    )
     for joint, gains in spec.gains.items():
         if joint in spec.joints and gains.p == gains.i == gains.d == 0.0:
             hint = f"give gains.{joint}.p [1/s2] and d [1/s], or leave them out for those of the bandwidth"

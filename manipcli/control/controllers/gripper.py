@@ -77,9 +77,9 @@ def _each(joints: Sequence[Joint], stated: float | None, *, turning: float, slid
 
 def check(spec: GripperSpec, robot: RobotModel) -> Iterator[Problem]:
     """Gains of joints that it does not have, and gains all zero; an effort limit of positions."""
-    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
     if spec.command_interface == "effort":
-        yield from idle_gains(spec.joints, spec.gains, "effort")
+        yield from idle_gains(robot, spec.joints, spec.gains, "effort")
     elif spec.max_effort is not None:
         hint = "use command_interface: effort, or the effort limits of the joints"
         yield Problem(("max_effort",), "positions know no maximum effort", hint, "CTRL147")

@@ -66,8 +66,10 @@ def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryCont
 def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
     """Interfaces that do not go together; gains and tolerances of joints that it does not have, gains all zero; an
     effort added where none is commanded."""
-    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
-    yield from strangers(spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104")
+    yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    yield from strangers(
+        robot, spec.joints, spec.constraints.joints, ("constraints", "joints"), "tolerances", "CTRL104"
+    )
     key = "command_interfaces" if spec.command_interfaces else "command_interface"
     if spec.command_interface is not None and spec.command_interfaces:
         yield Problem((key,), "command_interface and command_interfaces say the same", "keep the list", "CTRL107")
@@ -77,7 +79,7 @@ def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
         yield Problem((where,), wrong[0], wrong[1], "CTRL107")
         return
     if controlled_by_error(spec.interfaces):
-        yield from idle_gains(spec.joints, spec.gains, spec.interfaces[0])
+        yield from idle_gains(robot, spec.joints, spec.gains, spec.interfaces[0])
     if "effort" not in spec.interfaces:
         for word in ("gravity_compensation", "inverse_dynamics"):
             if getattr(spec, word):

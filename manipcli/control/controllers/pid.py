@@ -33,7 +33,7 @@ from manipcli.control.controller import (
     refuse_not_finite,
 )
 from manipcli.control.controllers.forward_command import finite_values
-from manipcli.control.gains import build_pid, gains_of, strangers
+from manipcli.control.gains import build_pid, gains_of, own_joints, strangers
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
@@ -205,8 +205,8 @@ def build(name: str, spec: PidSpec, fit: Fit) -> PidController:
 
 def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
     """Gains of joints that it does not have, that are missing or all zero; interfaces that cannot be led together."""
-    yield from strangers(spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
-    for joint in spec.joints:
+    yield from strangers(robot, spec.joints, spec.gains, ("gains",), "gains", "CTRL102")
+    for joint in own_joints(robot, spec.joints):
         own = spec.gains.get(joint)
         if own is None or own.p == own.i == own.d == own.feedforward_gain == 0.0:
             what = "has no gains" if own is None else "has gains that are all zero"

@@ -82,3 +82,14 @@ def test_what_cannot_work_is_told_at_its_place_and_not_built(name, text, code, t
 def test_wrong_gains_in_python_are_told_with_their_joint(kind, gains, named):
     with pytest.raises(InvalidArgument, match=re.escape(f"controller 'c': {named}")):
         kind(name="c", joints=["a"], gains={"a": gains})
+
+
+def test_what_is_told_of_a_claimed_mimic_joint_agrees():
+    """Its gains are those of the joint that it follows: that one is claimed, not the gains renamed."""
+    text = "type: gripper, joints: [panda_finger_joint2], gains: {panda_finger_joint1: {p: 1000, d: 10}}"
+    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml")
+    findings = controller_findings(file.spec, robot("panda"), 1e-3)
+    assert {finding.code: finding.hint for finding in findings if finding.severity == "error"} == {
+        "CTRL143": "claim 'panda_finger_joint1' instead",
+        "CTRL102": "take them out, or add 'panda_finger_joint1' to `joints`",
+    }

@@ -4,6 +4,7 @@
 """
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -488,7 +489,7 @@ def test_64_a_file_is_told_where_its_interfaces_are_wrong(keys, places):
     spec = JointTrajectorySpec.model_validate(
         {"type": "joint_trajectory", "joints": JOINTS, "gains": {joint: {"p": 1} for joint in JOINTS}, **keys}
     )
-    problems = list(check(spec, None))
+    problems = list(check(spec, SimpleNamespace(joints=())))
     assert [problem.loc[0] for problem in problems] == places
     short = JointTrajectorySpec.model_validate({"type": "joint_trajectory", "joints": JOINTS})
     assert short.interfaces == ("effort",)
