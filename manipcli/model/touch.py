@@ -46,8 +46,10 @@ def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:
     links = tuple(f"{ROBOT}/{link.name}" for link in setting.robot.links)
     if name == ROBOT or name in bodies or name in links:
         return ()
-    known = links if name.startswith(f"{ROBOT}/") else (ROBOT, *bodies)
     message = f"'{name}' is neither a body of the scene nor a part of the robot"
+    if f"{ROBOT}/{name}" in links:
+        return (Problem(loc, message, f"links are written with the robot: '{ROBOT}/{name}'"),)
+    known = links if name.startswith(f"{ROBOT}/") else (ROBOT, *bodies)
     return (Problem(loc, message, did_you_mean(name, known)),)
 
 

@@ -378,6 +378,7 @@ def test_a_step_is_done_from_its_end_on() -> None:
         ("contact_force", {"of": "cbe", "below": 1}, ("of",), "did you mean 'cube'?"),
         ("no_collision", {"pairs": [["robot", "deks"]]}, ("pairs", 0, 1), "did you mean 'desk'?"),
         ("collision", ["robt", "desk"], ("pairs", 0, 0), "did you mean 'robot'?"),
+        ("collision", ["finger", "desk"], ("pairs", 0, 0), "links are written with the robot: 'robot/finger'"),
         ("tracking", {"group": "ram", "within": 1}, ("group",), "did you mean 'arm'?"),
         ("limits", {"group": "ram"}, ("group",), "did you mean 'arm'?"),
         ("tool_speed", {"below": 1, "link": "fingr"}, ("link",), "did you mean 'finger'?"),
