@@ -17,6 +17,7 @@ from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
 _GRIPPER = "add a controller of type `gripper` for the hand's joints to the controllers file"
+_FOLLOWERS = "`joint_trajectory`, `computed_torque` or `cartesian_impedance`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +161,7 @@ def _sleeping(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
     if able:
         message = f"controller '{able[0]}', which {what} joint '{joint}', is not active here"
         return Problem(loc, message, f"add a step before it: `switch_controllers: {able[0]}`")
-    hint = "add the joint to a controller of type `joint_trajectory` in the controllers file"
+    hint = f"add the joint to a controller of a type that does, in the controllers file: {_FOLLOWERS}"
     return Problem(loc, f"no controller {what} joint '{joint}'", hint)
 
 

@@ -18,6 +18,7 @@ from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.plan.claims import Claims, unfollowed
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot
@@ -135,3 +136,11 @@ def test_the_manager_loads_lists_and_switches_it(member: ControllerMember[Contro
     assert set(manager.command.modes) == {"brake"}
     assert manager.switch(activate=[info.name]).ok
     assert manager.faults == ()
+
+
+@every_controller
+def test_a_joint_that_nobody_leads_is_told_which_types_do(member: ControllerMember[ControllerSpec]) -> None:
+    """The hint of steps names every type that follows trajectories, and none that does not."""
+    (problem,) = unfollowed(Claims(()), ["joint_1"], ())
+    assert problem.hint is not None
+    assert (f"`{member.name}`" in problem.hint) == (member.spec.role == "follower")

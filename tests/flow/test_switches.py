@@ -96,7 +96,8 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
         (
             "  - move: {to: {finger_1_distal: 0.1}}\n",
             "TASK232 6 steps[0].move.to: no controller follows trajectories of joint 'finger_1_distal' | "
-            "add the joint to a controller of type `joint_trajectory` in the controllers file",
+            "add the joint to a controller of a type that does, in the controllers file: `joint_trajectory`, "
+            "`computed_torque` or `cartesian_impedance`",
         ),
         ("  - switch_controllers: {}\n", "TASK208 6 steps[0].switch_controllers: say either `to`"),
         (
