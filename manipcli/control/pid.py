@@ -147,6 +147,7 @@ class Pid:
     def freeze(self, which: npt.ArrayLike) -> None:
         """From now on the integrals of `which` (n), true or false, stay as they are, and no others."""
         self._counted_above = np.where(which, np.inf, self._deadband)
+        self._unwinding = np.where(which, 0.0, self._inverse_tracking)
         self._has_deadband = bool(self._counted_above.any())
 
     def reset(self, keep_integral: bool = False) -> None:
@@ -241,7 +242,7 @@ class Pid:
         scratch, term = self._scratch, self._term
         np.multiply(self._i, self._counted(e), out=scratch)
         if self._any_tracks:
-            scratch += self._tracks * (command - unsaturated) * self._inverse_tracking
+            scratch += self._tracks * (command - unsaturated) * self._unwinding
         if self._any_conditional:
             scratch[self._conditional & (command != unsaturated) & (e * unsaturated > 0.0)] = 0.0
         scratch *= dt

@@ -85,6 +85,20 @@ def test_an_integral_clamp_of_zero_means_no_integral(compat):
     assert run(Pid(p=1.0, i=1.0, i_min=0, i_max=0, compat=compat), [1.0, 1.0]) == [1, 1]
 
 
+def test_a_frozen_integral_stays_whatever_is_cut():
+    """And goes on, as one that never stood still, once it is let go."""
+    pid = Pid(i=[1.0] * 3, u_min=-1, u_max=1, antiwindup=["back_calculation"] * 2 + ["none"], tracking_time=2.0)
+    run(pid, [np.full(3, 2.0)] * 2)
+    before = pid.i_term
+    pid.freeze([True, False, True])
+    pid.update(np.full(3, 2.0), 1.0)
+    np.testing.assert_array_equal(pid.i_term[[0, 2]], before[[0, 2]])
+    assert pid.i_term[1] == before[1] + 2.0 + (1.0 - before[1]) / 2.0
+    pid.freeze(False)
+    pid.update(np.full(3, 2.0), 1.0)
+    assert pid.i_term[0] == before[0] + 2.0 + (1.0 - before[0]) / 2.0
+
+
 def test_back_calculation_without_integral_gain_does_nothing():
     """Conformance 25: without an integral gain no tracking time is chosen, and nothing is integrated."""
     pid = Pid(u_min=-1, u_max=1, antiwindup="back_calculation")
