@@ -32,7 +32,7 @@ def tune(
             metavar="Z",
             min=0.05,
             max=10.0,
-            help="Damping ratio of kp and kd; from 1 on, only a ki makes a step overshoot.",
+            help="Damping ratio that p and d give; from 1 on, only an i makes a step overshoot.",
         ),
     ] = 1.0,
     joint: Annotated[

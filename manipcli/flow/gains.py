@@ -200,7 +200,7 @@ def _doubts(task: Task, loops: tuple[Held, ...], load: Load, postures: Postures,
 def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
     """(code, message, hint) of a loop that diverges or rings."""
     p, d, i = float(loop.p[0]), float(loop.d[0]), float(loop.i[0])
-    kp, kd, ki = f"kp {digits(p)}", f"kd {digits(d)}", f"ki {digits(i)}"
+    kp, kd, ki = f"p {digits(p)}", f"d {digits(d)}", f"i {digits(i)}"
     at = f"at {1e3 * loop.period:.3g} ms"
     if loop.delay is not None and loop.delay[0]:
         at += f" and {int(loop.delay[0])} ticks of latency"
@@ -214,21 +214,21 @@ def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | Non
     most = largest_damping(loop)
     if 0.0 < most < d:
         message = f"{joint}: {kd} is unstable above {digits(most)} {at}; {inertia}"
-        return "CTRL150", message, f"stay below half of that: kd {digits(0.5 * most)}"
+        return "CTRL150", message, f"stay below half of that: d {digits(0.5 * most)}"
     swift = largest_integral(loop)
     if 0.0 < swift < i:
         message = f"{joint}: {ki} with {kp} and {kd} is unstable above {digits(swift)} {at}; {inertia}"
-        return "CTRL150", message, f"stay below half of that: ki {digits(0.5 * swift)}"
+        return "CTRL150", message, f"stay below half of that: i {digits(0.5 * swift)}"
     if most == 0.0:
         stiffest = largest_stiffness(loop)
         if 0.0 < stiffest < p:
             message = f"{joint}: {kp} with {kd} is unstable above {digits(stiffest)} {at}; {inertia}"
-            return "CTRL150", message, "lower kp; `manipcli tune` proposes both"
+            return "CTRL150", message, "lower p; `manipcli tune` proposes both"
         message = f"{joint}: {kp}, {ki} and {kd} are unstable {at}; {inertia}"
         return "CTRL150", message, "`manipcli tune` proposes gains that are not"
     need = 1.4 * math.sqrt(p * float(loop.mass[0, 0]))
     message = f"{joint}: {kp}{f', {ki}' if i else ''} with {kd} swings up {at}; {inertia}"
-    return "CTRL150", message, f"kd {digits(min(need, 0.5 * most))} damps it"
+    return "CTRL150", message, f"d {digits(min(need, 0.5 * most))} damps it"
 
 
 def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
@@ -241,10 +241,10 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     if ratio >= SWINGING:
         return None
     message = (
-        f"{joint}: kp {digits(p)} with kd {digits(d)} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
+        f"{joint}: p {digits(p)} with d {digits(d)} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
         f"{ratio:.2g}; {inertia}"
     )
-    return "CTRL153", message, f"kd {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
+    return "CTRL153", message, f"d {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
 
 
 def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Doubt]:
@@ -261,10 +261,10 @@ def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) ->
             continue
         pole, share = unstable_share(whole)
         worst = [j for j in np.argsort(-share) if share[j] > 0.1][:3]
-        names = ", ".join(f"{loops[j].joint} (kd {digits(d[j])})" for j in worst)
+        names = ", ".join(f"{loops[j].joint} (d {digits(d[j])})" for j in worst)
         message = (
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"
         )
-        yield Doubt("", Finding("CTRL154", message, loops[worst[0]].place, "lower their kd", "warning"))
+        yield Doubt("", Finding("CTRL154", message, loops[worst[0]].place, "lower their d", "warning"))
         return

@@ -124,10 +124,10 @@ def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
                 asked = min(_sensible(task, end, grip.force), _most(task, name))
                 if not closing or not way or gains.i or asked <= ENOUGH * gains.p * way / closing:
                     continue
-                given = f"kp {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
+                given = f"p {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
                 message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; {given}"
                 than = "that" if asked == grip.force else f"{asked:.3g} N"
-                hint = f"kp {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
+                hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
                 place = task.controllers_file.place("controllers", controller, "gains", name)
                 yield Finding("CTRL168", message, place, hint, "warning")
 

@@ -104,7 +104,7 @@ def _sags(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | No
     """By how much it gives way under what holds (T) against gravity; until an integral carries that, or for good."""
     length, unit = joint.unit, joint.effort_unit
     gains = loop.gains
-    kp, ki = f"kp {digits(gains.p)}", f"ki {digits(gains.i)}"
+    kp, ki = f"p {digits(gains.p)}", f"i {digits(gains.i)}"
     weight = float(np.abs(gravity).max())
     left, clamped = gravity, ""
     if gains.i > 0.0:
@@ -115,7 +115,7 @@ def _sags(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | No
     if gains.p == 0.0:
         if most_left <= WEIGHTLESS or gains.i > 0.0:  # without p the integral alone is unstable, and told so
             return None
-        return "CTRL156", f"without kp nothing holds {weight:.3g} {unit} of gravity; it sinks", f"give it a kp; {CARRY}"
+        return "CTRL156", f"without p nothing holds {weight:.3g} {unit} of gravity; it sinks", f"give it p; {CARRY}"
     allowed = SAG[length] if loop.tolerance is None else loop.tolerance
     sag = most_left / gains.p
     if sag > allowed:

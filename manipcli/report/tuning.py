@@ -14,7 +14,7 @@ def render_text(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence
     """The gains, what they do, and what the numbers stand for."""
     simulated = any(one.simulated is not None for one in joints)
     integral = any(one.i for one in joints)
-    headers = ["joint", "inertia", "kp", *(["ki"] if integral else []), "kd", "damping", "overshoot", "settles"]
+    headers = ["joint", "inertia", "p", *(["i"] if integral else []), "d", "damping", "overshoot", "settles"]
     headers += ["simulated", "settles "] if simulated else []
     headers += ["frequency", "-3 dB", "margin"]
     rows = []

@@ -34,7 +34,7 @@ def test_the_gains_of_the_tasks_here_give_no_doubt(name: str) -> None:
 def test_too_much_damping_is_told_with_the_gain_that_would_do() -> None:
     (finding,) = findings("controllers.arm_controller.gains.joint_7.d=5")
     told = re.fullmatch(
-        r"joint_7: kd 5 is unstable above ([0-9.]+) at 1 ms; inertia ([0-9.]+) kg m2, the least over .*",
+        r"joint_7: d 5 is unstable above ([0-9.]+) at 1 ms; inertia ([0-9.]+) kg m2, the least over .*",
         finding.message,
     )
     assert told is not None
@@ -59,16 +59,16 @@ def test_too_much_damping_is_told_with_the_gain_that_would_do() -> None:
 @pytest.mark.parametrize(
     ("overrides", "told"),
     [
-        (["arm_controller.gains.joint_1.d=0.1"], r"CTRL153.*joint_1: kp 300 with kd 0.1 swings at 2.\d Hz"),
-        (["arm_controller.gains.joint_7.d=2.9"], r"CTRL150.*joint_7: kd 2.9 rings at 1 ms"),
-        (["arm_controller.gains.joint_7.p=8000"], r"CTRL150.*joint_7: kp 8000 with kd 0.4 is unstable above \d"),
+        (["arm_controller.gains.joint_1.d=0.1"], r"CTRL153.*joint_1: p 300 with d 0.1 swings at 2.\d Hz"),
+        (["arm_controller.gains.joint_7.d=2.9"], r"CTRL150.*joint_7: d 2.9 rings at 1 ms"),
+        (["arm_controller.gains.joint_7.p=8000"], r"CTRL150.*joint_7: p 8000 with d 0.4 is unstable above \d"),
         (
             ["arm_controller.gains.joint_6.i=90000"],
-            r"CTRL150.*joint_6: ki 90000 with kp .* is unstable above \d+ at 1 ms",
+            r"CTRL150.*joint_6: i 90000 with p .* is unstable above \d+ at 1 ms",
         ),
         (
             ["arm_controller.inverse_dynamics=false", "arm_controller.gains.joint_2.p=300"],
-            r"CTRL156.*joint_2: kp 300 gives way by 0.\d+ rad under \d+.* of gravity, more than its tolerance of 0.03",
+            r"CTRL156.*joint_2: p 300 gives way by 0.\d+ rad under \d+.* of gravity, more than its tolerance of 0.03",
         ),
     ],
 )

@@ -59,7 +59,7 @@ def test_damping_is_bounded_by_the_least_inertia_that_the_joint_moves_alone(foun
     least = float((one - other**2 / two).min())
     (finding,) = found("p: 40, d: 400")
     told = re.match(
-        r"shoulder: kd 400 is unstable above ([\d.]+) at 1 ms; inertia ([\d.]+) kg m2, the least", finding.message
+        r"shoulder: d 400 is unstable above ([\d.]+) at 1 ms; inertia ([\d.]+) kg m2, the least", finding.message
     )
     assert told is not None, finding.message
     assert float(told[1]) == pytest.approx(2.0 * least / 1e-3, rel=0.02)

@@ -53,7 +53,7 @@ def test_gains_of_a_controller_that_a_step_switches_on_are_looked_at(found: Foun
     assert found(PLACED, wild, steps=f"{{{UP}}}") == ()
     (one,) = found(PLACED, wild, steps=f"{{{UP}}}, {{{TO_B}}}, {{{DOWN}}}, {{{TO_A}}}, {{{UP}}}, {{{TO_B}}}")
     assert (one.code, one.severity) == ("CTRL150", "warning")
-    assert one.message.startswith(f"hinge: kd 200 is unstable above {BOUND:.3g}")
+    assert one.message.startswith(f"hinge: d 200 is unstable above {BOUND:.3g}")
     assert one.place is not None
     assert (Path(one.place.file).name, one.place.line) == ("c.yaml", 3)
 
@@ -66,7 +66,7 @@ def test_they_are_looked_at_where_the_robot_is_while_it_is_active(found: Found) 
     assert found(PLACED, soft, steps=f"{{{TO_B}}}, {{{TO_A}}}, {there_and_back}") == ()
     (one,) = found(PLACED, soft, steps=f"{{{UP}}}, {{{TO_B}}}, {{{TO_A}}}, {{{DOWN}}}")
     assert one.code == "CTRL156"
-    assert "hinge: kp 20 gives way by 0.11 rad under 2.29 N m of gravity" in one.message
+    assert "hinge: p 20 gives way by 0.11 rad under 2.29 N m of gravity" in one.message
 
 
 def test_who_stays_while_others_change_is_told_once(found: Found) -> None:

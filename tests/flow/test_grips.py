@@ -73,12 +73,12 @@ def pick(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) -> None:
-    """kp 500 x 20 mm are 10 N for two fingers: 5 N each, and so the run feels."""
+    """p 500 x 20 mm are 10 N for two fingers: 5 N each, and so the run feels."""
     gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
     (found,) = gain_findings(load_task(pick, overrides=[f"{gain}=500"]))
     assert (found.code, found.severity) == ("CTRL168", "warning")
-    assert found.message == "panda_finger_joint1: step 'pick_1' grasps with 7 N; kp 500 gives about 5 N"
-    assert found.hint == "kp 840 gives a fifth more than that"
+    assert found.message == "panda_finger_joint1: step 'pick_1' grasps with 7 N; p 500 gives about 5 N"
+    assert found.hint == "p 840 gives a fifth more than that"
     heard: list[str] = []
 
     def told_of(overrides: list[str]) -> str:
@@ -110,7 +110,7 @@ def test_an_object_of_next_to_no_mass_beside_the_grip_is_doubted(pick: Path, gra
 
 @pytest.mark.slow
 def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
-    """Of 500 N, 3.7 are left on 5 g, and 50 where two fingers share 100 N; kp is asked for these, and not for 500."""
+    """Of 500 N, 3.7 are left on 5 g, and 50 where two fingers share 100 N; p is asked for these, and not for 500."""
     gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
     asked, limit = "steps.0.pick.grasp.force=500 N", "robot.limits.panda_finger_joint1.effort=100 N"
     light = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=5 g"]))
@@ -118,5 +118,5 @@ def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
     soft = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=1 kg", f"{gain}=500"]))
     assert {found.code: found.hint for found in soft} == {
         "TASK238": "lower `force`, or raise what limits it: the joint's effort, or `max_effort`",
-        "CTRL168": "kp 6000 gives a fifth more than 50 N",
+        "CTRL168": "p 6000 gives a fifth more than 50 N",
     }

@@ -41,22 +41,22 @@ def told(task: Path) -> list[Finding]:
 @pytest.mark.parametrize(
     ("gains", "code", "message"),
     [
-        ("p: 20, d: 2", "CTRL156", f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity"),
-        ("p: 1, d: 0.1", "CTRL156", f"kp 1 gives way by {WEIGHT:.2g} rad under"),
-        ("d: 12", "CTRL156", f"without kp nothing holds {WEIGHT:.3g} N m of gravity; it sinks"),
+        ("p: 20, d: 2", "CTRL156", f"p 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity"),
+        ("p: 1, d: 0.1", "CTRL156", f"p 1 gives way by {WEIGHT:.2g} rad under"),
+        ("d: 12", "CTRL156", f"without p nothing holds {WEIGHT:.3g} N m of gravity; it sinks"),
         ("p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9", "CTRL159", f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1"),
         (
             "p: 5, d: 1, i: 20, i_clamp: 1",
             "CTRL156",
-            f"kp 5, whose integral is clamped to -1 ... 1, gives way by {(WEIGHT - 1) / 5:.2g} rad under",
+            f"p 5, whose integral is clamped to -1 ... 1, gives way by {(WEIGHT - 1) / 5:.2g} rad under",
         ),
         (
             "p: 20, d: 2, i: 4, i_clamp: 10",
             "CTRL156",
-            f"kp 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity until its integral carries "
-            "it, some 5 s with ki 4",
+            f"p 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity until its integral carries "
+            "it, some 5 s with i 4",
         ),
-        ("p: 20, d: 2, i: 16, i_clamp: 10", "CTRL156", "until its integral carries it, some 1.2 s with ki 16"),
+        ("p: 20, d: 2, i: 16, i_clamp: 10", "CTRL156", "until its integral carries it, some 1.2 s with i 16"),
     ],
 )
 def test_gains_too_weak_for_the_weight_are_told(written: Written, gains: str, code: str, message: str) -> None:

@@ -200,14 +200,14 @@ def with_junit(one: CaseReport) -> CaseReport:
 
 
 def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -> None:
-    weak = Finding("CTRL153", "joint_4: kp 5", Place("weak.yaml", 12, 16), hint="kd 3 gives 0.7", severity="warning")
+    weak = Finding("CTRL153", "joint_4: p 5", Place("weak.yaml", 12, 16), hint="d 3 gives 0.7", severity="warning")
     assert FAILED.run is not None
     drawn = replace(FAILED.run, verdict=replace(FAILED.run.verdict, drawn=Drawn(3, (("scene.cup.mass", 0.25),))))
     odd = with_junit(replace(FAILED, run=drawn, warnings=(weak,)))
     told = [
         "sample 3: scene.cup.mass=0.25",
-        "weak.yaml:12:16: warning[CTRL153]: joint_4: kp 5",
-        "  hint: kd 3 gives 0.7",
+        "weak.yaml:12:16: warning[CTRL153]: joint_4: p 5",
+        "  hint: d 3 gives 0.7",
     ]
     lines = render_case(odd).splitlines()
     assert [line.removeprefix("  ") for line in lines[3:6]] == told
@@ -215,7 +215,7 @@ def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -
     assert str(failure.text).splitlines()[-3:] == told
     assert all(line in render_page(Suite((odd,), 1, 1, 1.0), Path()) for line in told)
     (case,) = json.loads(suite_json.render_suite(Suite((odd,), 1, 1, 1.0)))["cases"]
-    assert [(one["code"], one["hint"]) for one in case["warnings"]] == [("CTRL153", "kd 3 gives 0.7")]
+    assert [(one["code"], one["hint"]) for one in case["warnings"]] == [("CTRL153", "d 3 gives 0.7")]
 
 
 def test_a_page_tells_all_that_was_drawn_and_a_line_the_first_of_it() -> None:
