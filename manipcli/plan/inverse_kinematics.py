@@ -174,7 +174,7 @@ class InverseKinematics:
             )
         hint = NOT_SO if best.angle_error > _TURNED else "move the goal nearer, or change the orientation of the tool"
         if distance > _FAR:
-            hint = "positions are in m: in millimetres? write '500 mm' for 500"
+            hint = "in millimetres? write '500 mm', not 500"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint=hint,

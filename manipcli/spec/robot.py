@@ -98,10 +98,14 @@ class LimitsSpec(Model):
         None, description="[rad/s^3 or m/s^3], above 0. Default: unlimited."
     )
     soft_lower: JointValue | None = Field(
-        None, description="Where a joint slows down before `lower` [rad or m]; needs k_position. Default: nowhere."
+        None,
+        description="Where a joint slows down before `lower` [rad or m]; plans stay within it. It needs k_position. "
+        "Default: nowhere.",
     )
     soft_upper: JointValue | None = Field(
-        None, description="Where a joint slows down before `upper` [rad or m]; needs k_position. Default: nowhere."
+        None,
+        description="Where a joint slows down before `upper` [rad or m]; plans stay within it. It needs k_position. "
+        "Default: nowhere.",
     )
     k_position: Annotated[float, Field(ge=0)] | None = Field(
         None, description="Velocity per distance to a soft limit [1/s]. Default: the description's, or 0: none."

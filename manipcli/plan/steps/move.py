@@ -37,8 +37,8 @@ class MoveSpec(Model):
     After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
     of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
 
-    What `touch` names is no obstacle to the hand: it is pushed, or pressed on, and so it is to the move that leaves it.
-    It is foreseen to slide with the tool; where it does not, the steps that follow are planned again.
+    What `touch` names is no obstacle to the hand: it is pushed, or pressed on. Name it in the move that leaves it, too.
+    The plan takes it to slide with the tool; where it does not, later steps are planned again.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
