@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,10 @@ from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, Pa
 from manipcli.cli.serving import stay
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 from manipcli.core.text import listed
+
+if TYPE_CHECKING:
+    from manipcli.cli.pictures import Pictures
+    from manipcli.replay.playback import Playback
 
 
 def replay(
@@ -91,7 +95,6 @@ def replay(
         from manipcli.flow.replay import open_playback
 
         check_outputs(*files, reads=(log,))
-
         pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
         playback = open_playback(
             log,
@@ -100,23 +103,7 @@ def replay(
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
         )
-        if playback.lost is not None:
-            console.talk(f"the log is not closed: {playback.lost}")
-        for note in playback.notes:
-            console.talk(f"note: {note}")
-        if html is not None:
-            from manipcli.core.whole_file import write_whole
-            from manipcli.replay.player import player_page
-
-            write_whole(html, player_page(playback).encode())
-            console.result(str(html))
-        pictures.make(playback)
-        if html is not None or pictures.wanted:
-            return ExitCode.PASSED
-        from manipcli.replay.replay import Replay
-
-        with Replay(playback, port=port) as page:
-            stay(page, open_=open_)
+        _show(playback, pictures, html, port=port, open_=open_)
     return ExitCode.PASSED
 
 
@@ -141,3 +128,24 @@ def _check_options(
     else:
         message = f"{listed(asked)} {'is' if len(asked) == 1 else 'are'} for --verify alone"
     raise InvalidInput([Finding("USE080", message)])
+
+
+def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:
+    """Tells what is missing, writes the files asked for; where none is, serves the page until Ctrl-C."""
+    if playback.lost is not None:
+        console.talk(f"the log is not closed: {playback.lost}")
+    for note in playback.notes:
+        console.talk(f"note: {note}")
+    if html is not None:
+        from manipcli.core.whole_file import write_whole
+        from manipcli.replay.player import player_page
+
+        write_whole(html, player_page(playback).encode())
+        console.result(str(html))
+    pictures.make(playback)
+    if html is not None or pictures.wanted:
+        return
+    from manipcli.replay.replay import Replay
+
+    with Replay(playback, port=port) as page:
+        stay(page, open_=open_)
