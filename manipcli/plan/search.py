@@ -31,7 +31,8 @@ def _rising(bounds: tuple[float, float]) -> tuple[float, float]:
         message = f"the least, {readable(bounds[0], 'm')}, is above the most, {readable(bounds[1], 'm')}"
         raise problem("range", message, hint="write [least, most]")
     if bounds[0] < 0.0:
-        raise problem("range", f"must be at least 0, not {readable(bounds[0], 'm')}")
+        message = f"must be at least 0, not {readable(bounds[0], 'm')}"
+        raise problem("range", message, hint="write [least, most], neither below 0, or one length")
     return bounds
 
 

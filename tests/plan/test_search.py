@@ -24,8 +24,9 @@ def test_a_range_rises() -> None:
         lengths.validate_python(["20 cm", "8 cm"])
     assert lengths.validate_python([0, 0.1]) == (0.0, 0.1)
     for below in ("-5 cm", ["-5 cm", "5 cm"]):
-        with pytest.raises(ValidationError, match="must be at least 0, not -50 mm"):
+        with pytest.raises(ValidationError, match="must be at least 0, not -50 mm") as refused:
             lengths.validate_python(below)
+        assert refused.value.errors()[0]["ctx"]["hint"] == "write [least, most], neither below 0, or one length"
 
 
 def test_the_first_that_can_be_planned_is_taken_and_no_other_is_tried() -> None:
