@@ -318,3 +318,25 @@ def test_what_is_in_the_way_of_a_place_is_told_with_what_a_place_can_do(bench: M
         if thing is wall:
             arm.do("lift", {"object": "block", "by": 0.16})
         arm.do("place", {**spec, **cure})
+
+
+@pytest.mark.slow
+def test_a_hand_that_does_not_fit_where_it_lowers_is_told_to_take_the_object_higher(bench: Make) -> None:
+    """A bottle of 20 cm, held at half its height, and a tray with a rim of 8 cm, which the palm meets."""
+    desk = "\n  desk: {box: {size: [0.6, 1.0, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}\n"
+    bottle = "  bottle: {cylinder: {radius: 3 cm, height: 20 cm}, mass: 150 g, rests_on: desk, at: [0.75, 0.0]}\n"
+    bowl = "  bowl: {tray: {size: [0.2, 0.2, 0.08]}, rests_on: desk, at: [0.70, 0.32], fixed: true}\n"
+    spec = {"object": "bottle", "at": [0.70, 0.32], "on": "bowl"}
+
+    def held(height: float) -> Any:
+        arm = bench(scene=desk + bottle + bowl)
+        arm.do(
+            "pick", {"object": "bottle", "approach": {"from": "side"}, "grasp": {"posture": "wrap", "height": height}}
+        )
+        arm.do("lift", {"object": "bottle", "by": 0.15})
+        return arm
+
+    refusal = held(0.1).refused("place", spec)
+    assert "'bowl' would come within 4 mm of 'robot/palm'" in refusal.cause
+    assert "take the object higher, `grasp: {height: ...}`" in refusal.hint
+    held(0.13).do("place", spec)

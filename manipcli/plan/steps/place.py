@@ -44,6 +44,10 @@ _OVER = (
     "over what is in the way: `lift: {by: ...}` it higher, and lower it from higher, `clearance: ...`; "
     "or `move` first to a pose from which the way is free"
 )
+_LOWER = (
+    "where the hand is in the way, take the object higher, `grasp: {height: ...}` of its `pick`; "
+    "else put it elsewhere, `at: [x, y]`, or turn it, `yaw: ...`"
+)
 _ROOMIER = "put it where the opening fingers have room, turn it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
@@ -88,7 +92,8 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         with _hinted(_OVER):
             draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
         support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
-        draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
+        with _hinted(_LOWER):
+            draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
         return draft
 
     def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
