@@ -25,7 +25,6 @@ Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -36,8 +35,8 @@ from pydantic_core import ErrorDetails
 
 from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
-from manipcli.core.units import ANGLE, LENGTH, readable
-from manipcli.spec import shape
+from manipcli.core.units import ANGLE, readable
+from manipcli.spec import hints, shape
 from manipcli.spec.fields import unit_of
 from manipcli.spec.quantity import Unit
 from manipcli.spec.tree import (
@@ -65,7 +64,6 @@ _EXPECTED = {
     "model_attributes_type": "a mapping", "mapping_type": "a mapping", "set_type": "a list",
     "frozen_set_type": "a list", "none_required": "nothing", "int_from_float": "a whole number",
 }  # fmt: skip
-_WORDS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +210,7 @@ def _told(
     if len(branches) > 1:
         return _none_fits(branches, node)
     if kind == "extra_forbidden":
-        return _unknown_key(path, dict(first.tags), model)
+        return f"unknown key '{dotted((path[-1],))}'", hints.unknown_key(path, dict(first.tags), model)
     if kind == "missing":
         return f"the key '{path[-1]}' is missing", _described(_field(first, model), path)
     if "message" in context:
@@ -227,16 +225,16 @@ def _told(
         field = _field(first, model)
         optional = field is not None and field.default is None
         unit = _unit(first, model)
-        hint = _other_unit(unit, context, node) or (_described(field, path) if optional else None)
+        hint = hints.other_unit(unit, context, node) or (_described(field, path) if optional else None)
         return f"must be {_RANGES[kind]} {_limit(context, unit)}, not {shown(node)}", hint
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
     if kind == "none_required":
         return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
-    hint = _type_hint(kind, node)
+    hint = hints.of_type(kind, node)
     if hint is None and kind in ("model_type", "model_attributes_type"):
-        hint = _to_write(shape.keys_of(shape.at(model, path, dict(first.tags))))
+        hint = hints.to_write(shape.keys_of(shape.at(model, path, dict(first.tags))))
     return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], hint
 
 
@@ -250,23 +248,6 @@ def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
     """What the model says of the key; None for an item of a list, and for a name that the writer has chosen."""
     *above, key = complaint.path or ("",)
     return shape.keys_of(shape.at(model, tuple(above), dict(complaint.tags))).get(str(key))
-
-
-def _other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
-    """The hint where a plain number beyond what is taken lies within it as degrees, or as millimetres."""
-    most = next((context[key] for key in ("le", "lt", "ge") if key in context), None)
-    value = node.value if isinstance(node, ScalarNode) else None
-    if not isinstance(most, int | float) or not isinstance(value, int | float) or value * most <= 0:
-        return None
-    guesses = [
-        f"in {what}? write '{value:g} {symbol}'"
-        for dimension, what, symbol, size in _SMALLER
-        if unit is not None and dimension in unit.dimensions and abs(value) > abs(most) >= abs(value) / size
-    ]
-    return "; ".join(guesses) or None
-
-
-_SMALLER = ((ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1000.0))
 
 
 def _described(field: FieldInfo | None, path: Loc) -> str | None:
@@ -307,23 +288,8 @@ def _expected(complaint: _Complaint) -> str:
 def _none_fits(branches: Sequence[_Complaint], node: Node) -> tuple[str, str | None]:
     wanted = list(dict.fromkeys(expected for expected in map(_expected, branches) if expected))
     one = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
-    hints = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
-    return f"expected {one}, not {shown(node)}", next((hint for hint in hints if hint), None)
-
-
-def _unknown_key(path: Loc, tags: dict[int, str], model: type[BaseModel]) -> tuple[str, str | None]:
-    known = shape.keys_of(shape.at(model, path[:-1], tags))
-    close = nearest(str(path[-1]), known)
-    hint = did_you_mean(str(path[-1]), known, kind="known keys")
-    if close and known[close[0]].description:
-        hint = f"{hint} ({close[0]}: {known[close[0]].description})"
-    return f"unknown key '{dotted((path[-1],))}'", hint
-
-
-def _to_write(known: dict[str, FieldInfo]) -> str | None:
-    """How a mapping with these keys is written: `{to: ...}`."""
-    needed = [key for key, field in known.items() if field.is_required()] or list(known)[:1]
-    return f"write {{{', '.join(f'{key}: ...' for key in needed)}}}" if needed else None
+    told = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
+    return f"expected {one}, not {shown(node)}", next((hint for hint in told if hint), None)
 
 
 def _unknown_word(expected: str, node: Node) -> tuple[str, str | None]:
@@ -355,24 +321,3 @@ def _wrong_count(context: dict[str, object], node: Node) -> str:
 
 def _items(number: object) -> str:
     return "1 item" if number == 1 else f"{number} items"
-
-
-def _type_hint(kind: str, node: Node) -> str | None:
-    value = node.value if isinstance(node, ScalarNode) else None
-    if isinstance(node, ScalarNode) and value is None:
-        return "the key has no value"
-    if kind == "bool_type" and isinstance(value, str) and value.casefold() in _WORDS:
-        return f"YAML 1.2 knows true and false alone: write {_WORDS[value.casefold()]}"
-    if kind in ("float_type", "int_type") and isinstance(value, str):
-        return _quoted_hint(value)
-    if kind == "string_type" and isinstance(value, int | float):
-        return "quotes make a text of it"
-    return None
-
-
-def _quoted_hint(text: str) -> str | None:
-    try:
-        float(text)
-    except ValueError:
-        return "this number has no unit" if text[:1].isdigit() else None
-    return f"remove the quotes: {text}"

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.spec.load import load_controllers_text, load_robot_text
+from manipcli.flow.vocabulary import task_spec
+from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.yaml import parse
 
 ROBOT = "robot: r\ndescription: r.urdf\n"
@@ -80,3 +81,41 @@ def test_a_prefix_makes_names_that_can_be_written(prefix: str) -> None:
     finding = refused(ROBOT + block)
     assert (finding.code, finding.hint) == ("ROBOT208", "write letters, digits and '_', '.', '/', '-'")
     load_robot_text(ROBOT + block.replace(prefix, "left_arm/"), "r.yaml")
+
+
+TASK = "task: t\nrobot: r.yaml\ncontrollers: c.yaml\n"
+TASK += "scene: {cup: {cup: {radius: 4 cm, height: 8 cm}, mass: 1, pose: {}}}\n"
+
+
+def told(block: str) -> Finding:
+    with pytest.raises(InvalidInput) as error:
+        load_task_text(TASK + block, "t.yaml", model=task_spec())
+    (finding,) = error.value.findings
+    return finding
+
+
+@pytest.mark.parametrize(
+    ("block", "place", "hint"),
+    [
+        ("steps: [{lift: {object: cup, by: 1 cm, until: {at_rest: {object: cup}}}}]", "steps[0].lift", "until,lift"),
+        ("steps: [{lift: {object: cup, by: 1 cm, timeout: 3 s}}]", "steps[0].lift", "timeout,lift"),
+        ("steps: [{lift: {object: cup, by: 1 cm, id: up}}]", "steps[0].lift", "id,lift"),
+        ("steps: [{pick: {object: cup, approach: {on_fail: stop}}}]", "steps[0].pick.approach", "on_fail,pick"),
+        (
+            "steps: [wait: 1 s]\nexpect: [{upright: {object: cup, within: 1, during: a}}]",
+            "expect[0].upright",
+            "during,upright",
+        ),
+        ("steps: [wait: 1 s]\nframes: {f: {pose: {parent: cup}}}", "frames.f.pose", "parent,pose"),
+    ],
+)
+def test_a_key_of_the_block_around_is_told_to_stand_there(block: str, place: str, hint: str) -> None:
+    key, beside = hint.split(",")
+    finding = told(block)
+    assert finding.message == f"{place}: unknown key '{key}'"
+    assert finding.hint == f"`{key}` stands beside `{beside}`, not below it"
+    assert finding.code == "TASK201"
+
+
+def test_a_key_of_the_file_is_not_told_to_stand_anywhere() -> None:
+    assert "beside" not in (told("steps: [{lift: {object: cup, by: 1 cm, robot: r}}]").hint or "")

@@ -1,0 +1,73 @@
+"""Hints for who wrote a file: the unit that was meant, the place of a key, the value as it should be written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from manipcli.core.errors import Loc
+from manipcli.core.text import did_you_mean, nearest
+from manipcli.core.units import ANGLE, LENGTH
+from manipcli.spec import shape
+from manipcli.spec.quantity import Unit
+from manipcli.spec.tree import Node, ScalarNode
+
+_WORDS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+_SMALLER = ((ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1000.0))
+
+
+def other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
+    """The hint where a plain number beyond what is taken lies within it as degrees, or as millimetres."""
+    most = next((context[key] for key in ("le", "lt", "ge") if key in context), None)
+    value = node.value if isinstance(node, ScalarNode) else None
+    if not isinstance(most, int | float) or not isinstance(value, int | float) or value * most <= 0:
+        return None
+    guesses = [
+        f"in {what}? write '{value:g} {symbol}'"
+        for dimension, what, symbol, size in _SMALLER
+        if unit is not None and dimension in unit.dimensions and abs(value) > abs(most) >= abs(value) / size
+    ]
+    return "; ".join(guesses) or None
+
+
+def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> str | None:
+    """The block around it that knows the key, else the nearest of the keys that are known where it stands."""
+    key = str(path[-1])
+    for k in range(len(path) - 2, 0, -1):
+        if key in shape.keys_of(shape.at(model, path[:k], tags)):
+            return f"`{key}` stands beside `{path[k]}`, not below it"
+    known = shape.keys_of(shape.at(model, path[:-1], tags))
+    close = nearest(key, known)
+    hint = did_you_mean(key, known, kind="known keys")
+    return f"{hint} ({close[0]}: {known[close[0]].description})" if close and known[close[0]].description else hint
+
+
+def to_write(known: dict[str, FieldInfo]) -> str | None:
+    """How a mapping with these keys is written: `{to: ...}`."""
+    needed = [key for key, field in known.items() if field.is_required()] or list(known)[:1]
+    return f"write {{{', '.join(f'{key}: ...' for key in needed)}}}" if needed else None
+
+
+def of_type(kind: str, node: Node) -> str | None:
+    """Where a value is of the wrong type: the YAML that was meant."""
+    value = node.value if isinstance(node, ScalarNode) else None
+    if isinstance(node, ScalarNode) and value is None:
+        return "the key has no value"
+    if kind == "bool_type" and isinstance(value, str) and value.casefold() in _WORDS:
+        return f"YAML 1.2 knows true and false alone: write {_WORDS[value.casefold()]}"
+    if kind in ("float_type", "int_type") and isinstance(value, str):
+        return _quoted(value)
+    if kind == "string_type" and isinstance(value, int | float):
+        return "quotes make a text of it"
+    return None
+
+
+def _quoted(text: str) -> str | None:
+    try:
+        float(text)
+    except ValueError:
+        return "this number has no unit" if text[:1].isdigit() else None
+    return f"remove the quotes: {text}"
