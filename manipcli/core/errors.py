@@ -106,10 +106,15 @@ class InvalidArgument(InvalidInput, ValueError):
         super().__init__((Finding(code=code, message=message, hint=hint),))
 
 
+RefusalReason = Literal["orientation", "touches", "in_the_way"]
+"""The arm cannot turn its tool so; it reaches a pose only so that something touches; something is in a motion's way."""
+
+
 class NotPlannable(ManipcliError):
     """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits.
 
     `loc`: which value below the step's verb is the cause, where it is one; `place`: where that or the step is written.
+    `reason`: by which a step decides what to try next, or to tell; hints are for people alone.
     """
 
     exit_code = ExitCode.FAILED
@@ -123,12 +128,14 @@ class NotPlannable(ManipcliError):
         hint: str | None = None,
         place: Place | None = None,
         loc: Loc = (),
+        reason: RefusalReason | None = None,
     ) -> None:
         self.cause = cause
         self.step = step
         self.hint = hint
         self.place = place
         self.loc = loc
+        self.reason = reason
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
 
     @property

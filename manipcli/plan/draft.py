@@ -279,7 +279,7 @@ class Draft:
         except NotPlannable as refusal:
             if label == self._verb:
                 raise
-            raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint) from refusal
+            raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
 
     def _solved(self, X_WT: Transform, grip: Grip | None, *, free: bool = False) -> Array:
         """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""

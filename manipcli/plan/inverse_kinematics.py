@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.errors import NotPlannable
+from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.posture import position_limits
@@ -33,10 +33,6 @@ _AT_LIMIT = 1e-6  # rad or m
 _TURNED = math.radians(60.0)  # a pose missed by more is one to which the arm cannot turn its tool
 _FAR = 50.0  # m: a goal beyond this was hardly meant in metres
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
-NOT_SO = "change the orientation of the tool: the arm cannot turn it like this"
-"""The hint where a pose is missed by its orientation."""
-TOUCHES = "move the goal away from what is touched, or change the orientation of the tool"
-"""The hint where a pose is reached only so that something is in the way."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,14 +166,19 @@ class InverseKinematics:
         if refusal is not None:
             raise NotPlannable(
                 f"the arm reaches ({place}) m only where {refusal}",
-                hint=TOUCHES,
+                hint="move the goal away from what is touched, or change the orientation of the tool",
+                reason="touches",
             )
-        hint = NOT_SO if best.angle_error > _TURNED else "move the goal nearer, or change the orientation of the tool"
+        hint = "move the goal nearer, or change the orientation of the tool"
+        kind: RefusalReason | None = None
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
+        elif best.angle_error > _TURNED:
+            hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint=hint,
+            reason=kind,
         )
 
     def track(self, X_WT: Transform, seed: npt.ArrayLike) -> Solution:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.core.errors import NotPlannable
+
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
 Story = Any
 
@@ -181,6 +183,20 @@ def test_what_is_taller_than_the_fingers_is_taken_higher_from_above(bench: Make)
         arm = bench("panda", scene=scene)
         end = arm.plan("pick", {"object": "block", "approach": {"from": "top"}}).end
         assert arm.planner.tool_pose(end).p[2] - 0.2 == pytest.approx(height, abs=1e-4), size
+
+
+def test_what_is_tried_next_does_not_hang_on_the_words_of_a_hint(bench: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+    scene += "  block: {box: {size: [0.04, 0.04, 0.09]}, mass: 80 g, rests_on: table, at: [0.5, -0.15]}\n"
+    tell = NotPlannable.__init__
+
+    def reworded(self: NotPlannable, cause: str, *, hint: str | None = None, **more: Any) -> None:
+        tell(self, cause, hint=f"say: {hint}", **more)
+
+    monkeypatch.setattr(NotPlannable, "__init__", reworded)
+    arm = bench("panda", scene=scene)
+    end = arm.plan("pick", {"object": "block", "approach": {"from": "top"}}).end
+    assert arm.planner.tool_pose(end).p[2] - 0.2 == pytest.approx(0.06, abs=1e-4)
 
 
 def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:

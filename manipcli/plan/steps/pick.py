@@ -21,13 +21,13 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
-from manipcli.plan.inverse_kinematics import NOT_SO, TOUCHES
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import Speed
+from manipcli.plan.tool_axes import misplaced
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
@@ -134,7 +134,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         refusal = out_of_reach[k]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
-            if refusal.hint == NOT_SO:
+            if refusal.reason == "orientation":
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise NotPlannable(refusal.cause, hint=hint)
@@ -152,11 +152,16 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
 
     def candidates() -> Iterator[tuple[int, float, float]]:
         for k in range(len(goals)):
-            if k == len(turns) and all(one is not None and one.hint != TOUCHES for one in out_of_reach.values()):
+            if k == len(turns) and all(one is not None and one.reason != "touches" for one in out_of_reach.values()):
                 return  # higher up it is no nearer
             yield from itertools.product((k,), spread(spec.approach.distance), slopes())
 
-    return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
+    try:
+        return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
+    except NotPlannable as refusal:
+        amiss = misplaced(planner, situation, spec.open, spec.grasp.posture)
+        hints = [hint for hint in (amiss, refusal.hint) if hint is not None]
+        raise NotPlannable(refusal.cause, hint="; or ".join(hints) or None) from refusal
 
 
 def _clear(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:

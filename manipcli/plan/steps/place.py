@@ -23,7 +23,7 @@ from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
-from manipcli.plan.planner import CLEARANCE, NO_WAY_AROUND, Planner
+from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
@@ -127,7 +127,7 @@ def _hinted(hint: str) -> Iterator[None]:
     try:
         yield
     except NotPlannable as refusal:
-        raise NotPlannable(refusal.cause, hint=hint if refusal.hint == NO_WAY_AROUND else refusal.hint) from refusal
+        raise NotPlannable(refusal.cause, hint=hint if refusal.reason == "in_the_way" else refusal.hint) from refusal
 
 
 def _horizontal(X_WT: Transform) -> Array | None:
