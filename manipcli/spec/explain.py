@@ -208,7 +208,8 @@ def _told(
     kind, path, context = first.error["type"], first.path, first.error.get("ctx", {})
     node = node_at(root, path)
     if len(branches) > 1:
-        return _none_fits(branches, node)
+        around = {depth: tag for depth, tag in first.tags if depth < len(path)}
+        return _none_fits(branches, node, shape.at(model, path, around))
     if kind == "extra_forbidden":
         return f"unknown key '{dotted((path[-1],))}'", hints.unknown_key(path, dict(first.tags), model)
     if kind == "missing":
@@ -232,9 +233,10 @@ def _told(
     if kind == "none_required":
         return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
-    hint = hints.of_type(kind, node)
+    kinds = shape.at(model, path, dict(first.tags))
+    hint = hints.of_type(kind, node, kinds)
     if hint is None and kind in ("model_type", "model_attributes_type"):
-        hint = hints.to_write(shape.keys_of(shape.at(model, path, dict(first.tags))))
+        hint = hints.to_write(shape.keys_of(kinds))
     return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], hint
 
 
@@ -285,11 +287,11 @@ def _expected(complaint: _Complaint) -> str:
     return str(context.get("expected") or _EXPECTED.get(error["type"], ""))
 
 
-def _none_fits(branches: Sequence[_Complaint], node: Node) -> tuple[str, str | None]:
+def _none_fits(branches: Sequence[_Complaint], node: Node, kinds: Sequence[object]) -> tuple[str, str | None]:
     wanted = list(dict.fromkeys(expected for expected in map(_expected, branches) if expected))
     one = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
-    told = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
-    return f"expected {one}, not {shown(node)}", next((hint for hint in told if hint), None)
+    said = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
+    return f"expected {one}, not {shown(node)}", hints.its_key(node, kinds) or next(filter(None, said), None)
 
 
 def _unknown_word(expected: str, node: Node) -> tuple[str, str | None]:

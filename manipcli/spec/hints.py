@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import get_args
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean, nearest
-from manipcli.core.units import ANGLE, LENGTH
+from manipcli.core.units import ANGLE, LENGTH, NUMBER
 from manipcli.spec import shape
 from manipcli.spec.quantity import Unit
 from manipcli.spec.tree import Node, ScalarNode
 
 _WORDS = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
-_SMALLER = ((ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1000.0))
+_SMALLER = (
+    (ANGLE, "degrees", "deg", 180.0 / math.pi), (LENGTH, "millimetres", "mm", 1e3), (NUMBER, "percent", "%", 1e2)
+)  # fmt: skip
 
 
 def other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
-    """The hint where a plain number beyond what is taken lies within it as degrees, or as millimetres."""
+    """The hint where a plain number beyond what is taken lies within it as degrees, millimetres or percent."""
     most = next((context[key] for key in ("le", "lt", "ge") if key in context), None)
     value = node.value if isinstance(node, ScalarNode) else None
     if not isinstance(most, int | float) or not isinstance(value, int | float) or value * most <= 0:
@@ -48,11 +51,18 @@ def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> s
 def to_write(known: dict[str, FieldInfo]) -> str | None:
     """How a mapping with these keys is written: `{to: ...}`."""
     needed = [key for key, field in known.items() if field.is_required()] or list(known)[:1]
-    return f"write {{{', '.join(f'{key}: ...' for key in needed)}}}" if needed else None
+    items = (f"{key}: {1 if known[key].annotation is int else '...'}" for key in needed)
+    return f"write {{{', '.join(items)}}}" if needed else None
 
 
-def of_type(kind: str, node: Node) -> str | None:
-    """Where a value is of the wrong type: the YAML that was meant."""
+def its_key(node: Node, kinds: Sequence[object]) -> str | None:
+    """Where a word stands alone that is a key of the mapping that may stand there: how that is written."""
+    known = shape.keys_of(kinds)
+    return to_write(known) if isinstance(node, ScalarNode) and node.value in known else None
+
+
+def of_type(kind: str, node: Node, kinds: Sequence[object]) -> str | None:
+    """Where a value is of none of the `kinds` that may stand there: the YAML that was meant."""
     value = node.value if isinstance(node, ScalarNode) else None
     if isinstance(node, ScalarNode) and value is None:
         return "the key has no value"
@@ -60,6 +70,8 @@ def of_type(kind: str, node: Node) -> str | None:
         return f"YAML 1.2 knows true and false alone: write {_WORDS[value.casefold()]}"
     if kind in ("float_type", "int_type") and isinstance(value, str):
         return _quoted(value)
+    if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, ...) for one in kinds):
+        return f"write [{value}]"
     if kind == "string_type" and isinstance(value, int | float):
         return "quotes make a text of it"
     return None

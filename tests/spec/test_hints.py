@@ -119,3 +119,31 @@ def test_a_key_of_the_block_around_is_told_to_stand_there(block: str, place: str
 
 def test_a_key_of_the_file_is_not_told_to_stand_anywhere() -> None:
     assert "beside" not in (told("steps: [{lift: {object: cup, by: 1 cm, robot: r}}]").hint or "")
+
+
+@pytest.mark.parametrize(
+    ("block", "written", "guess", "right"),
+    [
+        ("steps: [{wait: 1 s, on_fail: @}]", "retry", "write", "{retry: 1}"),
+        ("steps: [{move: {to: home, touch: @}}]", "cup", "write", "[cup]"),
+        ("steps: [wait: 1 s]\ntags: @", "slow", "write", "[slow]"),
+        ("steps: [{switch_controllers: {activate: @}}]", "arm", "write", "[arm]"),
+        ("steps: [{move: {to: home, speed: @}}]", "30", "in percent? write", "'30 %'"),
+        ("steps: [wait: 1 s]\nexpect: [{limits: {spare: @}}]", "20", "in percent? write", "'20 %'"),
+    ],
+)
+def test_what_is_told_to_be_written_is_taken(block: str, written: str, guess: str, right: str) -> None:
+    assert told(block.replace("@", written)).hint == f"{guess} {right}"
+    load_task_text(TASK + block.replace("@", right), "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "steps: [{move: {to: home, speed: 300}}]",
+        "steps: [{move: {pose: {xyz: cup}}}]",
+        "steps: [wait: 1 s]\nreplan: yes",
+    ],
+)
+def test_what_is_no_list_of_names_and_no_percentage_has_no_such_hint(block: str) -> None:
+    assert not (told(block).hint or "").startswith(("in percent", "write ["))
