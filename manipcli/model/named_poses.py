@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Loc
-from manipcli.core.text import did_you_mean
+from manipcli.core.text import did_you_mean, told_apart
 from manipcli.model.robot import Group, Joint, Link, NamedPose
 from manipcli.spec.robot import GroupSpec, RobotSpec
 
@@ -125,7 +125,8 @@ class _Poses:
                 self._reporter.error("ROBOT320", message, ("poses", name, group), hint=hint)
             elif group in self._groups:  # one that could not be built has been reported
                 values |= self._part(name, group, ())
-        return NamedPose(name=name, joints=tuple(values), positions=tuple(values.values()))
+        at = (self._moving[joint].limits.nearest(q) if joint in self._moving else q for joint, q in values.items())
+        return NamedPose(name=name, joints=tuple(values), positions=tuple(at))
 
     def _part(self, name: str, group: str, seen: tuple[str, ...]) -> dict[str, float]:
         """Joint values of one group in one pose; names of other poses are followed."""
@@ -170,9 +171,10 @@ class _Poses:
                 self._reporter.error("ROBOT323", message, locs[joint], hint=self._moving[joint].meant(value))
                 continue
             least, most = limits.within_soft
-            if value < least - LIMIT_TOLERANCE or value > most + LIMIT_TOLERANCE:
+            if not least <= limits.nearest(value) <= most:
                 word, limit = ("lower", least) if value < least else ("upper", most)
-                message = f"pose '{name}': joint '{joint}' at {value:g} is beyond its soft {word} limit {limit:g}"
+                at, bound = told_apart(value, limit, form=".6g")
+                message = f"pose '{name}': joint '{joint}' at {at} is beyond its soft {word} limit {bound}"
                 hint = f"no motion of an arm begins or ends there: change the pose, `soft_{word}` or `k_position`"
                 self._reporter.warning("ROBOT324", message, locs[joint], hint=hint)
         return values

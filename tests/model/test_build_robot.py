@@ -160,16 +160,23 @@ def test_a_pose_that_cannot_be_is_told(file: Path, poses: dict[str, object], exp
     assert expected in messages(file, groups=GROUPS, poses=poses)
 
 
+def test_a_pose_of_few_digits_beyond_a_limit_is_at_it(file: Path) -> None:
+    """As 90 deg under a limit of 1.570796: plans keep the limit to the last digit."""
+    poses = {"p": {"arm": [1.0000003, 0.5]}, "q": {"arm": "p"}}
+    robot = build(file, groups=GROUPS, poses=poses)
+    assert [robot.pose(name).positions for name in "pq"] == [(1.0, 0.5), (1.0, 0.5)]
+
+
 def test_a_pose_beyond_a_soft_limit_is_a_warning_where_the_limit_acts(file: Path) -> None:
     soft = {"soft_lower": 0.3, "soft_upper": 0.7, "k_position": 20.0}
-    poses = {"low": {"arm": [0.1, 0.1]}, "high": {"arm": {"j2": 0.8}}, "good": {"arm": [0.0, 0.3]}}
+    poses = {"low": {"arm": [0.1, 0.2999997]}, "high": {"arm": {"j2": 0.8}}, "good": {"arm": [0.0, 0.3]}}
 
     def warned(limits: dict[str, float]) -> list[tuple[str, str]]:
         findings = build_robot(spec(groups=GROUPS, poses=poses, limits={"j2": limits}), file=file)[1]
         return [(found.code, found.message) for found in findings if found.severity == "warning"]
 
     assert warned(soft) == [
-        ("ROBOT324", "pose 'low': joint 'j2' at 0.1 is beyond its soft lower limit 0.3"),
+        ("ROBOT324", "pose 'low': joint 'j2' at 0.2999997 is beyond its soft lower limit 0.3"),
         ("ROBOT324", "pose 'high': joint 'j2' at 0.8 is beyond its soft upper limit 0.7"),
     ]
     assert warned({"k_velocity": 5.0}) == []
