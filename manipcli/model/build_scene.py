@@ -26,6 +26,9 @@ Resolve = Callable[[str], Path]
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
+LONGEST = 10.0
+"""[m] of what can move: anything longer was meant in millimetres."""
+_SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
 UPRIGHT = 1.0 - 1e-6
 """Least cosine of the tilt of what carries or contains something: none, but for rounding."""
 
@@ -119,6 +122,10 @@ class _Builder:
         self._add_shape(name, kind, shape)
         if spec.fixed:
             return
+        if max(shape.size) > LONGEST:
+            message = f"body '{name}' can move and is {max(shape.size):.3g} m long, more than {LONGEST:g} m"
+            scaled = _SCALED.get(kind, "each size with its unit, as '80 mm'")
+            self._error("TASK222", message, (*loc, kind), f"in millimetres? write {scaled}; else say `fixed: true`")
         if kind == "urdf" and shape.inertial is None:
             hint = "give the link an <inertial> with mass and moments, or say `fixed: true`"
             self._error("TASK223", f"body '{name}' can move and its URDF states no inertia", (*loc, kind), hint)

@@ -295,6 +295,28 @@ def test_a_mesh_of_a_box_weighs_and_stands_like_the_box(tmp_path: Path) -> None:
     np.testing.assert_allclose(along_body, box, rtol=1e-6, atol=1e-9)  # the file's numbers are single precision
 
 
+@pytest.mark.parametrize("shape", [{"cylinder": {"radius": 20, "height": 80}}, {"box": {"size": [0.1, 10.1, 0.1]}}])
+def test_what_can_move_is_not_as_long_as_a_house(shape: dict[str, Any]) -> None:
+    body = shape | {"pose": {"xyz": [0, 0, 50]}}
+    found = only({"x": body | {"mass": 1}})
+    longest = max(next(iter(shape.values())).get("size", [80]))
+    assert (found.code, found.message) == ("TASK222", f"body 'x' can move and is {longest} m long, more than 10 m")
+    assert found.hint == "in millimetres? write each size with its unit, as '80 mm'; else say `fixed: true`"
+    built({"x": body | {"fixed": True}})
+    built({"x": {"box": {"size": [10, 10, 10]}, "mass": 1, "pose": {"xyz": [0, 0, 50]}}})
+
+
+def test_a_mesh_in_millimetres_is_told_its_scale(tmp_path: Path) -> None:
+    stl(tmp_path / "part.stl", cuboid((0.0, 0.0, 0.0), (40.0, 40.0, 80.0)))
+    mesh = {"file": "part.stl"}
+    with pytest.raises(InvalidInput) as caught:
+        build_scene(task({"x": {"mesh": mesh, "mass": 1, "pose": {}}}, floor=False), resolve=lambda n: tmp_path / n)
+    (found,) = caught.value.findings
+    assert found.hint == "in millimetres? write `scale: 0.001`; else say `fixed: true`"
+    scaled = task({"x": {"mesh": mesh | {"scale": 0.001}, "mass": 1, "pose": {}}}, floor=False)
+    assert max(build_scene(scaled, resolve=lambda n: tmp_path / n).body("x").size) == pytest.approx(0.08)
+
+
 def test_a_mesh_that_is_absent_flat_or_no_mesh_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.stl").write_text("not a mesh")
     (tmp_path / "part.step").write_text("")
