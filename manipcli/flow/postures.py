@@ -29,7 +29,7 @@ def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Fi
             a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
             yield Finding(
                 code="ROBOT340",
-                message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {-1000 * hit.distance:.1f} mm",
+                message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {hit.amount}",
                 place=file.place("poses", pose.name),
                 hint="change the pose; or list the pair under `collision_ignore` if the links may touch",
                 severity="warning",

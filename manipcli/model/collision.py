@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import pinocchio as pin
 
 RESOLUTION = 0.01  # rad or m: how far any joint moves between two checked positions of a trajectory
+_SEEN = 5e-5  # m: less is 0.0 mm to one digit
 
 Pair = tuple[str, str]
 
@@ -53,9 +54,15 @@ class CollisionHit:
     distance: float
     time: float = 0.0
 
+    @property
+    def amount(self) -> str:
+        """How far apart they are, or how deep in each other."""
+        return f"{1000.0 * abs(self.distance):.1f} mm" if abs(self.distance) >= _SEEN else "less than 0.1 mm"
+
     def __str__(self) -> str:
-        how = "overlap by" if self.distance < 0.0 else "come as near as"
-        return f"{self.a} and {self.b} {how} {abs(self.distance) * 1000.0:.1f} mm"
+        if abs(self.distance) < _SEEN:
+            return f"{self.a} and {self.b} touch"
+        return f"{self.a} and {self.b} {'overlap by' if self.distance < 0.0 else 'come as near as'} {self.amount}"
 
 
 def pairs(links: Iterable[str], *bodies: str) -> frozenset[Pair]:

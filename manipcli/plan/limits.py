@@ -23,6 +23,7 @@ class MotionLimits:
         velocity, acceleration: finite and positive.
         jerk: infinite where none is stated.
         soft: (joint, side) of those position limits that are soft ones; `lower` is side 0, `upper` side 1.
+        sliding: those of `names` whose positions are in m.
     """
 
     names: tuple[str, ...]
@@ -32,6 +33,11 @@ class MotionLimits:
     acceleration: Array
     jerk: Array
     soft: frozenset[tuple[str, int]] = frozenset()
+    sliding: frozenset[str] = frozenset()
+
+    def unit(self, name: str) -> str:
+        """Of the position of this joint."""
+        return "m" if name in self.sliding else "rad"
 
     @staticmethod
     def of(
@@ -71,4 +77,5 @@ class MotionLimits:
                 for side in (0, 1)
                 if limit.is_soft(side)
             ),
+            sliding=frozenset(name for name in joints if robot.joint(name).unit == "m"),
         )

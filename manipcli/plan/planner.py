@@ -243,9 +243,9 @@ class Planner:
             if frozenset((hit.a, hit.b)) in map(frozenset, self.hand_contacts(body)):
                 hint = f"`touch: [{body}]` of the `move` that leaves it lets it"
         if begins and hit.distance < 0.0 and not held:
-            cause = f"'{hit.a}' and '{hit.b}' overlap by {-1000 * hit.distance:.1f} mm already, {when}"
+            cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} already, {when}"
         else:
-            near = f"{1000 * abs(hit.distance):.1f} mm {'apart' if hit.distance >= 0.0 else 'into it'}"
+            near = f"{hit.amount} {'apart' if hit.distance >= 0.0 else 'into it'}"
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
         return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
 

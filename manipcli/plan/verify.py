@@ -15,7 +15,8 @@ from manipcli.plan.trajectory import JointTrajectory
 
 TOLERANCE = 0.005
 """Relative excess of velocity, acceleration and jerk that is forgiven."""
-
+PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
+"""What of each is by the second, after the unit of the position."""
 _POSITION = 1e-9  # rad or m: rounding of a trajectory that touches its limit
 
 
@@ -39,17 +40,17 @@ def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: floa
     dt = np.diff(times)[:, None]
     rate = np.diff(q, axis=0) / dt
     v = trajectory.velocities
-    _bounded("velocity", rate, limits.velocity, times, limits.names, tolerance)
+    _bounded("velocity", rate, limits.velocity, times, limits, tolerance)
     if v is None:
         return
-    _bounded("velocity", v, limits.velocity, times, limits.names, tolerance)
-    _bounded("acceleration", np.diff(v, axis=0) / dt, limits.acceleration, times, limits.names, tolerance)
+    _bounded("velocity", v, limits.velocity, times, limits, tolerance)
+    _bounded("acceleration", np.diff(v, axis=0) / dt, limits.acceleration, times, limits, tolerance)
     a = trajectory.accelerations
     if a is None:
         return
-    _bounded("acceleration", a, limits.acceleration, times, limits.names, tolerance)
+    _bounded("acceleration", a, limits.acceleration, times, limits, tolerance)
     if np.isfinite(limits.jerk).any():
-        _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits.names, tolerance)
+        _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits, tolerance)
 
 
 def verify_written(
@@ -73,9 +74,8 @@ def verify_written(
         lower, upper = joint.limits.within_soft
         if max(lower - value, value - upper) > _POSITION:
             side = 0 if value < lower else 1
-            refusal = _beyond(
-                name, value, (lower, upper)[side], side, joint.limits.is_soft(side), f"goes to {{}}{when}"
-            )
+            limit, soft = (lower, upper)[side], joint.limits.is_soft(side)
+            refusal = _beyond(name, value, limit, side, soft, f"goes to {{}}{when}", joint.unit)
             raise NotPlannable(refusal.cause, hint=joint.meant(value) or refusal.hint, loc=loc)
 
 
@@ -86,13 +86,15 @@ def _beyond(
     side: int,
     soft: bool,
     does: str,
+    unit: str,
     *,
     change: str = "the goal",
 ) -> NotPlannable:
     """What to tell of a joint that `does` something at a position, {}, beyond this limit; `change` what instead."""
     word = ("lower", "upper")[side]
     there, most = told_apart(value, limit, form=".4f")
-    message = f"joint '{name}' {does.format(there)}, beyond its {'soft ' if soft else ''}{word} limit {most}"
+    bound = f"{'soft ' if soft else ''}{word} limit {most} {unit}"
+    message = f"joint '{name}' {does.format(f'{there} {unit}')}, beyond its {bound}"
     hint = f"plans stay within soft limits: change {change}, or `soft_{word}` or `k_position` in the robot file"
     return NotPlannable(message, hint=hint if soft else None)
 
@@ -116,17 +118,22 @@ def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
     if outside[k, i] > _POSITION:
         name, value, side = trajectory.names[i], float(q[k, i]), 0 if q[k, i] < limits.lower[i] else 1
         limit, soft = (limits.lower, limits.upper)[side][i], (name, side) in limits.soft
+        unit = limits.unit(name)
         if k == 0:
-            raise _beyond(name, value, limit, side, soft, "begins at {}", change="that pose, or the task's `start`")
-        raise _beyond(name, value, limit, side, soft, f"goes to {{}} at t = {trajectory.times[k]:.3f} s")
+            raise _beyond(
+                name, value, limit, side, soft, "begins at {}", unit, change="that pose, or the task's `start`"
+            )
+        raise _beyond(name, value, limit, side, soft, f"goes to {{}} at t = {trajectory.times[k]:.3f} s", unit)
 
 
-def _bounded(word: str, values: Array, limit: Array, times: Array, names: tuple[str, ...], tolerance: float) -> None:
+def _bounded(word: str, values: Array, limit: Array, times: Array, limits: MotionLimits, tolerance: float) -> None:
     """|values| (k, n) <= limit (n) within `tolerance`."""
     ratio = np.abs(values) / limit
     k, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     if ratio[k, i] > 1.0 + tolerance:
+        name = limits.names[i]
         needed, most = told_apart(abs(values[k, i]), limit[i])
+        unit = limits.unit(name) + PER[word]
         raise NotPlannable(
-            f"joint '{names[i]}' would need {word} {needed} at t = {times[k]:.3f} s; its limit is {most}"
+            f"joint '{name}' would need {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}"
         )

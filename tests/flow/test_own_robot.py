@@ -88,9 +88,9 @@ def errors(task: Path) -> list[tuple[str, Finding]]:
 @pytest.mark.parametrize(
     ("step", "place", "told"),
     [
-        ("  - move: {to: {y: 0, x: 5}}\n", "task.yaml:8:26", "'move_1': joint 'x' goes to 5.0000, beyond its upper"),
-        ("  - move: {to: {l: 50 mm}}\n", "task.yaml:8:20", "'move_1': joint 'l' goes to 0.0500, beyond its upper"),
-        (FOLLOW, "task.yaml:12:27", "'follow_1': joint 'y' goes to 2.8100 at t = 60.000 s, beyond its upper"),
+        ("  - move: {to: {y: 0, x: 5}}\n", "task.yaml:8:26", "'move_1': joint 'x' goes to 5.0000 rad, beyond its"),
+        ("  - move: {to: {l: 50 mm}}\n", "task.yaml:8:20", "'move_1': joint 'l' goes to 0.0500 m, beyond its upper"),
+        (FOLLOW, "task.yaml:12:27", "'follow_1': joint 'y' goes to 2.8100 rad at t = 60.000 s, beyond"),
         ("  - move: {pose: {xyz: [3, 0, 0]}}\n", "task.yaml:8:5", "'move_1': no joint positions reach (3.000"),
     ],
 )

@@ -69,5 +69,5 @@ def test_a_line_for_which_a_joint_is_missing_tells_the_limit(make_arm7: Callable
             raise NotPlannable("the straight line ends here")
         return joint_path(solver.joints, corner)
 
-    with pytest.raises(NotPlannable, match=r"joint 'joint_6' goes to 2\.\d+ .* beyond its upper limit 2\."):
+    with pytest.raises(NotPlannable, match=r"joint 'joint_6' goes to 2\.\d+ rad .* beyond its upper limit 2\."):
         timed_line(walk, solver, limits, period=1e-3, insist=True)

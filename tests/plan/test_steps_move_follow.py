@@ -155,7 +155,7 @@ def test_what_lies_in_a_pushed_container_goes_with_it(bench: Make) -> None:
 def test_a_soft_limit_is_planned_for(bench: Make) -> None:
     """The Panda's description says 2.9671 rad, and of its safety_controller 2.8973: from beyond it is led back."""
     refusal = bench("panda").refused("move", {"to": {"panda_joint1": 2.95}})
-    assert refusal.cause == "joint 'panda_joint1' goes to 2.9500, beyond its soft upper limit 2.8973"
+    assert refusal.cause == "joint 'panda_joint1' goes to 2.9500 rad, beyond its soft upper limit 2.8973 rad"
     assert refusal.hint is not None
     assert "soft_upper" in refusal.hint
     limits = MotionLimits.of(bench("panda").robot, ("panda_joint1", "panda_finger_joint1"))
@@ -166,7 +166,7 @@ def test_a_soft_limit_is_planned_for(bench: Make) -> None:
 def test_a_move_past_a_limit_names_joint_value_and_limit(bench: Make) -> None:
     refusal = bench().refused("move", {"to": {"joint_4": 3.0}})
     upper = bench().robot.joint("joint_4").limits.upper
-    assert refusal.cause == f"joint 'joint_4' goes to 3.0000, beyond its upper limit {upper:.4f}"
+    assert refusal.cause == f"joint 'joint_4' goes to 3.0000 rad, beyond its upper limit {upper:.4f} rad"
     assert refusal.loc == ("to", "joint_4")
     assert refusal.hint is None
     assert bench().refused("move", {"to": {"joint_4": -90.0}}).hint == "in degrees? write '-90 deg'"
@@ -195,6 +195,9 @@ def test_what_is_too_near_is_told_with_the_clearance_that_is_kept(bench: Make) -
     told = "cup and robot/palm come as near as 3.9 mm, and 4 mm are to stay between them"
     assert planner.in_the_way(too_near) == told
     assert planner.in_the_way(overlap) == "floor and robot/base overlap by 5.0 mm"
+    assert planner.in_the_way(CollisionHit("desk", "robot/palm", -1e-5)) == "desk and robot/palm touch"
+    just = planner.refusal(bench().now, CollisionHit("desk", "robot/palm", -1e-5), "is", "before it moves")
+    assert just.cause == "'desk' and 'robot/palm' overlap by less than 0.1 mm already, before it moves"
     refusal = planner.refusal(bench().now, overlap, "is", "before it moves")
     assert "`mount` of a robot file" in (refusal.hint or "")
     for hit, own in ((CollisionHit("robot/a", "robot/b", -0.001, time=0.2), True), (too_near, False)):
@@ -351,13 +354,13 @@ def test_points_beyond_a_limit_name_joint_value_limit_and_time(bench: Make) -> N
     still = {"velocities": [0, 0]}
     way = v / 1.5 * 1.1
     cause = arm.refused("follow", follow({"positions": [way, 0.1], **still, "time_from_start": 1})).cause
-    assert cause.startswith(f"joint 'joint_1' would need velocity {1.1 * v:.4g} at t = 0.")
-    assert cause.endswith(f"its limit is {v:.4g}")
+    assert cause.startswith(f"joint 'joint_1' would need velocity {1.1 * v:.4g} rad/s at t = 0.")
+    assert cause.endswith(f"its limit is {v:.4g} rad/s")
     way = a / 6 * 0.25 * 1.1
     cause = arm.refused("follow", follow({"positions": [way, 0.1], **still, "time_from_start": 0.5})).cause
     assert "joint 'joint_1' would need acceleration" in cause
     cause = arm.refused("follow", follow({"positions": [0, 9.0], **still, "time_from_start": 60})).cause
-    assert "joint 'joint_2' goes to 9.0000 at t = 60.000 s, beyond its upper limit" in cause
+    assert "joint 'joint_2' goes to 9.0000 rad at t = 60.000 s, beyond its upper limit" in cause
 
 
 def test_points_that_make_no_trajectory_are_refused_where_they_are_read() -> None:

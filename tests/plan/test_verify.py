@@ -40,11 +40,11 @@ def test_a_motion_that_touches_every_limit_passes() -> None:
 @pytest.mark.parametrize(
     ("limit", "value", "message"),
     [
-        ("upper", 0.9, r"joint 'j' goes to 1\.0000 at t = 0\.785 s, beyond its upper limit 0\.9000"),
-        ("lower", 0.1, r"joint 'j' begins at 0\.0000, beyond its lower limit 0\.1000"),
-        ("velocity", 1.98, r"velocity 2 at t = 0\.000 s; its limit is 1\.98"),
-        ("acceleration", 3.97, r"acceleration 4 at t = 0\.785 s; its limit is 3\.97"),
-        ("jerk", 7.9, r"jerk 8 at t = 0\.000 s; its limit is 7\.9"),
+        ("upper", 0.9, r"joint 'j' goes to 1\.0000 rad at t = 0\.785 s, beyond its upper limit 0\.9000 rad"),
+        ("lower", 0.1, r"joint 'j' begins at 0\.0000 rad, beyond its lower limit 0\.1000 rad"),
+        ("velocity", 1.98, r"velocity 2 rad/s at t = 0\.000 s; its limit is 1\.98 rad/s"),
+        ("acceleration", 3.97, r"acceleration 4 rad/s2 at t = 0\.785 s; its limit is 3\.97 rad/s2"),
+        ("jerk", 7.9, r"jerk 8 rad/s3 at t = 0\.000 s; its limit is 7\.9 rad/s3"),
     ],
 )
 def test_one_percent_beyond_a_limit_is_refused_with_joint_value_limit_and_time(
@@ -52,6 +52,14 @@ def test_one_percent_beyond_a_limit_is_refused_with_joint_value_limit_and_time(
 ) -> None:
     with pytest.raises(NotPlannable, match=message):
         verify(sine(), limits(**{limit: value}))
+
+
+def test_a_joint_that_slides_is_told_in_metres() -> None:
+    sliding = frozenset({"j"})
+    with pytest.raises(NotPlannable, match=r"velocity 2 m/s at t = 0\.000 s; its limit is 1\.98 m/s$"):
+        verify(sine(), dataclasses.replace(limits(velocity=1.98), sliding=sliding))
+    with pytest.raises(NotPlannable, match=r"goes to 1\.0000 m at t = 0\.785 s, beyond its upper limit 0\.9000 m$"):
+        verify(sine(), dataclasses.replace(limits(upper=0.9), sliding=sliding))
 
 
 def test_a_soft_limit_is_called_so_and_the_hint_says_where_it_is_stated() -> None:
@@ -66,14 +74,14 @@ def test_a_soft_limit_is_called_so_and_the_hint_says_where_it_is_stated() -> Non
     within, stated = "plans stay within soft limits: change ", "`k_position` in the robot file"
     assert told == [
         (
-            "joint 'j' begins at 0.0000, beyond its soft lower limit 0.1000",
+            "joint 'j' begins at 0.0000 rad, beyond its soft lower limit 0.1000 rad",
             f"{within}that pose, or the task's `start`, or `soft_lower` or {stated}",
         ),
         (
-            "joint 'j' goes to 1.0000 at t = 0.785 s, beyond its soft upper limit 0.9000",
+            "joint 'j' goes to 1.0000 rad at t = 0.785 s, beyond its soft upper limit 0.9000 rad",
             f"{within}the goal, or `soft_upper` or {stated}",
         ),
-        ("joint 'j' goes to 1.0000 at t = 0.785 s, beyond its upper limit 0.9000", None),
+        ("joint 'j' goes to 1.0000 rad at t = 0.785 s, beyond its upper limit 0.9000 rad", None),
     ]
 
 
