@@ -132,7 +132,7 @@ class BodySpec(Model):
     )
     yaw: Turn = Field(0.0, description="About the world's z axis [rad]. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
-    fixed: bool = Field(False, description="Never moves. Default false.")
+    fixed: bool = Field(False, description="Never moves; what can is 10 m long at most. Default false.")
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
         None, description="[kg], above 0 to 100 t; needed unless `fixed`, `urdf`."
     )
