@@ -251,6 +251,15 @@ def test_an_integral_that_ros_1_would_not_let_act_is_told() -> None:
     ]
 
 
+def test_a_tolerance_that_no_joint_can_miss_is_not_enforced_and_told() -> None:
+    controllers, findings = loaded(ROS_1.replace("{trajectory: 0.1, goal: 0}", "{trajectory: 15, goal: 3.1}"))
+    assert controllers["arm"]["constraints"]["joints"] == {"a": {"goal": 3.1}}
+    assert told(findings) == [
+        "c.yaml:9:39: warning[CTRL214]: arm.constraints.a: 'trajectory: 15', in rad or m, is never missed: not enforced"
+    ]
+    assert findings[0].hint == "in degrees? ROS takes radians"
+
+
 OWN = "{ros__parameters: {joints: [a], command_interfaces: [effort]}}"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 
 from pydantic import BaseModel
@@ -259,7 +260,10 @@ class _Rewriting:
             given = plain(entry.node)
             if key in block.filled and given == []:
                 self.tell("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
-            if given in block.unserved.get(key, ()):
+            if isinstance(given, int | float) and given > block.most.get(key, math.inf):
+                message = f"{where}: '{key}: {given:g}', in rad or m, is never missed: not enforced"
+                self.tell("CTRL214", entry.key_place, message, hint="in degrees? ROS takes radians", severity="warning")
+            elif given in block.unserved.get(key, ()):
                 message = f"{where}: ROS knows '{key}: {given}', manipcli does not serve it: left out"
                 self.tell("CTRL214", entry.key_place, message, severity="warning")
             elif block.joint is not None and isinstance(entry.node, MappingNode) and key not in fields:

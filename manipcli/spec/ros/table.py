@@ -28,6 +28,7 @@ class Block:
         joint: the block of every other mapping: one a joint.
         neutral: values that say no more than if the key were absent, as dumps of parameters have them.
         unserved: values that ROS knows for a key and manipcli does not.
+        most: what a tolerance may be; one that is larger is never missed, and left out with a warning.
         filled: lists that are not to be empty, though ours may be.
     """
 
@@ -38,6 +39,7 @@ class Block:
     joint: Block | None = None
     neutral: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
     unserved: Mapping[str, tuple[Plain, ...]] = field(default_factory=dict)
+    most: Mapping[str, float] = field(default_factory=dict)
     filled: frozenset[str] = frozenset()
 
     @property

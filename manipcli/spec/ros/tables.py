@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from manipcli.spec.fields import bounds_of
+from manipcli.spec.quantity import JointTolerance
 from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table
 from manipcli.spec.tree import Plain
@@ -39,6 +41,8 @@ _GAINS: Final = Block(
 )  # fmt: skip
 INTERFACES: Final = ("position", "velocity", "effort")
 
+_WIDEST: Final = dict.fromkeys(("trajectory", "goal"), bounds_of(JointTolerance, ())[1])
+
 JOINT_TRAJECTORY: Final = Table(
     own="joint_trajectory",
     types={
@@ -54,7 +58,7 @@ JOINT_TRAJECTORY: Final = Table(
         renamed={"open_loop_control": "interpolate_from_desired_state"},
         inner={
             "gains": Block(joint=_GAINS),
-            "constraints": Block(inner={"joints": Block(joint=Block())}),
+            "constraints": Block(inner={"joints": Block(joint=Block(most=_WIDEST))}),
             "positions_upsampling": Block(
                 known=frozenset({"policy_frequency"}), neutral={"policy_frequency": (0, 0.0)}
             ),
