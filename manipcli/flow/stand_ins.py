@@ -15,7 +15,7 @@ from manipcli.spec.task import TaskSpec
 
 
 def named_scene(spec: TaskSpec) -> Scene:
-    """The names of a scene that cannot be built: bodies that could be anything but the floor, so that only unknown names
+    """The names of a scene that cannot be built. Its bodies could be anything but the floor, so that only unknown names
     are told."""
     one = Box((1.0, 1.0, 1.0))
     origin = Transform.identity()
