@@ -125,7 +125,7 @@ def test_success_needs_all_joints_inside_and_slow_at_the_same_tick():
 
 
 def test_it_never_succeeds_before_its_end():
-    controller = make(goal=10.0)
+    controller = make(goal=3.0)
     handle = controller.send_goal(trajectory(point(START, 0.01)))
     run(controller, state(START), 10)
     assert handle.active
