@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
+from manipcli.flow.log import RUNS
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Geometry, Mesh, RobotModel
 from manipcli.model.scene import Scene
@@ -17,8 +18,8 @@ class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
     What the log carries itself is taken from there. Packages are looked for as for a description beside the log, and in
-    the working directory, its folders, and those of the folder that holds `runs/`. What is not found keeps its URI as
-    its path: whoever draws it draws something else.
+    the working directory, its folders, and those of a project that holds the log in `runs/`. What is not found keeps
+    its URI as its path: whoever draws it draws something else.
 
     Args:
         log: where the log is.
@@ -40,8 +41,10 @@ class MeshSearch:
         allow_outside: bool = False,
     ) -> None:
         here = Path.cwd()
-        runs = log.resolve().parent
-        places = [*package_path, here, *_folders(here), *_folders(runs), *_folders(runs.parent)]
+        beside = log.resolve().parent
+        # Of any other folder the one above may hold everything: /, or where all homes are.
+        project = _folders(beside.parent) if beside.name == RUNS.name else []
+        places = [*package_path, here, *_folders(here), *_folders(beside), *project]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
         self._hashes = hashes
         self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None

@@ -187,8 +187,10 @@ def test_meshes_of_the_project_that_holds_the_runs_are_found_from_anywhere(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     shutil.copytree(ROOT / "robots", tmp_path / "project" / "robots")
-    (tmp_path / "project" / "runs").mkdir()
+    for folder in ("runs", "downloads"):
+        (tmp_path / "project" / folder).mkdir()
     assert open_playback(Path(shutil.copy(log, tmp_path / "project" / "runs" / "lift.mcap"))).notes == ()
+    assert open_playback(Path(shutil.copy(log, tmp_path / "project" / "downloads" / "lift.mcap"))).notes != ()
 
 
 def test_a_mesh_that_is_another_file_than_in_the_run_is_told(log: Path, tmp_path: Path) -> None:
