@@ -188,7 +188,7 @@ class Packages:
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
-            if os.path.islink(path):  # noqa: PTH114 (of a name that is too long, too)
+            if os.path.islink(path):  # noqa: PTH114  (Path.is_symlink raises where a name is too long)
                 message, near = f"'{uri}' is a link that leads to no file", False
             else:
                 message, near = f"'{uri}' is not found; searched {shown_path(path)}", True
