@@ -60,3 +60,18 @@ class Check:
 def found_while_reading(code: str) -> Callable[[Subject], Iterable[Finding]]:
     """The findings of this code that reading the description made: the one door every description comes through."""
     return lambda subject: (finding for finding in subject.parts.findings if finding.code == code)
+
+
+def reading_check(
+    code: str,
+    *,
+    name: str,
+    tier: Tier,
+    severity: Severity = "error",
+    summary: str,
+    reason: str,
+    bad: str,
+    files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
+) -> Check:
+    """A check that reading makes anyway: nothing is left but to say what it is about."""
+    return Check(code, name, tier, severity, summary, reason, bad, found_while_reading(code), files)
