@@ -22,6 +22,7 @@ from manipcli.record.reading import open_recording
 from manipcli.record.recording import Span, TaskEvent
 from manipcli.record.snapshot import snapshot
 from manipcli.record.units import joint_units
+from manipcli.replay.sampling import references
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 
 
@@ -52,11 +53,7 @@ def _ours(path: Path, time: float) -> Moment:
         raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
     states = span.states
     now = float(states.time[k])
-    references: dict[str, float] = {}
-    for trace in span.controllers:
-        row = int(np.searchsorted(trace.times, now + ROUNDING, side="right")) - 1
-        if row >= 0:
-            references |= dict(zip(trace.joints, trace.reference_position[row].tolist(), strict=True))
+    wanted = references(span.controllers, recording.joint_names, len(states.time))[k]
     units = joint_units(recording.attachments.get(URDF, b""))
     joints = tuple(
         JointMoment(
@@ -65,7 +62,7 @@ def _ours(path: Path, time: float) -> Moment:
             float(states.position[k, j]),
             float(states.velocity[k, j]),
             float(states.effort[k, j]),
-            references.get(name),
+            None if np.isnan(wanted[j]) else float(wanted[j]),
         )
         for j, name in enumerate(recording.joint_names)
     )

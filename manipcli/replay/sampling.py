@@ -110,13 +110,14 @@ class _Contacts:
 
 
 def references(traces: Sequence[ControllerTrace], joints: Sequence[str], count: int) -> Array:
-    """(T, n) the reference position of each joint from the controller that moves it; NaN where none does."""
+    """(T, n) the reference position of each joint from the controller that moves it then; NaN where none does."""
     found = np.full((count, len(joints)), np.nan)
     index = {name: k for k, name in enumerate(joints)}
     for trace in traces:
         columns = [index[name] for name in trace.joints if name in index]
         mine = [k for k, name in enumerate(trace.joints) if name in index]
-        found[:, columns] = trace.reference_position[:, mine]
+        led = trace.reference_position[:, mine]  # NaN while the controller is not active
+        found[:, columns] = np.where(np.isnan(led), found[:, columns], led)
     found.flags.writeable = False
     return found
 
