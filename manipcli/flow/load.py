@@ -128,7 +128,7 @@ def load_task(
     scene = None
     if task is not None:
         whole = task
-        scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), resolve=packages.resolve))
+        scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), packages=packages))
     told: tuple[Finding, ...] = ()
     if built:
         found = disagreements(read, controllers_file or None, built[0], scene or named_scene(read.spec))

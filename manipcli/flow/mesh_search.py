@@ -17,9 +17,9 @@ from manipcli.model.scene import Scene
 class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
-    What the log carries itself is taken from there. Packages are looked for as for a description beside the log, and in
-    the working directory, its folders, and those of a project that holds the log in `runs/`. What is not found keeps
-    its URI as its path: whoever draws it draws something else.
+    What the log carries itself is taken from there. Packages are looked for as for a description beside the log, in the
+    folders of a project that holds the log in `runs/`, and in the working directory and its folders. What is not found
+    keeps its URI as its path: whoever draws it draws something else.
 
     Args:
         log: where the log is.
@@ -44,7 +44,7 @@ class MeshSearch:
         beside = log.resolve().parent
         # Of any other folder the one above may hold everything: /, or where all homes are.
         project = _folders(beside.parent) if beside.name == RUNS.name else []
-        places = [*package_path, here, *_folders(here), *_folders(beside), *project]
+        places = [*package_path, *project, *_folders(beside), here, *_folders(here)]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
         self._hashes = hashes
         self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None

@@ -74,7 +74,7 @@ def load_task(
             allow_outside=allow_outside,
             source=file.source,
         )[0],
-        scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), resolve=packages.resolve),
+        scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -21,20 +20,20 @@ from manipcli.model.urdf import read_parts
 from manipcli.spec.task import MeshSpec, UrdfSpec
 
 
-def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
+def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
     """A mesh in its own frame; hull, bounding box and mass properties (at uniform density) of its convex hull.
 
     Its inertial states 1 kg per m3, so that only its mass has to be scaled; a mesh has no mass of its own.
 
     Raises:
-        ValueError: the file is absent, of another kind, unreadable, or encloses no volume.
+        NotFound: there is no such file.
+        ValueError: the file is of another kind, unreadable, or encloses no volume.
     """
+    path = packages.resolve(spec.file, anywhere=True)
     if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise ValueError(f"there is no file '{spec.file}'")
-    # As it is written; but a path that begins at the root says where things are on this machine.
-    uri = Packages(None).portable(path) if spec.file.startswith(("/", "file:")) else spec.file
+    # A path is relative to the task, which no log is beside.
+    uri = spec.file if spec.file.startswith("package:") else packages.portable(path)
     shape = Mesh(uri=uri, path=path, scale=(spec.scale, spec.scale, spec.scale))
     try:
         hull = coal_shape(shape)
@@ -54,19 +53,21 @@ def mesh(spec: MeshSpec, path: Path, rgba: Rgba) -> BodyShape:
     )
 
 
-def urdf(spec: UrdfSpec, path: Path, rgba: Rgba | None) -> BodyShape:
+def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
     """The one link of a URDF, in the link's frame: its collision shapes and its inertia.
 
     Args:
         spec: names the file.
-        path: where it was found.
+        packages: of the file that names it.
         rgba: instead of the file's colours.
 
     Raises:
+        NotFound: there is no such file.
         InvalidInput: the file has errors, each with its place.
         ValueError: it holds more than one link, no collision shape, or (for a link with mass) no moments of inertia.
     """
-    parts = read_parts(read_description(path, packages=Packages(path)))
+    path = packages.resolve(spec.file, anywhere=True)
+    parts = read_parts(read_description(path, packages=packages.below(path)))
     if parts.errors:
         raise InvalidInput(parts.errors)
     if len(parts.links) != 1:

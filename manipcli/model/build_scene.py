@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.mass import union
-from manipcli.model.packages import NotFound
+from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Rgba
 from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.model.scene_names import Locate, misnamed
@@ -20,8 +19,6 @@ from manipcli.model.start_overlap import overlaps
 from manipcli.spec.base import Model
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.task import BodySpec, TaskSpec
-
-Resolve = Callable[[str], Path]
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")
@@ -33,28 +30,28 @@ UPRIGHT = 1.0 - 1e-6
 """Least cosine of the tilt of what carries or contains something: none, but for rounding."""
 
 
-def build_scene(spec: TaskSpec, *, place: Locate | None = None, resolve: Resolve | None = None) -> Scene:
+def build_scene(spec: TaskSpec, *, place: Locate | None = None, packages: Packages | None = None) -> Scene:
     """The scene of a task: the floor first (when there is one), then the bodies as written.
 
     Args:
         spec: the task; `scene`, `frames`, `floor` and `simulation.gravity` are read.
         place: where in the file the value at a path such as `("scene", "cup", "inside")` stands.
-        resolve: finds a file that the task names (mesh, urdf); default: the path as it stands.
+        packages: of the task file, whose bodies name files (mesh, urdf); default: as seen from the working directory.
 
     Raises:
         InvalidInput: with every finding: no or several shapes, no or several placements, a body, parent or container
             that is not there, a missing mass, a wall thicker than its container, bodies that start inside each other.
     """
-    return _Builder(spec, place or (lambda _: None), resolve or Path).build()
+    return _Builder(spec, place or (lambda _: None), packages or Packages(None)).build()
 
 
 class _Builder:
     """One use: collects findings on the way, so that a faulty body does not hide the faults of the others."""
 
-    def __init__(self, spec: TaskSpec, place: Locate, resolve: Resolve) -> None:
+    def __init__(self, spec: TaskSpec, place: Locate, packages: Packages) -> None:
         self.spec = spec
         self.place = place
-        self.resolve = resolve
+        self.packages = packages
         self.findings = list(misnamed(spec, place))
         self.shapes: dict[str, BodyShape] = {}
         self.kinds: dict[str, str] = {}
@@ -151,9 +148,9 @@ class _Builder:
                 raise ValueError(f"a wall of {spec.tray.wall:g} m leaves no hollow in the tray")
             return body_shapes.tray(spec.tray, rgba)
         if spec.mesh is not None:
-            return body_files.mesh(spec.mesh, self.resolve(spec.mesh.file), rgba)
+            return body_files.mesh(spec.mesh, self.packages, rgba)
         assert spec.urdf is not None  # the words of SHAPES are the fields of BodySpec
-        return body_files.urdf(spec.urdf, self.resolve(spec.urdf.file), spec.color)
+        return body_files.urdf(spec.urdf, self.packages, spec.color)
 
     def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
         self.shapes[name] = shape

@@ -153,8 +153,15 @@ class Packages:
                 self._below = packages_below(folder) | self._below
         return self._below.get(name)
 
-    def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
+    def below(self, description: Path) -> Packages:
+        """For what a file that was found here names in its turn: the same places and rules, seen from it."""
+        return Packages(description, package_path=self._package_path, allow_outside=self._allow_outside)
+
+    def resolve(self, uri: str, *, relative_to: Path | None = None, anywhere: bool = False) -> Path:
         """The regular file that `uri` names, links followed; relative paths start at the folder `relative_to`.
+
+        Args:
+            anywhere: the user himself wrote this name, so that the file may lie where he says.
 
         Raises:
             NotFound: unknown scheme or package, no such file, not a regular file, or outside of the allowed folders.
@@ -178,12 +185,12 @@ class Packages:
             raise NotFound("a file name holds a NUL character")
         if not path.is_absolute():
             path = (relative_to or self._folder or Path.cwd()) / path
-        return self._checked(path, uri, roots)
+        return self._checked(path, uri, roots, self._allow_outside or anywhere)
 
-    def _checked(self, path: Path, uri: str, roots: Sequence[Path]) -> Path:
+    def _checked(self, path: Path, uri: str, roots: Sequence[Path], anywhere: bool) -> Path:
         def inside(real: Path) -> bool:
             within = any(real.is_relative_to(root) for root in roots) or self._beside(real)
-            return self._allow_outside or within or _of_the_same_package(real, roots)
+            return anywhere or within or _of_the_same_package(real, roots)
 
         try:
             real = path.resolve(strict=True)
@@ -218,7 +225,7 @@ class Packages:
         """A `package://NAME/...` URI of a resolved file that says nothing about this machine.
 
         NAME is the outermost Python package or nearest ROS package that holds the file, else a package found by name,
-        else the description's own folder, else the file's folder.
+        else the description's own folder, else the folder beside it that holds the file, else the file's folder.
         """
         for ancestor in path.parents:
             if (ancestor / "package.xml").is_file():
@@ -228,6 +235,11 @@ class Packages:
         for root in (self._own, *self._found.values(), *self._package_path):
             if root is not None and path.is_relative_to(root):
                 return _uri(root, path)
+        for above in self._own.parents if self._own is not None else ():
+            if _of_everything(above):
+                break
+            if path.is_relative_to(above):
+                return _uri(above / path.relative_to(above).parts[0], path)
         return _uri(path.parent, path)
 
 
@@ -240,7 +252,7 @@ class Unread(Packages):
         super().__init__(None)
         self._written: dict[Path, str] = {}
 
-    def resolve(self, uri: str, *, relative_to: Path | None = None) -> Path:
+    def resolve(self, uri: str, *, relative_to: Path | None = None, anywhere: bool = False) -> Path:
         # A path has no place for the two slashes of `package://`: how it was written is kept beside it.
         path = Path(uri)
         self._written[path] = uri

@@ -13,6 +13,7 @@ import pytest
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform
 from manipcli.model.build_scene import build_scene
+from manipcli.model.packages import Packages
 from manipcli.model.robot import Box, Cylinder
 from manipcli.model.scene import Scene
 from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
@@ -286,7 +287,7 @@ def cuboid(low: tuple[float, float, float], high: tuple[float, float, float]) ->
 def test_a_mesh_of_a_box_weighs_and_stands_like_the_box(tmp_path: Path) -> None:
     stl(tmp_path / "part.stl", cuboid((0.0, 0.0, 0.0), (100.0, 200.0, 300.0)))
     part = {"mesh": {"file": "part.stl", "scale": 0.001}, "mass": 2.0, "rests_on": "floor", "at": [0, 0]}
-    made = build_scene(task({"part": part}), resolve=lambda name: tmp_path / name).body("part")
+    made = build_scene(task({"part": part}), packages=Packages(tmp_path / "task.yaml")).body("part")
     np.testing.assert_allclose(made.X_WO.p, [0, 0, 0], atol=1e-7)
     np.testing.assert_allclose(made.size, [0.1, 0.2, 0.3], rtol=1e-6)
     np.testing.assert_allclose(made.X_OI.p, [0.05, 0.1, 0.15], rtol=1e-6)
@@ -310,11 +311,13 @@ def test_a_mesh_in_millimetres_is_told_its_scale(tmp_path: Path) -> None:
     stl(tmp_path / "part.stl", cuboid((0.0, 0.0, 0.0), (40.0, 40.0, 80.0)))
     mesh = {"file": "part.stl"}
     with pytest.raises(InvalidInput) as caught:
-        build_scene(task({"x": {"mesh": mesh, "mass": 1, "pose": {}}}, floor=False), resolve=lambda n: tmp_path / n)
+        build_scene(
+            task({"x": {"mesh": mesh, "mass": 1, "pose": {}}}, floor=False), packages=Packages(tmp_path / "task.yaml")
+        )
     (found,) = caught.value.findings
     assert found.hint == "in millimetres? write `scale: 0.001`; else say `fixed: true`"
     scaled = task({"x": {"mesh": mesh | {"scale": 0.001}, "mass": 1, "pose": {}}}, floor=False)
-    assert max(build_scene(scaled, resolve=lambda n: tmp_path / n).body("x").size) == pytest.approx(0.08)
+    assert max(build_scene(scaled, packages=Packages(tmp_path / "task.yaml")).body("x").size) == pytest.approx(0.08)
 
 
 def test_a_mesh_that_is_absent_flat_or_no_mesh_is_refused(tmp_path: Path) -> None:
@@ -322,13 +325,15 @@ def test_a_mesh_that_is_absent_flat_or_no_mesh_is_refused(tmp_path: Path) -> Non
     (tmp_path / "part.step").write_text("")
     stl(tmp_path / "flat.stl", [[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(1, 0, 0), (1, 1, 0), (0, 1, 0)]])
     for name, words in (
-        ("none.stl", "no file"),
+        ("none.stl", "is not found"),
         ("text.stl", "cannot be used"),
         ("part.step", "must end in"),
         ("flat.stl", "cannot be used"),
     ):
         with pytest.raises(InvalidInput) as caught:
-            build_scene(task({"x": {"mesh": {"file": name}, "mass": 1, "pose": {}}}), resolve=lambda n: tmp_path / n)
+            build_scene(
+                task({"x": {"mesh": {"file": name}, "mass": 1, "pose": {}}}), packages=Packages(tmp_path / "task.yaml")
+            )
         (found,) = caught.value.findings
         assert found.code == "TASK222"
         assert words in found.message
@@ -347,14 +352,14 @@ LINK = """
 def test_a_urdf_of_one_link_is_a_body(tmp_path: Path) -> None:
     (tmp_path / "part.urdf").write_text(URDF.format(links=LINK.format(name="part")))
     part = {"urdf": {"file": "part.urdf"}, "rests_on": "floor", "at": [0, 0]}
-    made = build_scene(task({"part": part}), resolve=lambda name: tmp_path / name).body("part")
+    made = build_scene(task({"part": part}), packages=Packages(tmp_path / "task.yaml")).body("part")
     assert made.mass == 2.0
     np.testing.assert_allclose(made.size, [0.4, 0.2, 0.1], atol=1e-12)
     np.testing.assert_allclose(made.centre, [0.1, 0.0, 0.2], atol=1e-12)
     np.testing.assert_allclose(made.X_WO.p, [0, 0, -0.15], atol=1e-12)
     tensor = np.array([[0.02, 0.005, 0], [0.005, 0.03, 0], [0, 0, 0.04]])
     np.testing.assert_allclose(made.X_OI.R @ made.inertia @ made.X_OI.R.T, tensor, atol=1e-15)
-    heavy = build_scene(task({"part": part | {"mass": 4.0}}), resolve=lambda name: tmp_path / name).body("part")
+    heavy = build_scene(task({"part": part | {"mass": 4.0}}), packages=Packages(tmp_path / "task.yaml")).body("part")
     np.testing.assert_allclose(heavy.inertia, 2 * made.inertia, rtol=1e-12)
 
 
@@ -364,7 +369,7 @@ def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.urdf").write_text(URDF.format(links="<link/>"))
     for name, code in (("two.urdf", "TASK222"), ("bad.urdf", "URDF")):
         with pytest.raises(InvalidInput) as caught:
-            build_scene(task({"x": {"urdf": {"file": name}, "pose": {}}}), resolve=lambda n: tmp_path / n)
+            build_scene(task({"x": {"urdf": {"file": name}, "pose": {}}}), packages=Packages(tmp_path / "task.yaml"))
         assert caught.value.findings[0].code.startswith(code)
 
 
