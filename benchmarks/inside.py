@@ -172,7 +172,7 @@ def optimality_rows() -> list[Row]:
     limits = MotionLimits(("joint",), -unbounded, unbounded, hundred, hundred, unbounded)
     best = 2.0 * math.sqrt(1.0 / 100.0)
     straight = rest_to_rest([0.0], [1.0], limits, period=0.001).duration / best
-    along = retime(joint_path(["joint"], [[0.0], [0.5], [1.0]]), limits, period=0.001).duration / best
+    along = retime(joint_path([[0.0], [0.5], [1.0]]), limits, period=0.001).duration / best
     return [
         Row("1 rad from rest to rest / 0.2 s", (straight,), "x", 1.01, "ruckig, on ticks of 1 ms"),
         Row("1 rad along a path / 0.2 s", (along,), "x", 1.01, "toppra, on ticks of 1 ms"),

@@ -78,7 +78,6 @@ class InverseKinematics:
         link: str,
         *,
         X_LT: Transform | None = None,
-        free_axis: npt.ArrayLike | None = None,
     ) -> None:
         """
         Args:
@@ -86,7 +85,6 @@ class InverseKinematics:
             joints: names of the joints that may move (a group's); all others stay where the seed has them.
             link: the link L that carries the tool.
             X_LT: tool frame in L; identity if None.
-            free_axis: (3,) unit, in T: rotation about it does not matter (None: the whole orientation does).
         """
         robot = kinematics.robot
         self.joints = tuple(joints)
@@ -94,7 +92,6 @@ class InverseKinematics:
         self._kinematics = kinematics
         self.link = link
         self._X_LT = Transform.identity() if X_LT is None else X_LT
-        self._free_axis = None if free_axis is None else frozen(free_axis)
         self._columns = np.array(self.columns, dtype=np.intp)
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
@@ -211,7 +208,7 @@ class InverseKinematics:
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
         """Judged by forward kinematics alone."""
         X_WC = self.forward(q)
-        error, angle = self._error(X_WT, X_WC.R, X_WC.p)
+        error, angle = _pose_error(X_WT, X_WC.R, X_WC.p)
         here = q[self._columns]
         at_limit = (here <= self._lower + _AT_LIMIT) | (here >= self._upper - _AT_LIMIT)
         return Solution(
@@ -233,22 +230,16 @@ class InverseKinematics:
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
-        error, angle = self._error(X_WT, R, p)
-        J = whole[:, self._columns]
-        if self._free_axis is not None:
-            axis = R @ self._free_axis
-            J[3:] -= np.outer(axis, axis @ J[3:])
-        return error, J, angle
+        error, angle = _pose_error(X_WT, R, p)
+        return error, whole[:, self._columns], angle
 
-    def _error(self, X_WG: Transform, R_WT: Array, p_WT: Array) -> tuple[Array, float]:
-        """Pose error (6) in the world, and its angle [rad]."""
-        error = np.empty(6)
-        error[:3] = X_WG.p - p_WT
-        if self._free_axis is None:
-            error[3:] = rotation_vector(X_WG.R @ R_WT.T)
-        else:
-            error[3:] = _between(R_WT @ self._free_axis, X_WG.R @ self._free_axis)
-        return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+
+def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array) -> tuple[Array, float]:
+    """Pose error (6) in the world, and its angle [rad]."""
+    error = np.empty(6)
+    error[:3] = X_WG.p - p_WT
+    error[3:] = rotation_vector(X_WG.R @ R_WT.T)
+    return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
 
 
 def rotation_vector(R: Array) -> Array:
@@ -264,19 +255,6 @@ def rotation_vector(R: Array) -> Array:
     columns = R + np.eye(3)
     axis = columns[:, int(np.argmax(np.diag(columns)))]
     return np.asarray(axis / np.linalg.norm(axis) * angle)
-
-
-def _between(a: Array, b: Array) -> Array:
-    """The rotation vector (3,) that turns unit vector `a` into `b` on the shortest way."""
-    cross = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-    sine, cosine = float(np.linalg.norm(cross)), float(a @ b)
-    if sine > 1e-9:
-        return np.asarray(cross * (math.atan2(sine, cosine) / sine))
-    if cosine > 0.0:
-        return cross
-    aside = np.eye(3)[int(np.argmin(np.abs(a)))]
-    normal = aside - (aside @ a) * a
-    return np.asarray(normal * (math.pi / np.linalg.norm(normal)))
 
 
 def _damped_step(J: Array, error: Array, damping: float, q: Array, lower: Array, upper: Array) -> Array:

@@ -8,15 +8,15 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limits import MotionLimits
-from manipcli.plan.path import JointPath
 from manipcli.plan.retimer import retime
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.plan.verify import overshoot, verify
 
-Walk = Callable[[InverseKinematics], JointPath]
-"""The path along a line, with the joints where this solver has them."""
+Walk = Callable[[InverseKinematics], Array]
+"""The path (k, n) along a line, with the joints where this solver has them."""
 
 _TRIES: Final = 3  # of 64 random lines along limits one mends 46, three 51
 

@@ -8,7 +8,6 @@ the arm stays on one branch of its inverse kinematics.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,20 +22,15 @@ ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointPath:
-    """`waypoints` (k, n) in the order of `names`, k >= 1, rad or m. What lies between them is the retimer's choice."""
+def joint_path(waypoints: npt.ArrayLike) -> Array:
+    """A path through `waypoints` (k, n), k >= 1: (m, n), equal neighbours merged.
 
-    names: tuple[str, ...]
-    waypoints: Array
-
-
-def joint_path(names: Sequence[str], waypoints: npt.ArrayLike) -> JointPath:
-    """A path through `waypoints` (k, n); equal neighbours are merged."""
+    What lies between them is the retimer's choice.
+    """
     points = np.array(waypoints, dtype=np.float64)
     keep = np.ones(len(points), dtype=bool)
     keep[1:] = np.max(np.abs(np.diff(points, axis=0)), axis=1) > 1e-9
-    return JointPath(names=tuple(names), waypoints=frozen(points[keep]))
+    return frozen(points[keep])
 
 
 def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
@@ -61,7 +55,7 @@ def interpolate(X_WA: Transform, X_WB: Transform) -> tuple[Transform, ...]:
     return (X_WA, *between, X_WB)
 
 
-def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) -> JointPath:
+def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) -> Array:
     """The straight line of the tool from where `q` (n) has it to `X_WT`.
 
     Raises:
@@ -70,7 +64,7 @@ def linear_path(solver: InverseKinematics, q: npt.ArrayLike, X_WT: Transform) ->
     return follow_poses(solver, q, interpolate(solver.forward(q), X_WT))
 
 
-def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> JointPath:
+def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Transform]) -> Array:
     """Joint positions that take the tool through `poses`, the first of which `q` (n) already has.
 
     Args:
@@ -108,4 +102,4 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
             )
         q = found.q
         waypoints.append(q[columns])
-    return joint_path(solver.joints, waypoints)
+    return joint_path(waypoints)

@@ -17,24 +17,16 @@ from manipcli.plan.sampling import on_ticks, refuse_endless
 from manipcli.plan.trajectory import JointTrajectory
 
 
-def rest_to_rest(
-    start: npt.ArrayLike,
-    goal: npt.ArrayLike,
-    limits: MotionLimits,
-    *,
-    period: float,
-    duration: float | None = None,
-) -> JointTrajectory:
+def rest_to_rest(start: npt.ArrayLike, goal: npt.ArrayLike, limits: MotionLimits, *, period: float) -> JointTrajectory:
     """The fastest straight move from `start` to `goal` (n) within `limits`, one point a control tick.
 
     Args:
         start, goal: (n) in the order of `limits.names`, rad or m.
         limits: velocity, acceleration, and jerk where finite.
         period: control period [s].
-        duration: slow down to this [s], if given.
 
     Raises:
-        NotPlannable: `duration` is too short, the limits make it too long, or a position is not finite.
+        NotPlannable: the limits make it too long, or a position is not finite.
     """
     import ruckig
 
@@ -45,8 +37,7 @@ def rest_to_rest(
     delta = q1 - q0
     moving = np.abs(delta) > 1e-12
     if not moving.any():
-        return on_ticks(lambda t: _line(q0, delta, np.zeros((len(t), 3))), 0.0, target=q1, limits=limits,
-                        period=period, duration=duration)  # fmt: skip
+        return on_ticks(lambda t: _line(q0, delta, np.zeros((len(t), 3))), 0.0, target=q1, limits=limits, period=period)
 
     def bound(limit: Array) -> float:
         return float(np.min(limit[moving] / np.abs(delta[moving])))
@@ -65,7 +56,7 @@ def rest_to_rest(
     def curve(times: Array) -> tuple[Array, Array, Array]:
         return _line(q0, delta, np.array([profile.at_time(t) for t in times.tolist()]).reshape(-1, 3))
 
-    return on_ticks(curve, profile.duration, target=q1, limits=limits, period=period, duration=duration)
+    return on_ticks(curve, profile.duration, target=q1, limits=limits, period=period)
 
 
 def _line(q0: Array, delta: Array, s: Array) -> tuple[Array, Array, Array]:

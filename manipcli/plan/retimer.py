@@ -22,7 +22,6 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.limits import MotionLimits
-from manipcli.plan.path import JointPath
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import on_ticks, refuse_endless
 from manipcli.plan.trajectory import JointTrajectory
@@ -33,22 +32,19 @@ _WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero 
 _ROUNDING = 1e-9
 
 
-def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: float | None = None) -> JointTrajectory:
-    """The fastest motion along `path` within `limits`, one point a control tick, at rest at both ends.
+def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajectory:
+    """The fastest motion along a path within `limits`, one point a control tick, at rest at both ends.
 
     Args:
-        path: one waypoint is a rest; two are a straight line, which `rest_to_rest` times exactly.
+        points: (k, n) on the path; one is a rest, two are a straight line, which `rest_to_rest` times exactly.
         limits: of the path's joints, in its order.
         period: control period [s].
-        duration: slow down to this [s], if given.
 
     Raises:
-        NotPlannable: no timing exists (the path is not smooth enough), `duration` is too short, or the limits make it
-            too long.
+        NotPlannable: no timing exists (the path is not smooth enough), or the limits make it too long.
     """
-    points = path.waypoints
     if len(points) <= 2:
-        return rest_to_rest(points[0], points[-1], limits, period=period, duration=duration)
+        return rest_to_rest(points[0], points[-1], limits, period=period)
     refuse_endless(points, limits)  # where TOPP-RA may find no timing, for rounding
     toppra = library()
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -66,22 +62,20 @@ def retime(path: JointPath, limits: MotionLimits, *, period: float, duration: fl
         raise NotPlannable("the path has no timing within the velocity and acceleration limits: it is not smooth")
     optimal, nominal = _progress(grid, speeds)
 
-    def sampled(progress: Progress, length: float, wished: float | None) -> JointTrajectory:
+    def sampled(progress: Progress, length: float) -> JointTrajectory:
         def curve(times: Array) -> tuple[Array, Array, Array]:
             s, ds, dds = progress(times)
             first, second = spline(s, 1), spline(s, 2)
             return spline(s), first * ds[:, None], second * (ds * ds)[:, None] + first * dds[:, None]
 
-        return on_ticks(curve, length, target=points[-1], limits=limits, period=period, duration=wished)
+        return on_ticks(curve, length, target=points[-1], limits=limits, period=period)
 
     if not np.isfinite(limits.jerk).any():
-        return sampled(optimal, nominal, duration)
+        return sampled(optimal, nominal)
     window = float(np.max(limits.acceleration / limits.jerk))
     refuse_endless(points, limits, nominal + max(_WINDOWS) * window)
-    smooth = [_averaged(optimal, nominal, factor * window, period) for factor in _WINDOWS]
-    motions = [sampled(progress, length, None) for progress, length in smooth]
-    best = min(range(len(motions)), key=lambda k: motions[k].duration)
-    return motions[best] if duration is None else sampled(*smooth[best], duration)
+    smooth = (sampled(*_averaged(optimal, nominal, factor * window, period)) for factor in _WINDOWS)
+    return min(smooth, key=lambda motion: motion.duration)
 
 
 Progress = Callable[[Array], tuple[Array, Array, Array]]

@@ -70,7 +70,6 @@ def on_ticks(
     target: Array,
     limits: MotionLimits,
     period: float,
-    duration: float | None,
 ) -> JointTrajectory:
     """Sample `curve` over [0, nominal] at every multiple of `period`, stretched to end on a tick, at rest on `target`.
 
@@ -83,18 +82,16 @@ def on_ticks(
         target: (n) position at its end, taken over exactly.
         limits: what the samples must keep.
         period: control period [s].
-        duration: wished duration [s]; the motion is slowed down to it.
 
     Raises:
-        NotPlannable: `duration` is shorter than the limits allow, or they make the motion longer than `LONGEST`.
+        NotPlannable: the limits make the motion longer than `LONGEST`.
     """
-    wished = 1 if duration is None else _ticks(duration, period)
     stretch = 1.0
     path = curve(np.linspace(0.0, nominal, 100))[0]
     for _ in range(_ROUNDS):
         refuse_endless(path, limits, nominal * stretch)
-        least = max(1, _ticks(nominal * stretch, period))
-        ticks = max(least, wished)
+        # The first tick not before the end, forgiving a millionth of a period of rounding.
+        ticks = max(1, math.ceil(nominal * stretch / period - 1e-6))
         times = np.arange(ticks + 1) * period
         scale = nominal / times[-1]
         q, v, a = curve(np.minimum(times * scale, nominal))
@@ -104,16 +101,6 @@ def on_ticks(
         if over <= 1.0 + 1e-9:
             break
         stretch = over * (1.0 + 1e-9) / scale
-    if duration is not None and least > wished:
-        raise NotPlannable(
-            f"the motion takes at least {least * period:.3f} s within its limits; {duration:.3f} s are asked for",
-            hint="ask for a longer duration, or raise the velocity and acceleration limits",
-        )
     return JointTrajectory.of_arrays(
         names=limits.names, times=frozen(times), positions=frozen(q), velocities=frozen(v), accelerations=frozen(a)
     )
-
-
-def _ticks(time: float, period: float) -> int:
-    """The first tick not before `time`, forgiving a millionth of a period of rounding."""
-    return math.ceil(time / period - 1e-6)

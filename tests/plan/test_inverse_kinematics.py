@@ -99,18 +99,6 @@ def test_limits_that_hold_the_arm_back_are_named(make_arm7: Callable[..., RobotM
         solver.solve(solver.forward(past), middle, np.random.default_rng(0))
 
 
-def test_a_free_axis_frees_the_rotation_about_it_alone(make_arm7: Callable[..., RobotModel], middle: Array) -> None:
-    solver = InverseKinematics(Kinematics(make_arm7()), ARM, "link_7", X_LT=X_LT, free_axis=(0.0, 0.0, 1.0))
-    goal = solver.forward(middle)
-    turned = goal @ Transform.of(xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 1.5))
-    q = solver.solve(turned, middle, np.random.default_rng(0))
-    np.testing.assert_allclose(q, middle, atol=1e-9)
-    tilted = turned @ Transform.of(rpy=(0.3, 0.0, 0.0))
-    reached = solver.forward(solver.solve(tilted, middle, np.random.default_rng(0)))
-    np.testing.assert_allclose(reached.R[:, 2], tilted.R[:, 2], atol=2 * ANGLE_TOLERANCE)
-    np.testing.assert_allclose(reached.p, tilted.p, atol=POSITION_TOLERANCE)
-
-
 def test_refused_solutions_are_passed_over_and_named_when_all_are(solver: InverseKinematics, middle: Array) -> None:
     goal = solver.forward(middle)
     other = solver.solve(goal, middle, np.random.default_rng(0), refuse=lambda q: "elbow up" if q[3] < 0.0 else None)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import timed_line
-from manipcli.plan.path import JointPath, joint_path, linear_path
+from manipcli.plan.path import joint_path, linear_path
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 
@@ -64,10 +64,10 @@ def test_a_line_for_which_a_joint_is_missing_tells_the_limit(make_arm7: Callable
     limits = MotionLimits.of(robot, solver.joints)
     corner = np.array([[0.8, 0.2], [1.4, 0.2], [2.0, 0.2], [1.4, 0.8]])
 
-    def walk(within: InverseKinematics) -> JointPath:
+    def walk(within: InverseKinematics) -> Array:
         if within is not solver:
             raise NotPlannable("the straight line ends here")
-        return joint_path(solver.joints, corner)
+        return joint_path(corner)
 
     with pytest.raises(NotPlannable, match=r"joint 'joint_6' goes to 2\.\d+ rad .* beyond its upper limit 2\."):
         timed_line(walk, solver, limits, period=1e-3, insist=True)

@@ -80,5 +80,5 @@ def test_a_jump_between_two_poses_is_refused_with_its_joint(solver: InverseKinem
 
 
 def test_a_joint_path_merges_equal_neighbours() -> None:
-    path = joint_path(("a",), [[0.0], [0.0], [1.0], [1.0], [0.0]])
-    np.testing.assert_array_equal(path.waypoints, [[0.0], [1.0], [0.0]])
+    path = joint_path([[0.0], [0.0], [1.0], [1.0], [0.0]])
+    np.testing.assert_array_equal(path, [[0.0], [1.0], [0.0]])

@@ -73,14 +73,6 @@ def test_velocity_and_acceleration_are_the_derivatives_of_position() -> None:
     np.testing.assert_allclose((v[2:] - v[:-2]) / (2 * PERIOD), a[1:-1], atol=100.0 * PERIOD)
 
 
-def test_wished_duration_is_kept_and_a_too_short_one_refused() -> None:
-    motion = rest_to_rest([0.0], [1.0], limits(2.0, 10.0), period=PERIOD, duration=3.0)
-    assert motion.duration == pytest.approx(3.0)
-    verify(motion, limits(2.0, 10.0))
-    with pytest.raises(NotPlannable, match=r"at least 0\.700 s"):
-        rest_to_rest([0.0], [1.0], limits(2.0, 10.0), period=PERIOD, duration=0.5)
-
-
 def test_without_motion_it_holds_for_one_period() -> None:
     motion = rest_to_rest([0.3], [0.3], limits(1.0, 1.0), period=PERIOD)
     np.testing.assert_array_equal(motion.positions, [[0.3], [0.3]])

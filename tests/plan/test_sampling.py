@@ -31,7 +31,7 @@ def limits(**of_b: float) -> MotionLimits:
 @pytest.mark.parametrize("value", [1e-9, 1e-300])
 def test_the_joint_that_makes_it_endless_is_named(points: Any, word: str, value: float) -> None:
     with pytest.raises(NotPlannable, match=f"with the {word} limit of joint 'b' the motion takes more than 600 s"):
-        retime(joint_path(JOINTS, points), limits(**{word: value}), period=1e-3)
+        retime(joint_path(points), limits(**{word: value}), period=1e-3)
 
 
 def test_what_takes_a_little_less_is_planned() -> None:
