@@ -158,7 +158,7 @@ def ticks_between(update_rate: float, period: float) -> int:
     if not 0.0 < update_rate < math.inf:
         raise InvalidArgument("CTRL163", f"an update rate of {update_rate:g} Hz; expected one above 0")
     every = 1.0 / (update_rate * period)
-    if every < 1.0 - 1e-9 or abs(every - round(every)) > 1e-6 * every:
+    if abs(every - max(1, round(every))) > 1e-5 * every:  # six digits of a rate do, as those of the hint
         message = f"an update rate of {update_rate:g} Hz does not divide the control rate of {1.0 / period:g} Hz"
         raise InvalidArgument("CTRL163", message, hint=f"say {1.0 / (period * max(1, round(every))):g} Hz")
     return round(every)

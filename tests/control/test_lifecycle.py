@@ -236,6 +236,14 @@ def test_an_update_rate_that_does_not_divide_the_control_rate_is_an_error_and_no
         ControllerManager(joints=JOINTS, period=PERIOD).load(Spring("one"), update_rate=rate)
 
 
+@pytest.mark.parametrize(("rate", "period", "ticks"), [(170.0, 0.001, 6), (900.0, 0.00166667, 1), (44.0, 0.001, 23)])
+def test_the_rate_that_the_hint_names_is_taken(rate, period, ticks):
+    with pytest.raises(InvalidArgument) as refused:
+        ticks_between(rate, period)
+    hint = refused.value.findings[0].hint
+    assert ticks_between(float(hint.removeprefix("say ").removesuffix(" Hz")), period) == ticks
+
+
 @pytest.mark.parametrize("wrong", [0.0, -5.0, math.nan, math.inf])
 def test_a_rate_or_period_that_is_not_above_zero_is_refused(wrong):
     with pytest.raises(InvalidArgument, match="expected one above 0"):
