@@ -46,10 +46,9 @@ class Actuation:
     Args:
         robot: the robot.
         period: of the control tick [s].
-        modes: (n) what each joint obeys, as in `select`; by default "effort", all of them.
     """
 
-    def __init__(self, robot: RobotModel, period: float, modes: Sequence[str | None] | None = None) -> None:
+    def __init__(self, robot: RobotModel, period: float) -> None:
         self._robot = robot
         self._period = period
         self.drivetrain = Drivetrain.of(robot)
@@ -94,7 +93,7 @@ class Actuation:
         self._most, self._least, self._wanted, self._given, self._friction = np.zeros((5, a))
         self._fast = np.zeros(a, dtype=np.bool_)
         self._applied, self._passed = np.zeros((2, n))
-        self.select(["effort"] * n if modes is None else modes)
+        self.select(["effort"] * len(robot.joint_names))
 
     def select(self, modes: Sequence[str | None]) -> None:
         """From now on each joint (n) obeys this; of anything but "effort" the entries of a command pass as they are."""
@@ -229,10 +228,6 @@ class Actuation:
         T[:, list(self.drivetrain.joints)] = self.drivetrain.transmission.maps.actuator_motion
         m = np.abs(T @ np.linalg.solve(M, T.T)).sum(axis=1) * self._period
         return np.concatenate((STIFFNESS / m, self._viscous / (1.0 + self._viscous * m)))
-
-    def motor_effort_limits(self) -> Array:
-        """(n) those of its robot; see the function of this name."""
-        return motor_effort_limits(self._robot)
 
 
 def motor_effort_limits(robot: RobotModel) -> Array:

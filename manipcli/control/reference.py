@@ -99,11 +99,6 @@ class Reference:
         """[s] of the course at `time`."""
         return self._before + (time - self._since) * self.speed
 
-    @property
-    def period(self) -> float:
-        """[s] between two ticks; 0 where nothing moves."""
-        return self._dt if self.moving else 0.0
-
     def rescale(self, speed: float, *, time: float) -> None:
         """From `time` on the clock runs so fast; the samples made beforehand are of no use any more."""
         if self.moving and self.scales and speed != self.speed:

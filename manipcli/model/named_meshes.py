@@ -19,7 +19,6 @@ from manipcli.model.urdf_numbers import finite
 class NamedMesh:
     """A <mesh> of a description: `path` is None where its file is not found, `fault` why it cannot be used."""
 
-    link: str
     role: Literal["visual", "collision"]
     element: Element
     uri: str
@@ -51,7 +50,7 @@ def named_meshes(subject: Subject) -> Iterator[NamedMesh]:
                 except NotFound:
                     path = None
                 role: Literal["visual", "collision"] = "visual" if geometry.tag == "visual" else "collision"
-                yield NamedMesh(link.attributes.get("name", ""), role, element, uri, _scale(element), path)
+                yield NamedMesh(role, element, uri, _scale(element), path)
 
 
 def _scale(element: Element) -> tuple[float, float, float]:

@@ -69,7 +69,7 @@ def _group(
         message = f"group '{name}': no joint moves between '{spec.chain.base}' and '{spec.chain.tip}'"
         reporter.error("ROBOT311", message, ("groups", name, "chain"))
         return None
-    return Group(name=name, joints=names, base=spec.chain.base, tip=spec.tip or spec.chain.tip)
+    return Group(name=name, joints=names, tip=spec.tip or spec.chain.tip)
 
 
 def _listed(
@@ -95,7 +95,7 @@ def _listed(
             message = f"group '{name}': joint '{joint}' is listed twice"
         hint = did_you_mean(joint, usable) if known is None else None
         reporter.error("ROBOT312", message, ("groups", name, "joints", k), hint=hint)
-    return Group(name=name, joints=tuple(listed), base=None, tip=tip) if good else None
+    return Group(name=name, joints=tuple(listed), tip=tip) if good else None
 
 
 def build_poses(

@@ -205,7 +205,6 @@ class Group:
 
     name: str
     joints: tuple[str, ...]
-    base: str | None = None
     tip: str | None = None
 
 

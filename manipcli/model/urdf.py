@@ -25,7 +25,7 @@ from manipcli.model.urdf_numbers import Reader
 class Parts:
     """What a description consists of. `root` is '' and the rest is what could be read, where there are errors.
 
-    `findings`: errors and warnings, in the order of the file. `places`: where each ("link" | "joint", name) is written.
+    `findings`: errors and warnings, in the order of the file.
     """
 
     name: str
@@ -33,7 +33,6 @@ class Parts:
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     transmissions: tuple[TransmissionTag, ...]
-    places: Mapping[tuple[str, str], Place]
     findings: tuple[Finding, ...]
 
     @property
@@ -75,7 +74,6 @@ def read_parts(description: Description) -> Parts:
         links=tuple(links[link] for link in order if link in links),
         joints=ordered,
         transmissions=transmissions,
-        places=places,
         findings=(*description.findings, *reader.findings),
     )
 

@@ -118,7 +118,7 @@ class _Walk:
         self, message: Message, way: tuple[Part, ...]
     ) -> tuple[list[_Found], list[str], dict[str, tuple[str, ...]]]:
         """The wanted numbers, and the texts and lists of texts that may name elements."""
-        self._count(1)
+        self._count()
         found: list[_Found] = []
         texts: list[str] = []
         lists: dict[str, tuple[str, ...]] = {}
@@ -232,7 +232,7 @@ class _Walk:
 
     def _text(self, *, keep: bool) -> str:
         """The length decides where things stand; the letters only where they may name something."""
-        self._count(1)
+        self._count()
         size = self._reader.u32()
         start = self._reader.skip(size, 1)
         keep = keep and size <= MAX_NAME
@@ -242,8 +242,8 @@ class _Walk:
     def _guard(self, start: int, end: int) -> None:
         self.guards.extend(range(start, end))
 
-    def _count(self, steps: int) -> None:
-        self.steps += steps
+    def _count(self) -> None:
+        self.steps += 1
         if self.steps > MAX_STEPS:
             raise CdrError("has too many parts to be looked through")
 

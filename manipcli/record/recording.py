@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from manipcli.core.geometry import Array
 from manipcli.model.state import Contact, WorldState
 
@@ -68,16 +66,6 @@ class Span:
     states: WorldState
     controllers: tuple[ControllerTrace, ...]
     contacts: tuple[ContactSnapshot, ...]
-
-    def since(self, time: float) -> Span:
-        """The ticks from `time` [s] on, and the contacts that hold on them."""
-        first = int(np.searchsorted(self.states.time, time))
-        valid = [k for k, snapshot in enumerate(self.contacts) if snapshot.time <= time]
-        return Span(
-            states=self.states.map(lambda a: a[first:]),
-            controllers=tuple(trace.map(lambda a: a[first:]) for trace in self.controllers),
-            contacts=self.contacts[valid[-1] if valid else 0 :],
-        )
 
 
 EMBEDDED = "embedded_meshes"

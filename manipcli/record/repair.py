@@ -52,7 +52,7 @@ class Repaired:
     Attributes:
         path, output: the file, and the clean one.
         start, end: [s] log time of the first and the last message that was kept; None where there is none.
-        messages, chunks, attachments: kept.
+        messages, attachments: kept.
         messages_lost: None where nobody knows how many there were.
         losses: what was lost, in the order of the file; empty where nothing is.
     """
@@ -62,7 +62,6 @@ class Repaired:
     start: float | None
     end: float | None
     messages: int
-    chunks: int
     attachments: tuple[str, ...]
     messages_lost: int | None
     losses: tuple[Loss, ...]
@@ -142,7 +141,6 @@ class _Copy:
     _open: list[str] = field(default_factory=list)
     _start: int | None = None
     _end: int | None = None
-    _chunks: int = 0
     _messages: int = 0
 
     def take(self, piece: object) -> None:
@@ -200,7 +198,6 @@ class _Copy:
         self.container.chunk(content)
         self._start = content.start_ns if self._start is None else min(self._start, content.start_ns)
         self._end = content.end_ns if self._end is None else max(self._end, content.end_ns)
-        self._chunks += 1
         self._messages += sum(len(index) for index in content.indexes.values())
 
     def _settle(self, next_ns: int | None) -> None:
@@ -232,7 +229,6 @@ class _Copy:
             start=None if self._start is None else self._start / 1e9,
             end=None if self._end is None else self._end / 1e9,
             messages=self._messages,
-            chunks=self._chunks,
             attachments=tuple(self._attachments),
             messages_lost=lost,
             losses=tuple(self._losses),

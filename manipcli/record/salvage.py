@@ -77,11 +77,6 @@ class OpenChunk:
         """Log time of its first message."""
         return min(int(places.times.min()) for places in self.places.values())
 
-    @property
-    def end_ns(self) -> int:
-        """Log time of its last message."""
-        return max(int(places.times.max()) for places in self.places.values())
-
 
 @dataclass(frozen=True, slots=True)
 class Damage:

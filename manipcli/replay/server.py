@@ -97,9 +97,9 @@ class LocalServer:
             with _silent():
                 self.viser.stop()
 
-    def wait(self, until: threading.Event | None = None) -> None:
-        """Return when `until` is set; a KeyboardInterrupt gets through."""
-        (until or threading.Event()).wait()
+    def wait(self) -> None:
+        """Never returns; a KeyboardInterrupt gets through."""
+        threading.Event().wait()
 
 
 @contextmanager

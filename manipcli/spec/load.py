@@ -7,7 +7,7 @@ import os
 import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import any_of, escape, listed, nearest_file
@@ -25,8 +25,6 @@ from manipcli.spec.salvage_robot import salvage_robot
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.yaml import MAX_BYTES, parse
-
-M = TypeVar("M", bound=Model)
 
 FileKind = Literal["task", "robot", "controllers"]
 _NONE = "expected the mapping of a task, robot or controllers file"
@@ -62,12 +60,6 @@ def sibling(path: Path) -> str | None:
         return f"the folder '{path.parent}' is not there either"
     close = nearest_file(path.name, names)
     return f"did you mean {any_of(close)}?" if close else f"beside it: {listed(names)}" if names else None
-
-
-def load(path: Path, model: type[M], area: Area) -> Located[M]:
-    """A file of any model, without parameters and overrides."""
-    source, told = _source(read_bytes(path), str(path), area)
-    return validate(source, model, findings=told)
 
 
 def kind_of(path: Path, *, sure: bool = False) -> FileKind:

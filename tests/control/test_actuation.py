@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.control.actuation import STIFFNESS, Actuation
+from manipcli.control.actuation import STIFFNESS, Actuation, motor_effort_limits
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Actuator, Inertial, Joint, JointLimits, Link, RobotModel, TransmissionTag
@@ -162,7 +162,8 @@ def test_a_load_below_the_friction_makes_a_joint_creep_and_no_more() -> None:
 
 def test_what_is_commanded_otherwise_is_left_alone() -> None:
     """Case 13: a quantity that only one side has stays as it was, at 13.37."""
-    actuation = Actuation(robot(*motors(effort=1.0)), PERIOD, ["effort", "position", None])
+    actuation = Actuation(robot(*motors(effort=1.0)), PERIOD)
+    actuation.select(["effort", "position", None])
     np.testing.assert_allclose(actuation.apply(np.full(3, 13.37), ZERO, ZERO), (10.0, 13.37, 13.37))
     assert actuation.saturations.tolist() == [1, 0, 0]
     actuation.select(["velocity", "effort", "effort"])
@@ -170,7 +171,8 @@ def test_what_is_commanded_otherwise_is_left_alone() -> None:
 
 
 def test_of_a_pair_both_joints_are_commanded_by_effort_or_none_goes_through_its_actuators() -> None:
-    actuation = Actuation(robot(*motors(effort=0.1), pair=True), PERIOD, ["position", "effort", "position"])
+    actuation = Actuation(robot(*motors(effort=0.1), pair=True), PERIOD)
+    actuation.select(["position", "effort", "position"])
     command = np.array([5.0, 40.0, 5.0])
     np.testing.assert_allclose(actuation.apply(command, ZERO, ZERO), command)
 
@@ -183,18 +185,18 @@ def test_a_joint_without_a_transmission_keeps_its_effort() -> None:
 def test_motors_of_an_engine_are_capped_by_actuator_and_joint() -> None:
     """n (efficiency limit - c), and no more than the joint bears; without limits that of the joint."""
     limited = robot(Actuator("m0", effort=2.0, efficiency=0.9, coulomb_friction=0.1), Actuator("m1", effort=50.0))
-    np.testing.assert_allclose(Actuation(limited, PERIOD).motor_effort_limits(), (17.0, 100.0, 100.0))
+    np.testing.assert_allclose(motor_effort_limits(limited), (17.0, 100.0, 100.0))
     free = dataclasses.replace(
         limited, joints=tuple(dataclasses.replace(joint, limits=JointLimits()) for joint in limited.joints)
     )
-    np.testing.assert_allclose(Actuation(free, PERIOD).motor_effort_limits(), (17.0, 500.0, np.inf))
+    np.testing.assert_allclose(motor_effort_limits(free), (17.0, 500.0, np.inf))
 
 
 def test_what_an_engine_may_apply_to_a_pair_is_within_both_actuators() -> None:
     """In every corner of the box, and in one of them an actuator is at its limit."""
     model = robot(Actuator("m1", effort=1.0), Actuator("m2", effort=0.5), pair=True)
     actuation = Actuation(model, PERIOD)
-    caps = actuation.motor_effort_limits()
+    caps = motor_effort_limits(model)
     corners = np.array([(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]) * caps[1:]
     efforts = actuation.drivetrain.transmission.blocks[1].joint_to_actuator("effort", corners)
     use: Array = np.abs(efforts).max(axis=0) / (1.0, 0.5)

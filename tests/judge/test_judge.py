@@ -412,15 +412,6 @@ def _ticks(made: Recording, start: int, end: int) -> Span:
     )
 
 
-def test_a_span_since_a_moment_keeps_the_contacts_that_hold_then() -> None:
-    span = _ticks(touches((0.2, "a", "b", 1.0), (0.5, "a", "b", 2.0), (0.8, "a", "b", 3.0)), 0, T)
-    cut = span.since(0.6)
-    assert cut.states.time[0] == pytest.approx(0.6)
-    assert len(cut.controllers[0].times) == len(cut.states.time)
-    assert [snapshot.contacts[0].force for snapshot in cut.contacts] == [2.0, 3.0]
-    assert [snapshot.time for snapshot in span.since(0.1).contacts] == [0.2, 0.5, 0.8]
-
-
 def test_spans_are_gone_through_once_whatever_is_asked() -> None:
     """A file of an hour is read once."""
 

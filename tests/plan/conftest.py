@@ -74,7 +74,7 @@ def arm7(*, velocity: float = 2.0, acceleration: float = 10.0, jerk: float | Non
         root="base",
         links=tuple(links),
         joints=tuple(joints),
-        groups=(Group("arm", ARM, base="base", tip="link_7"),),
+        groups=(Group("arm", ARM, tip="link_7"),),
         poses=(),
         transmissions=(),
         X_WB=Transform.identity(),
