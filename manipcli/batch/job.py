@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 from manipcli.core.errors import Finding, Place
+from manipcli.report.markup import link
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Case, Trouble
 
@@ -93,7 +92,7 @@ class Job:
         """The link from its page to the one that leads to all; "" where no pages are written."""
         if self.page is None or self.settings.pages is None:
             return ""
-        return quote(os.path.relpath(self.settings.pages / "index.html", self.page.parent))
+        return link(self.settings.pages / "index.html", self.page.parent)
 
     @property
     def nominal(self) -> bool:

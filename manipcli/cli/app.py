@@ -182,6 +182,12 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
         return ExitCode.INTERNAL, (Finding(code="INT001", message=message),)
     if isinstance(error, OSError) and error.filename is not None:
         return ExitCode.USAGE, (Finding(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
+    if isinstance(error, FileNotFoundError):  # of no name: that of the working folder was asked for
+        finding = Finding("USE004", "the working folder has been removed", hint="enter it again, or another one")
+        return ExitCode.USAGE, (finding,)
+    if isinstance(error, UnicodeEncodeError) and error.encoding == sys.getfilesystemencoding() != "utf-8":
+        message = f"no file can be called '{error.object}': this locale knows {error.encoding} only"
+        return ExitCode.USAGE, (Finding("USE005", message, hint="set LC_ALL=C.UTF-8"),)
     finding = Finding(
         code=ManipcliError.code,
         message=f"{type(error).__name__}: {error}".replace("\n", " "),

@@ -107,7 +107,7 @@ def _files(folder: Path) -> dict[Path, bytes]:
     from manipcli import pipeline
     from manipcli.report.json import dumps
 
-    name = (Path(os.path.realpath(folder)).name or "tasks").encode()
+    name = (Path(os.path.realpath(folder)).name or "tasks").encode("utf-8", "replace")
     files = {
         folder / path: (TEMPLATES / template).read_bytes().replace(b"PROJECT", name) for path, template in FILES.items()
     }

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.core.text import did_you_mean, listed, shorten
+from manipcli.core.text import did_you_mean, escape, listed, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
 from manipcli.judge.steps import step_outcomes
 from manipcli.record.cdr import CdrError, CdrReader
@@ -51,7 +51,7 @@ def open_chart(
     Raises:
         InvalidInput: a log cannot be read, a field is not there, or there is nothing to show.
     """
-    opened = [_Log(path, name) for path, name in zip(logs, _short_names(logs), strict=True)]
+    opened = [_Log(path, name) for path, name in zip(logs, map(escape, _short_names(logs)), strict=True)]
     first, last = _time(start, opened, begin=True), _time(end, opened, begin=False)
     if first >= last:
         raise InvalidInput([Finding("PLOT003", f"nothing lies between --from {start} and --to {end}")])

@@ -6,10 +6,9 @@ import base64
 import os
 from importlib.resources import files
 from pathlib import Path
-from urllib.parse import quote
 
 from manipcli.replay.player import POLICY
-from manipcli.report.markup import Markup, document, element
+from manipcli.report.markup import Markup, document, element, link
 from manipcli.report.suite import CaseReport
 from manipcli.report.suite_text import beforehand
 
@@ -32,7 +31,7 @@ def render_case_page(report: CaseReport, folder: Path, *, index: str = "") -> st
         element("p", element("span", str(one.place), class_="place") if one.place else None, " ", one.message)
         for one in report.troubles
     ]
-    log = element("a", report.log, href=quote(os.path.relpath(report.log, folder))) if report.log is not None else None
+    log = element("a", report.log, href=link(report.log, folder)) if report.log is not None else None
     why = element(
         "section",
         *(causes or [element("p", report.text)]),

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import html
+import os
+from pathlib import Path
+from urllib.parse import quote
 
 from manipcli.core.text import escape
 
@@ -57,6 +60,11 @@ def element(name: str, *children: str | None, **attributes: Attribute) -> Markup
 def joined(*parts: str | None) -> Markup:
     """Parts behind each other; what is no `Markup` is escaped."""
     return Markup("".join(part if isinstance(part, Markup) else html.escape(escape(part)) for part in parts if part))
+
+
+def link(target: Path | str, folder: Path) -> str:
+    """The address of a file as seen from a page in `folder`; of a name that is no text its bytes."""
+    return quote(os.path.relpath(target, folder), errors="surrogateescape")
 
 
 def _text(value: str | float) -> str:

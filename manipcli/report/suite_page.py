@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from importlib.resources import files
 from pathlib import Path
-from urllib.parse import quote
 
 from manipcli.replay.player import POLICY
 from manipcli.report.html_parts import mark, table
-from manipcli.report.markup import Markup, document, element
+from manipcli.report.markup import Markup, document, element, link
 from manipcli.report.suite import CaseReport, Suite
 from manipcli.report.suite_text import beforehand, gist, render_summary
 
@@ -46,7 +44,7 @@ def render_page(suite: Suite, folder: Path) -> str:
 def _row(report: CaseReport, folder: Path) -> tuple[str, ...]:
     name: str = report.case.file
     if report.page is not None:
-        name = element("a", name, href=quote(os.path.relpath(report.page, folder)))
+        name = element("a", name, href=link(report.page, folder))
     others = [] if report.page is not None else [trouble.message for trouble in report.troubles[1:]]
     more = [] if report.passed else [*others, *beforehand(report, whole=True), element("code", report.command)]
     return (

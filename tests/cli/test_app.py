@@ -88,6 +88,7 @@ ERRORS = [
     (KeyboardInterrupt(), 2, "error"),
     (PermissionError(13, "Permission denied", "/nowhere/x.mcap"), 4, "error"),
     (OSError(28, "No space left on device"), 3, "error"),
+    (FileNotFoundError(2, "No such file or directory"), 4, "error"),
     (ZeroDivisionError("division\nby zero"), 3, "error"),
 ]
 
@@ -287,6 +288,31 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     script = f"set -o pipefail; {sys.executable} -m manipcli --version | true"
     done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_working_folder_that_was_removed_is_told(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    script = f"mkdir '{gone}' && cd '{gone}' && rmdir '{gone}' && {sys.executable} -m manipcli test"
+    done = subprocess.run(
+        ["bash", "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert done.returncode == 4
+    assert done.stderr.startswith("error[USE004]: the working folder has been removed\n")
+
+
+def test_a_name_that_the_locale_cannot_write_is_told(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As with `LC_ALL=C PYTHONUTF8=0`: the name of the log comes from a file that is UTF-8 all the same."""
+    monkeypatch.setattr(sys, "getfilesystemencoding", lambda: "ascii")
+    pipeline.run_task = _raising(UnicodeEncodeError("ascii", "t\xe4.mcap", 1, 2, "ordinal not in range(128)"))
+    assert main(["run", "t.yaml"]) == 4
+    told = "error[USE005]: no file can be called 't\xe4.mcap': this locale knows ascii only\n"
+    assert capsys.readouterr().err.startswith(told)
 
 
 def test_a_full_disk_is_told_and_not_passed_over() -> None:

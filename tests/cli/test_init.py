@@ -63,6 +63,12 @@ def test_nothing_is_replaced_unless_that_is_wanted(project: Path, capsys: pytest
     assert capsys.readouterr().err == "next: manipcli test\n"
 
 
+def test_a_folder_whose_name_is_no_text_is_a_project_all_the_same(tmp_path: Path) -> None:
+    folder = tmp_path / "Gr\udcf6\udcdfe"  # bytes of Latin-1, as Python says them
+    assert main(["init", str(folder)]) == 0
+    assert (folder / "README.md").read_text("utf-8").startswith("# Gr??e\n")
+
+
 @pytest.mark.parametrize(
     ("there", "words", "told"),
     [

@@ -59,6 +59,13 @@ def test_a_figure_goes_to_a_file(log: Path, tmp_path: Path, capsys: pytest.Captu
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.slow
+def test_a_log_whose_name_is_no_text_is_drawn(log: Path, tmp_path: Path) -> None:
+    odd = tmp_path / "p\udcf6.mcap"
+    odd.write_bytes(log.read_bytes())
+    assert main(["plot", str(odd), "-o", str(tmp_path / "a.svg")]) == 0
+
+
 def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cut = tmp_path / "other.mcap.partial"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size * 4 // 5])

@@ -283,6 +283,12 @@ def test_the_page_leads_to_the_others_and_escapes_what_it_shows(tmp_path: Path) 
     assert not re.findall(r'(?:src|href)="(?!data:|sub/|#)', page)
 
 
+def test_the_page_leads_to_a_file_whose_name_is_no_text(tmp_path: Path) -> None:
+    odd = replace(CRASHED, page=str(tmp_path / "p\udcf6.html"), log=str(tmp_path / "p\udcf6.mcap"))
+    assert 'href="p%F6.html"' in render_page(Suite((odd,), 1, 1, 9.0), tmp_path)
+    assert 'href="p%F6.mcap"' in render_case_page(odd, tmp_path)
+
+
 def test_findings_become_troubles_with_places_and_hints() -> None:
     place = Place("a.yaml", 2, 3)
     assert troubles_of([Finding("TASK203", "no joint 'x'", place, hint="did you mean 'y'?")]) == (
