@@ -24,7 +24,8 @@ def relative_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
     Returns:
         Positions (T, n, 3) [m] and unit quaternions (T, n, 4) xyzw.
     """
-    return _terms(robot).relative(q)
+    terms = _terms(robot)
+    return terms.poses(q, *terms.parent)
 
 
 def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
@@ -38,7 +39,7 @@ def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
         Positions (T, n, 3) [m] and unit quaternions (T, n, 4) xyzw.
     """
     terms = _terms(robot)
-    p, quat = terms.relative_to_last(q)
+    p, quat = terms.poses(q, *terms.last)
     for k, before in enumerate(terms.before):
         if before >= 0:
             p[:, k] = p[:, before] + rotate(quat[:, before], p[:, k])
@@ -47,13 +48,13 @@ def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
 
 
 class _Terms:
-    """The constants of a robot's moving joints."""
+    """The constants of a robot's moving joints, each placed in its parent link and behind the joint `before` it."""
 
     def __init__(self, robot: RobotModel) -> None:
         joints = robot.moving_joints
         self._turning = np.array([joint.type != "prismatic" for joint in joints], dtype=bool)
         self._sliding = np.flatnonzero(~self._turning)
-        self._parent = _halves(joints, [joint.X_PJ for joint in joints])
+        self.parent = _halves(joints, [joint.X_PJ for joint in joints])
         # Where each link stands in the child link of the last moving joint above it, or in the world.
         where: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
         placements: list[Transform] = []
@@ -67,15 +68,9 @@ class _Terms:
                 last, X = len(before) - 1, Transform.identity()
             where[joint.child] = (last, X)
         self.before = tuple(before)
-        self._last = _halves(joints, placements)
+        self.last = _halves(joints, placements)
 
-    def relative(self, q: Array) -> tuple[Array, Array]:
-        return self._poses(q, *self._parent)
-
-    def relative_to_last(self, q: Array) -> tuple[Array, Array]:
-        return self._poses(q, *self._last)
-
-    def _poses(self, q: Array, p0: Array, u: Array, v: Array, slide: Array) -> tuple[Array, Array]:
+    def poses(self, q: Array, p0: Array, u: Array, v: Array, slide: Array) -> tuple[Array, Array]:
         half = np.where(self._turning, q, 0.0) * 0.5
         quat = np.sin(half)[..., None] * u + np.cos(half)[..., None] * v
         p = np.repeat(p0[None], len(q), axis=0)
@@ -95,23 +90,6 @@ def _halves(joints: tuple[Joint, ...], placements: list[Transform]) -> tuple[Arr
     return frozen(p), frozen(u), frozen(v), frozen(slide)
 
 
-class _ByIdentity:
-    """Makes a robot, which cannot be hashed, a cache key that keeps it alive."""
-
-    def __init__(self, robot: RobotModel) -> None:
-        self.robot = robot
-
-    def __hash__(self) -> int:
-        return id(self.robot)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _ByIdentity) and other.robot is self.robot
-
-
 @lru_cache(maxsize=8)
-def _cached(key: _ByIdentity) -> _Terms:
-    return _Terms(key.robot)
-
-
 def _terms(robot: RobotModel) -> _Terms:
-    return _cached(_ByIdentity(robot))
+    return _Terms(robot)

@@ -95,7 +95,7 @@ def build_robot(
         assert parts is not None
         body.weld(reporter, each, parts, k)
     reporter.stop()
-    return _assembled(reporter, spec, main.root, body), tuple(reporter.findings)
+    return _assembled(reporter, spec, body), tuple(reporter.findings)
 
 
 def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
@@ -118,7 +118,7 @@ def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
     reporter.findings += parts.findings
     reporter.stop()
     body = _Body(parts.root, list(parts.links), list(parts.joints), list(parts.transmissions))
-    return _assembled(reporter, spec, parts.root, body)
+    return _assembled(reporter, spec, body)
 
 
 def bare_robot(parts: Parts) -> RobotModel:
@@ -136,7 +136,7 @@ def bare_robot(parts: Parts) -> RobotModel:
     )
 
 
-def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> RobotModel:
+def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     """The robot of welded parts and of what the robot file says about them."""
     joints = _with_limits(reporter, spec, body.ordered())
     links = tuple(body.links)
@@ -154,7 +154,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, root: str, body: _Body) -> R
     reporter.stop()
     return RobotModel(
         name=spec.robot,
-        root=root,
+        root=body.root,
         links=links,
         joints=joints,
         groups=groups,

@@ -26,7 +26,7 @@ SUFFIXES = {".stl": "stl", ".obj": "obj", ".dae": "collada"}
 Format = Literal["stl", "stl-ascii", "obj", "collada"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TriangleMesh:
     """Triangles in the frame of the file, in its unit (Collada: in metres).
 

@@ -265,7 +265,7 @@ class Actuator:
     latency: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RobotModel:
     """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
 

@@ -31,25 +31,12 @@ def mesh_surfaces(path: Path) -> tuple[Surface, ...]:
         mesh = read_mesh(path)
     except UnusableMesh as error:
         raise UnreadableMesh(f"'{path.name}' {error.reason}") from error
-    return _surfaces(path, _Whole(mesh))
-
-
-class _Whole:
-    """A mesh as a cache key: the reader answers with the same object while the file does not change."""
-
-    def __init__(self, mesh: TriangleMesh) -> None:
-        self.mesh = mesh
-
-    def __hash__(self) -> int:
-        return id(self.mesh)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Whole) and other.mesh is self.mesh
+    return _surfaces(path, mesh)
 
 
 @lru_cache(maxsize=64)
-def _surfaces(path: Path, whole: _Whole) -> tuple[Surface, ...]:
-    mesh = whole.mesh
+def _surfaces(path: Path, mesh: TriangleMesh) -> tuple[Surface, ...]:
+    """The reader answers with the same mesh while the file does not change."""
     colours = mesh.colours or (tuple(_obj_colours(path)) if mesh.format == "obj" else ())
     faces: dict[Rgba | None, list[slice]] = {}
     for (first, rgba), (last, _) in pairwise([*(colours or ((0, None),)), (len(mesh.faces), None)]):
