@@ -27,13 +27,13 @@ from manipcli.spec.tree import Plain
 def check_files(
     paths: Sequence[Path], *, package_path: Sequence[Path] = (), allow_outside: bool = False
 ) -> tuple[Finding, ...]:
-    """Every finding of every file; a task is checked with the robot and controllers files that it names.
+    """Every finding of every file, once; a task is checked with the robot and controllers files that it names.
 
     Args:
         paths: task, robot and controllers files, URDF and xacro.
         package_path, allow_outside: where packages are, and whether a file may lie outside of them.
     """
-    return tuple(finding for path in paths for finding in _findings(path, package_path, allow_outside))
+    return tuple(dict.fromkeys(finding for path in paths for finding in _findings(path, package_path, allow_outside)))
 
 
 def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> tuple[Finding, ...]:

@@ -1,4 +1,4 @@
-"""`check` of a controllers file that no task names: it says what it could not look at."""
+"""`check` of several files at once, and of a controllers file that no task names: it says what it could not look at."""
 
 from __future__ import annotations
 
@@ -31,3 +31,19 @@ def test_nor_where_they_are_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[
     path.write_text("controllers:\n  arm: {type: joint_trajectry, joints: [a]}\n")
     assert main(["check", str(path)]) == 1
     assert capsys.readouterr().err == ""
+
+
+def test_what_two_files_share_is_told_and_counted_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "one.yaml").write_text("robot: one\ndescription: one.urdf\nspeed: 3\n")
+    task = f"task: wait\nrobot: robots/one.yaml\ncontrollers: {CONTROLLERS}\nsteps: [{{wait: 1}}]\n"
+    (tmp_path / "a.yaml").write_text(task)
+    (tmp_path / "b.yaml").write_text(task)
+    assert main(["check", "a.yaml", "b.yaml", "robots/one.yaml"]) == 1
+    said = capsys.readouterr().out
+    assert said.count("robots/one.yaml:3:1: error[ROBOT201]: unknown key 'speed'") == 1
+    assert said.count("error[ROBOT301]") == 1
+    assert said.endswith("3 files checked, 2 errors\n")
