@@ -182,8 +182,11 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
         return ExitCode.INTERNAL, (Finding(code="INT001", message=message),)
     if isinstance(error, OSError) and error.filename is not None:
         return ExitCode.USAGE, (Finding(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
-    if isinstance(error, FileNotFoundError):  # of no name: that of the working folder was asked for
-        finding = Finding("USE004", "the working folder has been removed", hint="enter it again, or another one")
+    if isinstance(error, FileNotFoundError):  # of no name: the working folder's was asked for, or `tempfile` says this
+        if error.strerror == os.strerror(errno.ENOENT):
+            finding = Finding("USE004", "the working folder has been removed", hint="enter it again, or another one")
+        else:
+            finding = Finding("USE006", str(error.strerror or error), hint="TMPDIR=FOLDER names another one")
         return ExitCode.USAGE, (finding,)
     if isinstance(error, UnicodeEncodeError) and error.encoding == sys.getfilesystemencoding() != "utf-8":
         message = f"no file can be called '{error.object}': this locale knows {error.encoding} only"

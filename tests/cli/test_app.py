@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -89,6 +90,7 @@ ERRORS = [
     (PermissionError(13, "Permission denied", "/nowhere/x.mcap"), 4, "error"),
     (OSError(28, "No space left on device"), 3, "error"),
     (FileNotFoundError(2, "No such file or directory"), 4, "error"),
+    (FileNotFoundError(2, "No usable temporary directory found in ['/tmp']"), 4, "error"),
     (ZeroDivisionError("division\nby zero"), 3, "error"),
 ]
 
@@ -302,6 +304,18 @@ def test_a_working_folder_that_was_removed_is_told(tmp_path: Path) -> None:
     )
     assert done.returncode == 4
     assert done.stderr.startswith("error[USE004]: the working folder has been removed\n")
+
+
+def test_a_computer_without_a_folder_for_temporary_files_is_told(
+    pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: ["/nowhere"])
+    pipeline.run_task = lambda *_, **__: tempfile.gettempdir()
+    assert main(["run", "t.yaml"]) == 4
+    assert capsys.readouterr().err == (
+        "error[USE006]: No usable temporary directory found in ['/nowhere']\n  hint: TMPDIR=FOLDER names another one\n"
+    )
 
 
 def test_a_name_that_the_locale_cannot_write_is_told(
