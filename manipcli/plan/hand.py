@@ -16,7 +16,7 @@ STEPS = 40
 SPEED = 1.0
 """[rad/s or m/s] of a hand's references, where nobody says."""
 PRESSES = 1e-3
-"""[m] A finger that would stand deeper than this in what it is to let go of still presses on it."""
+"""[m] A finger that would stand deeper than this in what it is to let go of would still press on it."""
 
 
 def fingers(robot: RobotModel, joints: Sequence[str]) -> tuple[tuple[int, ...], ...]:
@@ -96,8 +96,11 @@ def closed_on(
 
 def pressing(robot: RobotModel, query: CollisionQuery, q: Array, joints: Sequence[str]) -> str | None:
     """The part of the hand of these `joints` that is deepest at `q` (n) in what the query looks at, by more than
-    `PRESSES`, as `robot/<link>`; None if none is."""
-    links = {f"robot/{link}" for link in moved_links(robot, joints)}
-    deep = [hit for hit in query.every(q) if hit.distance < -PRESSES and {hit.a, hit.b} & links]
-    deepest = min(deep, key=lambda hit: hit.distance, default=None)
-    return None if deepest is None else next(iter({deepest.a, deepest.b} & links))
+    `PRESSES`, as `robot/<link>`; None if no two fingers are: one alone does not hold, unless the hand has no other."""
+    hits = [hit for hit in query.every(q) if hit.distance < -PRESSES]
+    parts = fingers(robot, joints)
+    found: list[tuple[float, str]] = []
+    for finger in parts:
+        own = {f"robot/{link}" for link in moved_links(robot, [joints[j] for j in finger])}
+        found += sorted((hit.distance, link) for hit in hits for link in {hit.a, hit.b} & own)[:1]
+    return min(found)[1] if found and len(found) >= min(2, len(parts)) else None

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
 from manipcli.model.collision import CollisionHit
+from manipcli.plan.hand import pressing
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.follow import FollowSpec
@@ -408,6 +409,24 @@ def test_a_release_into_a_pose_that_would_still_hold_is_refused(bench: Make, sto
     assert re.fullmatch(still, refusal.cause)
     assert refusal.hint == "it lets go in a pose that is open: `posture: POSE`"
     assert arm.plan("release", {"posture": "zero"}).end.carried is None
+
+
+def test_a_finger_alone_does_not_hold(bench: Make, story: Story) -> None:
+    """It pushes away what has slipped towards it, as the others open; against a second one it would hold."""
+    arm = bench()
+    arm.now = story.steps["pick"][1].end
+    joints, query = arm.planner.gripper_joints, arm.planner.grasping(arm.now, "cup")
+    wrap = arm.robot.pose("wrap").positions[0]
+
+    def pressed_by(closed: list[str]) -> str | None:
+        position = np.array(arm.now.position)
+        position[arm.robot.indices(joints)] = [wrap * any(name.startswith(one) for one in closed) for name in joints]
+        return pressing(arm.robot, query, position, joints)
+
+    for finger in ("finger_1", "finger_2", "finger_3"):
+        assert pressed_by([finger]) is None
+        others = [other for other in ("finger_1", "finger_2", "finger_3") if other != finger]
+        assert re.fullmatch(rf"robot/({'|'.join(others)})_\w+", str(pressed_by(others)))
 
 
 def test_a_hand_closed_on_nothing_named_is_left_closed_by_moves(bench: Make) -> None:
