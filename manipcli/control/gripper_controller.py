@@ -95,7 +95,7 @@ class GripperController:
         self._stall_time, self._contact_time = stall_time, contact_time
         self._allow_stalling = allow_stalling
 
-        self._output = output = ControllerOutput.of(n, 1)
+        self.output = output = ControllerOutput.of(n, 1)
         self._reference, self._velocity, self._command = output.position, output.velocity, output.command
         self._errors = np.zeros((2, n))
         self._error, self._error_rate = self._errors
@@ -179,11 +179,6 @@ class GripperController:
         """While a goal stops fingers by force."""
         return self._goal is not None and self._force is not None
 
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
-
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
         """Ends its goal as aborted and forgets its state; the next update activates it again."""
         if self._goal is not None:
@@ -221,7 +216,7 @@ class GripperController:
                 self._ramp(period)
         if self._pid is None:
             self._command[:] = self._reference
-            return self._output
+            return self.output
         np.subtract(self._reference, measured.position, self._error)
         np.subtract(self._velocity, measured.velocity, self._error_rate)
         if not math.hypot(*self._all_errors.tolist()) < math.inf:
@@ -230,7 +225,7 @@ class GripperController:
         self._pid.apply(self._errors, period, command)
         np.maximum(command, self._minus_effort, out=command)
         np.minimum(command, self._effort, out=command)
-        return self._output
+        return self.output
 
     def _activate(self, measured: JointState) -> None:
         self._activated = True

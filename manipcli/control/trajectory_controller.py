@@ -155,8 +155,8 @@ class JointTrajectoryController:
         chosen = joint_gains(name, self.joints, gains or {})
         self._pid = build_pid(name, self.joints, chosen, compat) if by_error else None
         scale = np.array([each.ff_velocity_scale for each in chosen])
-        self._output = ControllerOutput.of(n, len(self.interfaces))
-        rows = self._output.rows
+        self.output = ControllerOutput.of(n, len(self.interfaces))
+        rows = self.output.rows
         self._reference = Reference(rows[:3], Feeds(self.interfaces, velocity_scale=scale if by_error else None))
         self._desired, self._desired_velocity = rows[0], rows[1]
         self._commands, self._command = rows[3:], rows[3]
@@ -176,11 +176,6 @@ class JointTrajectoryController:
         self._stop = False
         self._bound = np.inf
         self._speed = self._initial_speed
-
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
 
     @property
     def tolerances(self) -> Tolerances:
@@ -280,7 +275,7 @@ class JointTrajectoryController:
             self._look_closer(time, measured)
         if reference.ended and self._goal is not None:
             late = reference.clock(time) - reference.end
-            then = self._goal.judge_end(self._errors, self._output.acceleration, measured.velocity, time, late)
+            then = self._goal.judge_end(self._errors, self.output.acceleration, measured.velocity, time, late)
             self._go_on(then, time, measured)
         feed = reference.feed
         if self._pid is None:
@@ -289,7 +284,7 @@ class JointTrajectoryController:
             self._pid.apply(self._errors, period, self._command)
             if feed is not None:
                 self._command += feed[0]
-        return self._output
+        return self.output
 
     def _compare(self, measured: JointState) -> None:
         """Writes the errors of this tick, once more."""
@@ -310,7 +305,7 @@ class JointTrajectoryController:
             return
         clock = reference.clock(time)
         if not reference.ended or clock <= 0.0:
-            then = goal.judge_path(self._errors, self._output.acceleration, measured.velocity, time, clock)
+            then = goal.judge_path(self._errors, self.output.acceleration, measured.velocity, time, clock)
             self._go_on(then, time, measured)
 
     def _go_on(self, then: Then, time: float, measured: JointState) -> None:

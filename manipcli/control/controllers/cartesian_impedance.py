@@ -127,7 +127,7 @@ class CartesianImpedanceController:
         self._block = np.ix_(self._columns, self._columns)
         self._q = np.zeros(len(kinematics.robot.joint_names))
         self._singular = SINGULAR**2 * np.eye(6)
-        self._output = ControllerOutput.of(len(self.joints), 1)
+        self.output = ControllerOutput.of(len(self.joints), 1)
         self._error = np.zeros(6)
         self._task_damping = np.zeros(6) if self._damping is None else self._damping
         self._posture_damping = np.zeros(len(self.joints))
@@ -142,11 +142,6 @@ class CartesianImpedanceController:
             message = f"controller '{self.name}': {what} {given.tolist()}; expected 6 numbers of 0 or more"
             raise InvalidArgument("CTRL185", message)
         return given
-
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
 
     @property
     def error(self) -> Array:
@@ -189,7 +184,7 @@ class CartesianImpedanceController:
     ) -> ControllerOutput:
         """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
         self._time = time
-        output, q, kinematics = self._output, self._q, self._kinematics
+        output, q, kinematics = self.output, self._q, self._kinematics
         self._refer(time, period, measured)
         if self._pose is None:
             q[self._columns] = output.position
@@ -217,7 +212,7 @@ class CartesianImpedanceController:
 
     def _refer(self, time: float, period: float, measured: JointState) -> None:
         """Writes the reference of the joints."""
-        output = self._output
+        output = self.output
         if self._pose is None:
             output.rows[:3] = self._follower.update(time, period, measured).rows[:3]
             return

@@ -96,7 +96,7 @@ class ComputedTorqueController:
         followed = self._follower.output
         self._correction = followed.command
         self._wanted = np.zeros(len(self.joints))
-        self._output = ControllerOutput(
+        self.output = ControllerOutput(
             rows=followed.rows,
             position=followed.position,
             velocity=followed.velocity,
@@ -104,11 +104,6 @@ class ComputedTorqueController:
             commands=followed.commands,
             wanted_acceleration=self._wanted,
         )
-
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
 
     def send_goal(self, trajectory: JointTrajectory, *, constraints: ConstraintsSpec | None = None) -> GoalHandle:
         """Accepts a trajectory; see `JointTrajectoryController.send_goal`."""
@@ -123,9 +118,9 @@ class ComputedTorqueController:
     ) -> ControllerOutput:
         """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
         self._follower.update(time, period, measured)
-        np.add(self._output.acceleration, self._correction, out=self._wanted)
+        np.add(self.output.acceleration, self._correction, out=self._wanted)
         self._correction[:] = 0.0
-        return self._output
+        return self.output
 
 
 def error_gains(bandwidth: float, damping_ratio: float) -> GainsSpec:

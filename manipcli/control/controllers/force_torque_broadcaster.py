@@ -49,7 +49,7 @@ class Wrench:
 
 
 class ForceTorqueBroadcaster:
-    """Publishes what it is attached to.
+    """Publishes what it is attached to: `output.rows` (1, 6) are force and torque at the last update.
 
     Args:
         name: of the controller.
@@ -67,7 +67,7 @@ class ForceTorqueBroadcaster:
         self.name = name
         self.link = link
         self.joint = joint
-        self._output = ControllerOutput.published(6)
+        self.output = ControllerOutput.published(6)
         self._source = np.zeros(6)
         self._time = 0.0
 
@@ -76,14 +76,9 @@ class ForceTorqueBroadcaster:
         self._source = source
 
     @property
-    def output(self) -> ControllerOutput:
-        """`rows` (1, 6): force and torque at the last update."""
-        return self._output
-
-    @property
     def wrench(self) -> Wrench:
         """What was measured at the last update; zeros before the first."""
-        values = self._output.rows[0]
+        values = self.output.rows[0]
         return Wrench(self._time, self.link, frozen(values[:3]), frozen(values[3:]))
 
     def deactivate(self, time: float, reason: str = "the controller was deactivated") -> None:
@@ -94,8 +89,8 @@ class ForceTorqueBroadcaster:
     ) -> ControllerOutput:
         """One control tick at `time` [s]."""
         self._time = time
-        self._output.rows[0] = self._source
-        return self._output
+        self.output.rows[0] = self._source
+        return self.output
 
 
 def build(name: str, spec: ForceTorqueBroadcasterSpec, fit: Fit) -> ForceTorqueBroadcaster:

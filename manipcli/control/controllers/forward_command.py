@@ -55,14 +55,9 @@ class ForwardCommandController:
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
         self._interface = interface
-        self._output = ControllerOutput.of(n, 1)
+        self.output = ControllerOutput.of(n, 1)
         self._wanted = np.zeros(n)
         self._told = False
-
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
 
     def set_command(self, values: npt.ArrayLike) -> None:
         """What is commanded from the next update on, until it is deactivated.
@@ -84,7 +79,7 @@ class ForwardCommandController:
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
     ) -> ControllerOutput:
         """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
-        output, command = self._output, self._output.command
+        output, command = self.output, self.output.command
         if not self._told:
             self._told = True
             self._wanted = np.array(measured.position) if self._interface == "position" else np.zeros(len(self.joints))

@@ -74,14 +74,9 @@ class JointStateBroadcaster:
         if not {*state_interfaces} <= {"position", "velocity", "effort"}:
             raise InvalidArgument("CTRL183", f"controller '{name}': {list(state_interfaces)} are not all measured")
         self._wanted = tuple(word in state_interfaces for word in ("position", "velocity", "effort"))
-        self._output = ControllerOutput.published(0)
+        self.output = ControllerOutput.published(0)
         self._seen = np.zeros((3, len(self.joints)))
         self._time = 0.0
-
-    @property
-    def output(self) -> ControllerOutput:
-        """Nothing: it commands nothing."""
-        return self._output
 
     @property
     def state(self) -> BroadcastState:
@@ -98,7 +93,7 @@ class JointStateBroadcaster:
         """One control tick at `time` [s]."""
         seen, self._time = self._seen, time
         seen[0], seen[1], seen[2] = measured.position, measured.velocity, measured.effort
-        return self._output
+        return self.output
 
 
 def build(name: str, spec: JointStateBroadcasterSpec, fit: Fit) -> JointStateBroadcaster:

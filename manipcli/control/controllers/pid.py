@@ -105,7 +105,7 @@ class PidController:
         self._given_rates = len(led) == 2
         self._hold_first = hold_first
 
-        self._output = ControllerOutput.of(n, 1)
+        self.output = ControllerOutput.of(n, 1)
         self._errors = np.zeros((2, n))
         self._error, self._error_rate = self._errors
         self._all_errors = self._errors.reshape(-1)
@@ -115,11 +115,6 @@ class PidController:
         self._has_before = False
         self._reference, self._rate = np.zeros((2, n))
         self._told = self._activated = False
-
-    @property
-    def output(self) -> ControllerOutput:
-        """What the last update wrote."""
-        return self._output
 
     def set_reference(self, values: npt.ArrayLike, rates: npt.ArrayLike | None = None) -> None:
         """What the joints shall have from the next update on, until it is deactivated.
@@ -147,7 +142,7 @@ class PidController:
         self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
     ) -> ControllerOutput:
         """One control tick at `time` [s] of the length `period` [s]; `contact_force` is ignored."""
-        output = self._output
+        output = self.output
         state = measured.velocity if self._led_velocity else measured.position
         if not self._activated:
             self._activated = True
