@@ -17,9 +17,15 @@ from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBro
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.flow.load import load_task
-from manipcli.flow.log import CONTROLLERS, TASK, action_of, attached, recorded, recorded_robot, recorded_scene
+from manipcli.flow.log import (
+    action_of,
+    recorded,
+    recorded_controllers_file,
+    recorded_robot,
+    recorded_scene,
+    recorded_task_file,
+)
 from manipcli.flow.other_log import is_own
-from manipcli.flow.vocabulary import task_spec
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.record import channels
@@ -30,7 +36,6 @@ from manipcli.record.topics import Topic, open_topics
 from manipcli.report.graph import Edge, Graph, Node
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.load import load_controllers_text, load_task_text
 from manipcli.spec.task import JUDGED, TaskSpec
 
 PRODUCERS: Final[Mapping[str, str]] = {
@@ -71,8 +76,8 @@ def log_graph(path: Path) -> Graph:
         note = f"{path.name} tells of no task: what its topics are fed by is not known"
         return Graph(path.name, nodes, (), (note,))
     recording = open_recording(path)
-    spec = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
-    controllers = load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}").spec
+    spec = recorded_task_file(recording, path).spec
+    controllers = recorded_controllers_file(recording, path).spec
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
     version = recording.metadata.get("versions", {}).get(spec.simulation.engine, "")
     notes = () if recording.lost is None else (recording.lost,)

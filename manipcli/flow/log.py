@@ -20,6 +20,7 @@ from manipcli.flow.plan import Plan
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import judge
+from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import Mesh, RobotModel
@@ -33,7 +34,9 @@ from manipcli.record.recorder import Recorder
 from manipcli.record.recording import EMBEDDED, Recording, Span
 from manipcli.record.selection import Selection
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.load import load_robot_text, load_task_text
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.located import Located
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import expressions
 from manipcli.spec.robot import RobotSpec
@@ -42,7 +45,7 @@ from manipcli.spec.task import TaskSpec
 RUNS = Path("runs")
 """Where logs go that nobody asked elsewhere, below the working directory."""
 TASK, ROBOT, CONTROLLERS, URDF = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf"
-SCENE, PLAN = "scene.json", "plan.json"
+SCENE = "scene.json"
 YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/json", "application/octet-stream"
 
 
@@ -78,7 +81,7 @@ def open_log(
         (CONTROLLERS, YAML, resolved(task.controllers).encode()),
         (URDF, XML, task.robot.urdf.encode()),
         (SCENE, JSON, scene_to_json(task.true.scene)),
-        (PLAN, JSON, plan.to_json()),
+        (PLAN_FILE, JSON, plan.to_json()),
     ]
     return Recorder(
         path,
@@ -189,15 +192,29 @@ class _Watched:
 
 def judge_recording(recording: Recording, path: Path) -> Verdict:
     """The verdict on a log that is open already; see `judge_log`."""
-    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
+    expect = recorded_task_file(recording, path).spec.judged
     scene = recorded_scene(recording, path)
-    return judge(recording, expect=task.judged, robot=recorded_robot(recording, path), scene=scene)
+    return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
+
+
+def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
+    """The resolved task file of a log."""
+    return load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
+
+
+def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
+    """The resolved robot file of a log."""
+    return load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
+
+
+def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:
+    """The resolved controllers file of a log."""
+    return load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
 
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:
     """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
-    spec = load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}").spec
-    return rebuild_robot(spec, attached(recording, path, URDF))
+    return rebuild_robot(recorded_robot_file(recording, path).spec, attached(recording, path, URDF))
 
 
 def recorded_scene(recording: Recording, path: Path) -> Scene:

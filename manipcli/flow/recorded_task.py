@@ -13,18 +13,26 @@ from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
 from manipcli.flow.agreement import disagreements
 from manipcli.flow.load import Task
-from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, TASK, URDF, attached, mesh_files, recorded_robot, recorded_scene
+from manipcli.flow.log import (
+    URDF,
+    attached,
+    mesh_files,
+    recorded_controllers_file,
+    recorded_robot,
+    recorded_robot_file,
+    recorded_scene,
+    recorded_task_file,
+)
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.flow.sample import sampled
 from manipcli.flow.vary import bind
-from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import SAMPLE, Drawn
+from manipcli.judge.steps import PLAN_FILE
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.build_scene import build_scene
 from manipcli.model.scene import Scene
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
@@ -59,9 +67,9 @@ def recorded_task(
     Raises:
         InvalidInput: it lacks a file, one of them cannot be used, or a mesh is not found.
     """
-    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
-    robot_file = load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
-    controllers = load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
+    task = recorded_task_file(recording, path)
+    robot_file = recorded_robot_file(recording, path)
+    controllers = recorded_controllers_file(recording, path)
     meshes = MeshSearch(
         path,
         hashes=recording.metadata.get("meshes", {}),
@@ -121,7 +129,7 @@ def _drawn(recording: Recording, path: Path) -> Drawn | None:
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
     """Where steps and what is judged were written, as the plan in the log says; {} where it does not."""
     try:
-        plan = json.loads(attached(recording, path, PLAN))
+        plan = json.loads(attached(recording, path, PLAN_FILE))
         places = [*(step["place"] for step in plan["steps"]), *plan["judged"]]
     except (KeyError, TypeError, ValueError, RecursionError):
         return {}

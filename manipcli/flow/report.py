@@ -11,7 +11,7 @@ from typing import Any
 
 from manipcli import __version__
 from manipcli.flow.load import Task
-from manipcli.flow.log import CONTROLLERS, ROBOT, TASK, attached, recorded_robot, recorded_scene
+from manipcli.flow.log import CONTROLLERS, ROBOT, TASK, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.flow.replay import open_playback
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.steps import PLAN_FILE
@@ -26,7 +26,6 @@ from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import STEP_WORDS
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task as load_spec
-from manipcli.spec.load import load_task_text
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
@@ -55,7 +54,7 @@ def log_page(
         InvalidInput: the file is no log of ours, is damaged, or holds no tick.
     """
     recording = open_recording(path)
-    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec()).spec
+    task = recorded_task_file(recording, path).spec
     near = _near(task_file, task) if task_file is not None else ()
     playback = open_playback(
         path, rate=_rate(recording), package_path=(*package_path, *near), allow_outside=allow_outside
@@ -116,7 +115,7 @@ def log_places(recording: Recording, path: Path, outcomes: Sequence[StepOutcome]
 
     The steps are those of `outcomes`: a log whose plan is lost tells of those alone that began.
     """
-    task = load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
+    task = recorded_task_file(recording, path)
     known, judged = _known_places(recording)
 
     def written(place: str, *key: str | int) -> Written:

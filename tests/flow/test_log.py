@@ -14,7 +14,8 @@ from mcap.writer import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.log import CONTROLLERS, PLAN, ROBOT, SCENE, TASK, URDF
+from manipcli.flow.log import CONTROLLERS, ROBOT, SCENE, TASK, URDF
+from manipcli.judge.steps import PLAN_FILE
 from manipcli.pipeline import judge_log, run_task
 from manipcli.record.reading import read_recording
 
@@ -104,7 +105,7 @@ def test_a_log_without_an_attachment_that_judging_needs_is_refused_by_its_name(
     assert caught.value.findings[0].code == "LOG102"
 
 
-@pytest.mark.parametrize("name", [CONTROLLERS, PLAN])
+@pytest.mark.parametrize("name", [CONTROLLERS, PLAN_FILE])
 def test_other_attachments_are_not_needed(log: Path, tmp_path: Path, name: str) -> None:
     assert judge_log(copy(log, tmp_path / "filtered.mcap", without=name)).verdict == "passed"
 
@@ -144,4 +145,4 @@ def test_a_log_says_the_hashes_of_the_files_that_it_carries(log: Path) -> None:
     with log.open("rb") as file:
         carried = {one.name: hashlib.sha256(one.data).hexdigest() for one in make_reader(file).iter_attachments()}
     assert read_recording(log).metadata["files"] == carried
-    assert {*carried} == {TASK, ROBOT, CONTROLLERS, URDF, SCENE, PLAN}
+    assert {*carried} == {TASK, ROBOT, CONTROLLERS, URDF, SCENE, PLAN_FILE}

@@ -16,6 +16,8 @@ STANDARD = (
     schemas.MARKER_ARRAY,
     "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
     "trajectory_msgs/msg/JointTrajectoryPoint",
+    schemas.GOAL_STATUS_ARRAY,
+    "unique_identifier_msgs/msg/UUID",
 )
 
 
