@@ -173,7 +173,7 @@ def gain_margin(loop: Loop) -> float:
     """By what factor all gains may grow until the loop is unstable; 0 where it is already, at most `MOST_GAIN`."""
     if not is_stable(loop):
         return 0.0
-    return _boundary(loop.scaled)
+    return boundary(loop.scaled)
 
 
 def largest_damping(loop: Loop) -> float:
@@ -186,7 +186,7 @@ def largest_damping(loop: Loop) -> float:
     # From the stable middle upwards: with little damping a loop may be unstable, too.
     for start in 10.0 ** np.arange(-3.0, 4.0, 0.25):
         if is_stable(with_d(float(start))):
-            return unit * _boundary(with_d, start=float(start))
+            return unit * boundary(with_d, start=float(start))
     return 0.0
 
 
@@ -198,7 +198,7 @@ def largest_stiffness(loop: Loop) -> float:
         return replace(loop, p=np.array([unit * factor]))
 
     start = 1e-9
-    return unit * _boundary(with_p, start=start) if is_stable(with_p(start)) else 0.0
+    return unit * boundary(with_p, start=start) if is_stable(with_p(start)) else 0.0
 
 
 def largest_integral(loop: Loop) -> float:
@@ -209,10 +209,10 @@ def largest_integral(loop: Loop) -> float:
         return replace(loop, i=np.array([unit * factor]))
 
     start = 1e-6
-    return unit * _boundary(with_i, start=start) if unit > 0.0 and is_stable(with_i(start)) else 0.0
+    return unit * boundary(with_i, start=start) if unit > 0.0 and is_stable(with_i(start)) else 0.0
 
 
-def _boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
+def boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:
     """The first factor above `start`, where the loop is stable, at which it is not; within 0.1 %."""
     low = start
     while is_stable(loop_at(2.0 * low)):

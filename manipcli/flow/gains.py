@@ -3,7 +3,7 @@ are those of an active controller: from the start, or from a step on that switch
 
 Each loop on the effort interface alone at the least inertia that it meets, then all of them together (`stability.py`);
 and whether there is effort enough for gravity, for the planned motions and grasps, and for standing near where it is
-to stand (`weak.py`). Joints on other interfaces: `drives.py`.
+to stand (`weak.py`). Joints on other interfaces: `drives.py`; those that the model of the robot leads: `modelled.py`.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import RINGING, drive_doubts, driven_joints
 from manipcli.flow.grips import strained, too_light, too_soft, too_swift
 from manipcli.flow.load import Task
+from manipcli.flow.modelled import modelled_doubts, modelled_joints
 from manipcli.flow.plan import Plan, plan_task, start_position
 from manipcli.flow.switches import active_in
 from manipcli.flow.weak import Held, weak
@@ -61,9 +62,10 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
     """
     robot, spec = task.robot, task.controllers
     in_steps = tuple(active_in(task.spec.steps, Claims.of(spec), robot))
-    shifts = {active: (_loops(task, active), driven_joints(task, active)) for active in dict.fromkeys(in_steps)}
-    if not any(loops or drives for loops, drives in shifts.values()):
-        return ()
+    shifts = {
+        active: (_loops(task, active), driven_joints(task, active), modelled_joints(task, active))
+        for active in dict.fromkeys(in_steps)
+    }
     found: list[Finding] = []
     if plan is None:
         try:
@@ -81,7 +83,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
     samples = None if plan is None else _planned(task, plan)
     named = Postures.at_rest(named_postures(robot, start_position(task)))
     told: set[tuple[str, Place | None, str]] = set()
-    for active, (loops, drives) in shifts.items():
+    for active, (loops, drives, modelled) in shifts.items():
         postures = named if samples is None else _while(samples, [there == active for there in in_steps])
         doubts: list[Doubt] = []
         if loops:
@@ -89,6 +91,8 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
             doubts += _doubts(task, loops, load, postures, planned=plan is not None)
         if drives:
             doubts += drive_doubts(task, drives, kinematics, postures, planned=plan is not None)
+        if modelled:
+            doubts += modelled_doubts(task, modelled, kinematics, postures, planned=plan is not None)
         # Who stays while others change is looked at again: each doubt about each of its joints is told once.
         found += [doubt.finding for doubt in doubts if doubt.what not in told]
         told.update(doubt.what for doubt in doubts)

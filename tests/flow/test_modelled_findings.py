@@ -1,0 +1,86 @@
+"""Joints that the model of the robot leads, by computed torque or an impedance: plans, bandwidths, motors too weak."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from manipcli.core.errors import Finding
+from manipcli.flow.check import check_files
+
+TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
+<joint name="hinge"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>
+<actuator name="motor"><mechanicalReduction>1</mechanicalReduction></actuator></transmission>"""
+ROBOT = """poses: {zero: {all: [0]}, up: {all: [1.2]}}
+tool: {link: arm}
+limits: {hinge: {acceleration: 30}}
+actuators: {motor: {effort: EFFORT, LATENCY}}
+"""
+Found = Callable[..., tuple[Finding, ...]]
+COMPUTED = "type: computed_torque"
+SOFT = "type: cartesian_impedance, stiffness: {translation: 100, rotation: 10}"
+WEIGHT = 9.81 * 0.25 * math.sin(1.2)
+"""[N m] that hold 1 kg at 0.25 m."""
+
+
+@pytest.fixture
+def found(pendulum: Callable[..., Path]) -> Found:
+    def of(
+        controller: str, *, effort: float = 20.0, latency: int = 0, step: str = "move: {to: up}"
+    ) -> tuple[Finding, ...]:
+        robot = ROBOT.replace("EFFORT", f"{effort} N m").replace("LATENCY", f"latency: {latency}")
+        folder = pendulum(robot, urdf=TRANSMISSION)
+        (folder / "c.yaml").write_text(f"controllers:\n  c: {{joints: [hinge], {controller}}}\n")
+        (folder / "task.yaml").write_text(
+            f"task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{{{step}}}]\n"
+        )
+        return tuple(one for one in check_files([folder / "task.yaml"]) if one.severity != "note")
+
+    return of
+
+
+def test_a_task_is_planned_whoever_controls_it(found: Found) -> None:
+    """The limit is 2 rad."""
+    (refusal,) = found(COMPUTED, step="follow: {joint_names: [hinge], points: [{positions: [9], time_from_start: 9}]}")
+    assert (refusal.code, refusal.severity) == ("PLAN100", "error")
+    assert "beyond its upper limit" in refusal.message
+
+
+def test_an_error_that_does_not_come_to_rest_is_told(found: Found) -> None:
+    """Damped critically and looked at every h, e'' + 2 w e' + w^2 e = 0 needs w h < 2 (sqrt 2 - 1)."""
+    most = 2.0 * (math.sqrt(2.0) - 1.0) / (math.tau * 1e-3)
+    assert not found(f"{COMPUTED}, bandwidth: {0.99 * most}")
+    (told,) = found(f"{COMPUTED}, bandwidth: {1.01 * most}")
+    assert (told.code, told.severity) == ("CTRL150", "warning")
+    assert told.message == f"c: a bandwidth of 133 Hz is unstable above {most:.3g} Hz at 1 ms"
+    assert told.hint == f"stay below half of that: {most / 2:.3g} Hz"
+    assert told.place is not None
+    assert (Path(told.place.file).name, told.place.line) == ("c.yaml", 2)
+
+
+def test_a_late_motor_bears_less(found: Found) -> None:
+    assert not found(f"{COMPUTED}, bandwidth: 100")
+    (told,) = found(f"{COMPUTED}, bandwidth: 100", latency=3)
+    limit = re.search(r"unstable above (\S+) Hz at 1 ms and 3 ticks of latency", told.message)
+    assert limit is not None
+    assert not found(f"{COMPUTED}, bandwidth: {0.98 * float(limit[1])}", latency=3)
+
+
+def test_gains_of_accelerations_are_told_with_a_bandwidth_that_would_do(found: Found) -> None:
+    (told,) = found(f"{COMPUTED}, gains: {{hinge: {{p: 100, d: 2100}}}}")
+    assert told.message == "hinge: p 100, i 0 and d 2100, of accelerations, are unstable at 1 ms"
+    assert told.hint == "leave them out: a `bandwidth` chooses them, 65.9 Hz at most"
+
+
+@pytest.mark.parametrize("controller", [COMPUTED, SOFT])
+def test_a_motor_too_weak_for_its_load_is_told(found: Found, controller: str) -> None:
+    (told,) = found(controller, effort=1.0)
+    assert (told.code, told.severity) == ("CTRL155", "warning")
+    assert told.message == f"hinge: holding against gravity takes up to {WEIGHT:.3g} N m, its limit is 1 N m"
+    (told,) = found(controller, effort=WEIGHT + 0.01)
+    assert told.message.startswith("hinge: the planned motions need up to")
+    assert not found(controller)
