@@ -6,6 +6,7 @@ at angle q is  u sin(q/2) + v cos(q/2).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -47,6 +48,23 @@ def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
     return p, quat
 
 
+def tool_poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
+    """Pose of the tool in the world, of a robot that has one: (T, 3) [m] and (T, 4) xyzw, at joint positions (T, n)."""
+    assert robot.tool is not None
+    last, X = link_places(robot)[robot.tool.link]
+    X = X @ robot.tool.X_LT
+    if last < 0:
+        return np.tile(X.p, (len(q), 1)), np.tile(X.quat_xyzw, (len(q), 1))
+    p, quat = forward_batch(robot, q)
+    return p[:, last] + rotate(quat[:, last], X.p), quat_product(quat[:, last], X.quat_xyzw)
+
+
+def link_places(robot: RobotModel) -> Mapping[str, tuple[int, Transform]]:
+    """Where each link stands still: in the child link of the last moving joint above it, by its number, or in the world
+    (-1)."""
+    return _terms(robot).places
+
+
 class _Terms:
     """The constants of a robot's moving joints, each placed in its parent link and behind the joint `before` it."""
 
@@ -55,18 +73,17 @@ class _Terms:
         self._turning = np.array([joint.type != "prismatic" for joint in joints], dtype=bool)
         self._sliding = np.flatnonzero(~self._turning)
         self.parent = _halves(joints, [joint.X_PJ for joint in joints])
-        # Where each link stands in the child link of the last moving joint above it, or in the world.
-        where: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
+        self.places: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
         placements: list[Transform] = []
         before: list[int] = []
         for joint in robot.joints:
-            last, X = where[joint.parent]
+            last, X = self.places[joint.parent]
             X = X @ joint.X_PJ
             if joint.moves:
                 placements.append(X)
                 before.append(last)
                 last, X = len(before) - 1, Transform.identity()
-            where[joint.child] = (last, X)
+            self.places[joint.child] = (last, X)
         self.before = tuple(before)
         self.last = _halves(joints, placements)
 

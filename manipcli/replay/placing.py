@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, quat_product, rotate
-from manipcli.model.batch_kinematics import forward_batch
+from manipcli.model.batch_kinematics import forward_batch, link_places
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 
@@ -31,17 +31,7 @@ class Placing:
     def __init__(self, robot: RobotModel | None, scene: Scene | None = None) -> None:
         self._robot = robot
         self._scene = scene
-        # Each link stands still in the child link of the last moving joint above it, or in the world.
-        self._links: list[tuple[int, Transform]] = []
-        if robot is not None:
-            where: dict[str, tuple[int, Transform]] = {robot.root: (-1, robot.X_WB)}
-            for joint in robot.joints:
-                last, X = where[joint.parent]
-                if joint.moves:
-                    where[joint.child] = (robot.joint_names.index(joint.name), Transform.identity())
-                else:
-                    where[joint.child] = (last, X @ joint.X_PJ)
-            self._links = [where[link.name] for link in robot.links]
+        self._links = [] if robot is None else [link_places(robot)[link.name] for link in robot.links]
 
     @property
     def still(self) -> frozenset[str]:

@@ -11,8 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from manipcli.core.geometry import Array, rotate, wrapped
+from manipcli.core.geometry import Array, wrapped
 from manipcli.judge.verdict import Verdict
+from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -171,7 +172,7 @@ class Playback:
         """(T, 3) [m] the origin of the tool in the world; (0, 3) where the robot has none."""
         if self.robot is None or self.robot.tool is None:
             return np.zeros((0, 3))
-        return tool_positions(self.robot, self.stance)
+        return tool_poses(self.robot, self.stance)[0]
 
     def curves(self) -> tuple[PlotTable, ...]:
         """Measured and wanted values of the joints, the way of the tool and contact forces, at the times shown."""
@@ -182,14 +183,6 @@ class Playback:
             ),
             *((forces,) if forces.columns else ()),
         )
-
-
-def tool_positions(robot: RobotModel, position: Array) -> Array:
-    """(T, 3) [m] the origin of the tool in the world, of a robot that has one, at joint positions (T, n)."""
-    assert robot.tool is not None
-    poses = Placing(robot).at(position, np.zeros((len(position), 0, 3)), np.zeros((len(position), 0, 4)))
-    link = 1 + [one.name for one in robot.links].index(robot.tool.link)
-    return poses.position[:, link] + rotate(poses.quat_xyzw[:, link], robot.tool.X_LT.p)
 
 
 def joint_tables(
@@ -229,7 +222,7 @@ def joint_tables(
             columns, of = (tuple(each[k] for k in known) for each in (names, units))
             tables.append(PlotTable(title, columns, of, times, values[:, known]))
     if robot is not None and robot.tool is not None:
-        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, times, tool_positions(robot, position)))
+        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, times, tool_poses(robot, position)[0]))
     return tuple(tables)
 
 

@@ -14,12 +14,12 @@ from typing import Literal
 import numpy as np
 
 from manipcli.core.geometry import Array, quat_product, rotate, rotate_inverse
+from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
-from manipcli.replay.placing import Placing
 
 BRIDGED = 0.05
 """[s] Contact that is lost for less is not lost, and what is touched for less is not stood on."""
@@ -195,14 +195,9 @@ class HoldMeter:
             self._contacts(snapshot)
         times = span.states.time
         mine = np.flatnonzero((times >= self._hold.grasped - ROUNDING) & (times <= self._hold.until + ROUNDING))
-        tool = self._robot.tool
-        if not len(mine) or tool is None:
+        if not len(mine) or self._robot.tool is None:
             return
-        q = span.states.position[mine][:, self._joints]
-        poses = Placing(self._robot).at(q, np.zeros((len(mine), 0, 3)), np.zeros((len(mine), 0, 4)))
-        link = 1 + [one.name for one in self._robot.links].index(tool.link)
-        p_WT = poses.position[:, link] + rotate(poses.quat_xyzw[:, link], tool.X_LT.p)
-        q_WT = quat_product(poses.quat_xyzw[:, link], tool.X_LT.quat_xyzw)
+        p_WT, q_WT = tool_poses(self._robot, span.states.position[mine][:, self._joints])
         column = bodies[self._hold.body]
         q_WO = span.states.body_quat_xyzw[mine, column]
         p_WC = span.states.body_position[mine, column] + rotate(q_WO, self._centre)

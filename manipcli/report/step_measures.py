@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.core.geometry import Array, rotate
+from manipcli.core.geometry import Array
 from manipcli.judge.verdict import StepOutcome
+from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import ContactSnapshot, Recording, Span
-from manipcli.replay.placing import Placing
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +66,7 @@ class _Joints:
         self._order = [recording.joint_names.index(name) for name in robot.joint_names]
         kinds = np.array([joint.type == "prismatic" for joint in robot.moving_joints], dtype=bool)
         self._slides, self.turning, self.sliding = kinds, bool((~kinds).any()), bool(kinds.any())
-        self._placing = Placing(robot)
-        self._tool = robot.tool
-        names = [link.name for link in robot.links]
-        self._link = 1 + names.index(robot.tool.link) if robot.tool is not None else 0
+        self._robot = robot
         self.has_tool = robot.tool is not None
         self._last: tuple[Array, ...] | None = None
 
@@ -77,7 +74,7 @@ class _Joints:
         """Times (T,) at which intervals end, and (T, 5): their begin, and what was turned, slid, moved and done."""
         states = span.states
         q, power = states.position[:, self._order], (states.effort * states.velocity)[:, self._order]
-        point = self._point(q)
+        point = tool_poses(self._robot, q)[0] if self.has_tool else np.zeros((len(q), 3))
         now = (states.time, q, np.maximum(power, 0.0).sum(axis=1), point)
         if self._last is not None:
             # Of four arrays four: mypy does not know how long this tuple is.
@@ -94,15 +91,6 @@ class _Joints:
             (power[1:] + power[:-1]) / 2.0 * seconds,
         )
         return time[1:], np.stack(columns, axis=1)
-
-    def _point(self, q: Array) -> Array:
-        """(T, 3) the origin of the tool in the world."""
-        if self._tool is None:
-            return np.zeros((len(q), 3))
-        none = np.zeros((len(q), 0, 3))
-        poses = self._placing.at(q, none, np.zeros((len(q), 0, 4)))
-        X = self._tool.X_LT
-        return np.asarray(poses.position[:, self._link] + rotate(poses.quat_xyzw[:, self._link], X.p))
 
 
 class _Sums:

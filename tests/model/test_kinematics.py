@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,11 +11,11 @@ import pytest
 
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import EARTH_GRAVITY
-from manipcli.model.batch_kinematics import forward_batch, relative_batch
+from manipcli.model.batch_kinematics import forward_batch, relative_batch, tool_poses
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.normalise import engine_urdf
-from manipcli.model.robot import RobotModel
+from manipcli.model.robot import RobotModel, Tool
 from manipcli.spec.robot import AttachSpec, PoseSpec, RobotSpec
 
 ROBOTS = Path(__file__).parents[2] / "robots"
@@ -96,6 +97,15 @@ def test_the_batch_agrees_with_the_chain_at_every_instant(robot: RobotModel, q: 
             X = poses[joint.parent] @ Transform.of(xyz=p_rel[t, k], quat_xyzw=quat_rel[t, k])
             np.testing.assert_allclose(X.matrix, poses[joint.child].matrix, atol=1e-13)
     np.testing.assert_allclose(np.linalg.norm(quat, axis=-1), 1.0, atol=1e-14)
+
+
+def test_the_tool_is_placed_in_any_link_also_in_one_that_nothing_moves(robot: RobotModel, q: Array) -> None:
+    X_LT, times = Transform.of(xyz=(0.1, -0.2, 0.3), rpy=(0.4, 0.5, 0.6)), np.stack([q, -q])
+    for link in (robot.root, robot.links[-1].name):
+        p, quat = tool_poses(dataclasses.replace(robot, tool=Tool(link, X_LT)), times)
+        for t, at in enumerate(times):
+            X_WT = chain_product(robot, at)[link] @ X_LT
+            np.testing.assert_allclose(Transform.of(xyz=p[t], quat_xyzw=quat[t]).matrix, X_WT.matrix, atol=1e-13)
 
 
 def test_the_jacobian_is_the_derivative_of_the_pose(robot: RobotModel, q: Array) -> None:
