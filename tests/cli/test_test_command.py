@@ -164,7 +164,11 @@ def test_as_many_run_at_once_as_this_process_may_use_cores(
         "manipcli.batch.pool.run_jobs", lambda _, at_once, **__: (one for one in given.append(at_once) or ())
     )
     main(["test", *words])
-    assert given == [at_once]
+    monkeypatch.delattr(os, "sched_getaffinity")  # as elsewhere than on Linux
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    main(["test", *words])
+    assert given == [at_once, at_once]
 
 
 @pytest.mark.parametrize(
