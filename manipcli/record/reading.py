@@ -27,14 +27,13 @@ from manipcli.record.scan import (
     HEADER,
     MAX_NAMED,
     MESSAGE,
-    MESSAGE_INDEX,
     METADATA,
     SCHEMA,
     ChunkPlace,
+    Piece,
     Record,
     Scan,
     guarded,
-    message_index,
     open_chunk,
 )
 from manipcli.record.spans import FileSpans
@@ -59,23 +58,11 @@ def open_recording(path: Path, *, being_written: bool = False) -> Recording:
     """
     reader = _Reader(path)
     scan = Scan(path, being_written=being_written)
-    chunk: Record | None = None
-    indexes: dict[int, bytes] = {}
-    end = 0
-    for record in scan:
-        if record.opcode == MESSAGE_INDEX and chunk is not None:
-            channel, entries = guarded(path, record, message_index)
-            indexes[channel] = entries
-            end = record.end
-            continue
-        if chunk is not None:
-            reader.chunk(chunk, indexes, end)
-        chunk, indexes, end = (record if record.opcode == CHUNK else None), {}, record.end
-        if chunk is None and record.opcode != MESSAGE_INDEX:
-            reader.declaration(record)
-    if chunk is not None:
-        # Some of its indexes may have been cut off.
-        reader.chunk(chunk, {}, end)
+    for piece in scan.pieces():
+        if piece.record.opcode == CHUNK:
+            reader.chunk(piece)
+        else:
+            reader.declaration(piece.record)
     return reader.recording(scan.lost)
 
 
@@ -162,10 +149,11 @@ class _Reader:
         for topic in self._contents.absent:
             self._types.pop(topic, None)
 
-    def chunk(self, record: Record, indexes: Mapping[int, bytes], end: int) -> None:
-        """A chunk; its indexes, which end at `end`, say whether anything in it is needed yet."""
+    def chunk(self, piece: Piece) -> None:
+        """A chunk; its indexes say whether anything in it is needed yet."""
+        record, indexes = piece.record, piece.indexes
         self._known()
-        self._chunks.append(ChunkPlace(record.offset, end))
+        self._chunks.append(ChunkPlace(record.offset, piece.end))
         of = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
         if not indexes or "" in of.values():
             guarded(self._path, record, lambda record: self._opened(record, {}))

@@ -36,9 +36,12 @@ from manipcli.record.scan import (
     RECORD_HEAD,
     SCHEMA,
     Record,
+    first_bytes,
     is_finished,
     open_chunk,
     open_regular,
+    read_head,
+    readable,
 )
 
 if TYPE_CHECKING:
@@ -125,22 +128,14 @@ class Salvage:
         Raises:
             BadRecording: no MCAP file at all, not readable, or damaged in too many places.
         """
-        try:
-            with open_regular(self.path) as file:
-                self.size = os.fstat(file.fileno()).st_size
-                yield from self._pieces(file)
-        except OSError as error:
-            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+        with readable(self.path), open_regular(self.path) as file:
+            self.size = os.fstat(file.fileno()).st_size
+            yield from self._pieces(file)
 
     def _pieces(self, file: BinaryIO) -> Iterator[Declared | OpenChunk | Damage]:
         finished = is_finished(file, self.size)
-        file.seek(0)
-        magic = file.read(len(MAGIC))
-        if magic != MAGIC:
-            cause = "is empty" if not magic else "is no MCAP file (its first bytes are others)"
-            raise BadRecording(self.path, cause, hint="a recording is an .mcap file that manipcli run has written")
+        self._crc = zlib.crc32(first_bytes(self.path, file))
         self.index = _index(file, self.size) if finished else Index()
-        self._crc = zlib.crc32(magic)
         loose = bytearray()
         offset = len(MAGIC)
         while offset < self.size:
@@ -238,8 +233,7 @@ class Salvage:
 def _record_at(file: BinaryIO, offset: int, size: int) -> Record | None:
     """The record that begins there; None where none fits."""
     file.seek(offset)
-    head = file.read(RECORD_HEAD.size)
-    opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+    _, opcode, length = read_head(file)
     if not 0 < opcode <= _LAST_OPCODE or length > MAX_RECORD or offset + RECORD_HEAD.size + length > size:
         return None
     body = file.read(length)

@@ -10,7 +10,8 @@ import os
 import stat
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, TypeVar
@@ -62,6 +63,15 @@ class ChunkPlace:
     end: int
 
 
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A record and, of a chunk, the message indexes behind it by channel; `end`: where the next one begins."""
+
+    record: Record
+    end: int
+    indexes: Mapping[int, bytes]
+
+
 class Scan:
     """Iterate once over the records of the data section; afterwards `lost` says what is missing at the end.
 
@@ -74,24 +84,35 @@ class Scan:
         self._being_written = being_written
 
     def __iter__(self) -> Iterator[Record]:
-        try:
-            with open_regular(self.path) as file:
-                yield from self._records(file, os.fstat(file.fileno()).st_size)
-        except OSError as error:
-            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+        with readable(self.path), open_regular(self.path) as file:
+            yield from self._records(file, os.fstat(file.fileno()).st_size)
+
+    def pieces(self) -> Iterator[Piece]:
+        """The same records, the indexes of messages with the chunk that they are of."""
+        chunk: Record | None = None
+        indexes: dict[int, bytes] = {}
+        end = 0
+        for record in self:
+            if record.opcode == MESSAGE_INDEX:
+                if chunk is not None:
+                    channel, entries = guarded(self.path, record, message_index)
+                    indexes[channel], end = entries, record.end
+                continue
+            if chunk is not None:
+                yield Piece(chunk, end, indexes)
+            chunk, indexes, end = (record if record.opcode == CHUNK else None), {}, record.end
+            if chunk is None:
+                yield Piece(record, end, {})
+        if chunk is not None:
+            # Some of its indexes may have been cut off.
+            yield Piece(chunk, chunk.end, {})
 
     def _records(self, file: BinaryIO, size: int) -> Iterator[Record]:
         finished = is_finished(file, size)
-        file.seek(0)
-        start = file.read(len(MAGIC))
-        if start != MAGIC:
-            cause = "is empty" if not start else "is no MCAP file (its first bytes are others)"
-            raise BadRecording(self.path, cause, hint="a recording is an .mcap file that manipcli run has written")
-        crc = zlib.crc32(start)
+        crc = zlib.crc32(first_bytes(self.path, file))
         offset = len(MAGIC)
         while offset < size:
-            head = file.read(RECORD_HEAD.size)
-            opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+            head, opcode, length = read_head(file)
             end = offset + RECORD_HEAD.size + length
             if len(head) == RECORD_HEAD.size and length > MAX_RECORD:
                 raise BadRecording(self.path, f"the record at byte {offset} is said to be {length} bytes long")
@@ -133,6 +154,36 @@ class Scan:
             raise BadRecording(self.path, "the checksum of its summary does not match: it was changed", hint=REPAIRABLE)
 
 
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """What the system refuses becomes an error that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise BadRecording(path, f"cannot be read: {error.strerror or error}") from error
+
+
+def first_bytes(path: Path, file: BinaryIO) -> bytes:
+    """Those that every MCAP file begins with; what follows is read next.
+
+    Raises:
+        BadRecording: they are others.
+    """
+    file.seek(0)
+    start = file.read(len(MAGIC))
+    if start != MAGIC:
+        cause = "is empty" if not start else "is no MCAP file (its first bytes are others)"
+        raise BadRecording(path, cause, hint="a recording is an .mcap file that manipcli run has written")
+    return start
+
+
+def read_head(file: BinaryIO) -> tuple[bytes, int, int]:
+    """The head of a record, its opcode and length; (0, 0) where it is cut."""
+    head = file.read(RECORD_HEAD.size)
+    opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+    return head, opcode, length
+
+
 def open_regular(path: Path) -> BinaryIO:
     """A file to read; opening a pipe would wait for whoever writes into it.
 
@@ -166,8 +217,7 @@ def records_at(path: Path, file: BinaryIO, place: ChunkPlace) -> Iterator[Record
     file.seek(place.start)
     offset = place.start
     while offset < place.end:
-        head = file.read(RECORD_HEAD.size)
-        opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
+        head, opcode, length = read_head(file)
         body = file.read(length) if length <= place.end - offset - RECORD_HEAD.size else b""
         if len(head) < RECORD_HEAD.size or len(body) < length or (opcode == CHUNK) != (offset == place.start):
             raise BadRecording(path, "changed while it was read")

@@ -28,10 +28,10 @@ from manipcli.record.columns import (
 )
 from manipcli.record.contents import Contents
 from manipcli.record.differences import body_velocities
-from manipcli.record.faults import BadRecording, Thinned
+from manipcli.record.faults import Thinned
 from manipcli.record.messages import WORLD
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
-from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, records_at
+from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, readable, records_at
 from manipcli.record.selection import common_stride
 
 
@@ -70,15 +70,12 @@ class FileSpans:
     def _without_velocities(self) -> Iterator[Span]:
         reader = _SpanReader(self.contents, self.channels, gaps=self.cut)
         empty = True
-        try:
-            with self.path.open("rb") as file:
-                for place in self.chunks:
-                    span = self._chunk(file, place, reader)
-                    if span is not None:
-                        empty = False
-                        yield span
-        except OSError as error:
-            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+        with readable(self.path), self.path.open("rb") as file:
+            for place in self.chunks:
+                span = self._chunk(file, place, reader)
+                if span is not None:
+                    empty = False
+                    yield span
         if reader.waiting and not self.cut:
             raise Thinned(self.path)
         if empty:

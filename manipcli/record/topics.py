@@ -21,15 +21,16 @@ from manipcli.record.scan import (
     CHUNK,
     MAX_NAMED,
     MESSAGE,
-    MESSAGE_INDEX,
     RECORD_HEAD,
     SCHEMA,
     ChunkPlace,
+    Piece,
     Record,
     Scan,
     guarded,
     message_index,
     open_chunk,
+    readable,
     records_at,
 )
 
@@ -109,14 +110,11 @@ class Topics:
             BadRecording: a chunk is damaged, or the file changed.
         """
         wanted = {number: name for number, name in self._channels.items() if name in names}
-        try:
-            with self.path.open("rb") as file:
-                for place in self._places:
-                    if not place.channels.isdisjoint(wanted):
-                        for number, data, found in _read(self.path, file, place, frozenset(wanted)):
-                            yield wanted[number], data, found
-        except OSError as error:
-            raise BadRecording(self.path, f"cannot be read: {error.strerror or error}") from error
+        with readable(self.path), self.path.open("rb") as file:
+            for place in self._places:
+                if not place.channels.isdisjoint(wanted):
+                    for number, data, found in _read(self.path, file, place, frozenset(wanted)):
+                        yield wanted[number], data, found
 
 
 def open_topics(path: Path) -> Topics:
@@ -127,9 +125,9 @@ def open_topics(path: Path) -> Topics:
     """
     reader = _Reader(path)
     scan = Scan(path)
-    for record in scan:
-        reader.take(record)
-    reader.close()
+    for piece in scan.pieces():
+        reader.take(piece)
+    reader.close_run()
     return Topics(path, reader.topics, scan.lost, reader.channels, tuple(reader.places))
 
 
@@ -140,39 +138,26 @@ class _Reader:
         self._path = path
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._named = 0
-        self._chunk: Record | None = None
-        self._indexes: dict[int, bytes] = {}
-        self._end = 0
         self._run: list[Record] = []
         self._run_size = 0
         self.topics: dict[str, Topic] = {}
         self.channels: dict[int, str] = {}
         self.places: list[_Place] = []
 
-    def take(self, record: Record) -> None:
-        """The next record of the file."""
-        if record.opcode == MESSAGE_INDEX and self._chunk is not None:
-            channel, entries = guarded(self._path, record, message_index)
-            self._indexes[channel] = entries
-            self._end = record.end
-            return
-        self._close_chunk()
+    def take(self, piece: Piece) -> None:
+        """The next piece of the file."""
+        record = piece.record
         if record.opcode == MESSAGE:
             self._run.append(record)
             self._run_size += len(record.body)
             if self._run_size >= RUN:
-                self._close_run()
+                self.close_run()
             return
-        self._close_run()
+        self.close_run()
         if record.opcode == CHUNK:
-            self._chunk, self._indexes, self._end = record, {}, record.end
+            self._chunk(piece)
         elif record.opcode in (SCHEMA, CHANNEL):
             guarded(self._path, record, self._declared)
-
-    def close(self) -> None:
-        """There are no more records."""
-        self._close_chunk()
-        self._close_run()
 
     def _declared(self, record: Record) -> None:
         from mcap import records
@@ -199,19 +184,17 @@ class _Reader:
         elif known.definition != (text if readable else ""):
             raise CdrError(f"{channel.topic} has two types, {known.type} and {name}")
 
-    def _close_chunk(self) -> None:
-        chunk, self._chunk = self._chunk, None
-        if chunk is None:
-            return
-        at = ChunkPlace(chunk.offset, self._end)
-        if self._indexes and all(channel in self.channels for channel in self._indexes):
-            for channel, entries in self._indexes.items():
+    def _chunk(self, piece: Piece) -> None:
+        at = ChunkPlace(piece.record.offset, piece.end)
+        if piece.indexes and all(channel in self.channels for channel in piece.indexes):
+            for channel, entries in piece.indexes.items():
                 self._saw(channel, np.frombuffer(entries, dtype="<u8")[::2].astype(np.int64))
-            self.places.append(_Place(at, chunk=True, channels=frozenset(self._indexes)))
+            self.places.append(_Place(at, chunk=True, channels=frozenset(piece.indexes)))
         else:
-            guarded(self._path, chunk, lambda record: self._opened(open_chunk(self._path, record), at, chunk=True))
+            guarded(self._path, piece.record, lambda one: self._opened(open_chunk(self._path, one), at, chunk=True))
 
-    def _close_run(self) -> None:
+    def close_run(self) -> None:
+        """Messages outside chunks end here, if there were any."""
         run, self._run, self._run_size = self._run, [], 0
         if run:
             data = b"".join(RECORD_HEAD.pack(one.opcode, len(one.body)) + one.body for one in run)

@@ -19,6 +19,7 @@ from manipcli.record.fields import FieldName, UnknownField, parse_field, ways
 from manipcli.record.inventory import inventory
 from manipcli.record.layout import layout
 from manipcli.record.repair import repair
+from manipcli.record.scan import CHUNK, MESSAGE_INDEX, Scan
 from manipcli.record.series import Series, Wanted, read_series
 from manipcli.record.topics import open_topics
 from manipcli.record.units import unit_of
@@ -343,3 +344,16 @@ def test_units_follow_the_joint_and_the_place(log: Path) -> None:
     assert unit("tf[cup].rotation.w") == ""
     assert unit("contacts.force") == "N"
     assert unit("joint_states.header.stamp") == "s"
+
+
+def test_a_log_that_is_cut_within_the_indexes_of_a_chunk_keeps_all_messages_of_it(log: Path, tmp_path: Path) -> None:
+    """Some of the indexes are there and say nothing of the topics whose index is lost."""
+    records = list(Scan(log))
+    first = max(k for k, record in enumerate(records) if record.opcode == CHUNK) + 1
+    assert [record.opcode for record in records[first : first + 2]] == [MESSAGE_INDEX] * 2
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log.read_bytes()[: records[first].end])
+    kept = {topic.name: topic.messages for topic in inventory(cut).topics if topic.messages}
+    assert {topic.name: topic.count for topic in open_topics(cut).all.values() if topic.count} == kept
+    last = series(cut, "joint_states.position")["shoulder"]
+    assert len(last.times) == kept["/joint_states"]
