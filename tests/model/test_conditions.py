@@ -16,7 +16,7 @@ from manipcli.model.condition import Condition, Setting, World
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading
-from manipcli.model.robot import Group, Joint, JointLimits, JointType, Link, NamedPose, RobotModel
+from manipcli.model.robot import Group, Joint, JointLimits, JointType, Link, NamedPose, RobotModel, Tool
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
@@ -305,7 +305,27 @@ def test_at_pose_is_what_is_left_of_the_worst_joint() -> None:
     now = state(position=(0.51, -1.03, 0.2))
     assert margin("at_pose", now, pose="home", within=0.05) == pytest.approx(0.02)
     assert margin("at_pose", now, pose="all", group="arm", within=0.02) == pytest.approx(-0.01)
-    assert margin("at_pose", now, pose="all", within=0.05) == pytest.approx(0.02), "what slides does not count"
+    assert margin("at_pose", now, pose="all", within=0.05) == pytest.approx(0.02), "fingers do not count"
+    assert margin("at_pose", now, pose="out", slide=0.15) == pytest.approx(0.05)
+    both = read("at_pose", now, pose="all", within=0.05, slide=0.15).found(0)
+    assert (both.margin, both.unit) == (pytest.approx(-0.05), "m")
+
+
+def test_at_pose_counts_what_slides_and_carries_the_tool() -> None:
+    scara = replace(ROBOT, tool=Tool("finger", Transform.identity()))
+    look = CONDITIONS["at_pose"].open(CONDITIONS["at_pose"].spec(pose="all"), replace(WORLD, robot=scara))
+    near, far = (state(position=(0.5, -1.0, slide)) for slide in (0.001, 0.006))
+    found = look(moments(far, near, far))
+    assert found.margins == pytest.approx([0.004, -0.001])
+    assert found.found(1).text == "joint 'slide' is 6 mm from pose 'all'; within 5 mm"
+
+
+def test_at_pose_takes_a_joint_without_limits_the_short_way_round() -> None:
+    first, *others = ROBOT.joints
+    endless = replace(ROBOT, joints=(replace(first, type="continuous"), *others))
+    look = CONDITIONS["at_pose"].open(CONDITIONS["at_pose"].spec(pose="home"), replace(WORLD, robot=endless))
+    around = state(position=(0.51 + 2 * np.pi, -1.0, 0.0))
+    assert look(moments(around)).margins == pytest.approx([0.01])
 
 
 SPECS: list[tuple[str, dict[str, Any]]] = [
