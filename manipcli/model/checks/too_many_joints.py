@@ -19,7 +19,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF332", message, joints[MAX_JOINTS].place, hint)
 
 
-CHECK = Check(
+TOO_MANY_JOINTS = Check(
     code="URDF332",
     name="too-many-joints",
     tier="readiness",

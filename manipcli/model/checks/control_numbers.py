@@ -1,4 +1,4 @@
-"""Numbers and switches of ros2_control that are none."""
+"""Numbers and switches of <ros2_control> that are none."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -17,6 +17,7 @@ TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", 
 
 
 def _find(subject: Subject) -> Iterator[Finding]:
+    """Numbers and switches of ros2_control that are none."""
     for component in subject.description.root.all("ros2_control"):
         rate = component.attributes.get("rw_rate", "1").strip()
         if not _whole(rate):
@@ -102,21 +103,23 @@ def _whole(text: str) -> bool:
     return text.isascii() and text.isdigit() and int(text) > 0
 
 
-CHECK = Check(
-    code="URDF324",
-    name="control-number",
-    tier="readiness",
-    severity="error",
-    summary="A number or switch in <ros2_control> cannot be read, or contradicts the limits",
-    reason=(
-        "ros2_control takes its default instead, without a word; an initial position outside of the limits "
-        "starts the robot where it cannot be."
+CONTROL_NUMBER_CHECKS: tuple[Check, ...] = (
+    Check(
+        code="URDF324",
+        name="control-number",
+        tier="readiness",
+        severity="error",
+        summary="A number or switch in <ros2_control> cannot be read, or contradicts the limits",
+        reason=(
+            "ros2_control takes its default instead, without a word; an initial position outside of the limits "
+            "starts the robot where it cannot be."
+        ),
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="j">'
+            '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
+            "</ros2_control>"
+        ),
+        find=_find,
     ),
-    bad=one_joint(
-        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="j">'
-        '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
-        "</ros2_control>"
-    ),
-    find=_find,
 )
