@@ -18,7 +18,7 @@ from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries
-from manipcli.flow.log import default_log, judge_log, known_of, open_log, run_metadata, verdict_metadata
+from manipcli.flow.log import default_log, judge_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
 from manipcli.flow.recorded_task import recorded_task
 from manipcli.flow.sample import load_task
@@ -127,6 +127,7 @@ def run_task(
         log=str(where),
         timing=timing,
         warnings=(*warnings, *doubts),
+        meshes=mesh_files(task),
     )
 
 

@@ -136,6 +136,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
                 job.log,
                 job.picture,
                 at=found[0].at,
+                meshes=report.meshes,
                 package_path=settings.package_path,
                 allow_outside=settings.allow_outside,
             ),

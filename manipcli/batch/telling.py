@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,15 +86,16 @@ def draw(
     picture: Path,
     *,
     at: float | None = None,
+    meshes: Mapping[str, Path] = {},
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> None:
-    """The picture of a moment of a log, `at` [s], or of its end.
+    """The picture of a moment of a log, `at` [s], or of its end, with the files of `meshes`, where they are known.
 
     Raises:
         ManipcliError: the log shows nothing, or a mesh is not there.
     """
-    playback = open_playback(log, package_path=package_path, allow_outside=allow_outside)
+    playback = open_playback(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
     with Shots(playback, size=SIZE) as shots:
         image = shots.at(playback.end if at is None else min(max(at, playback.start), playback.end))
     write_whole(picture, png_bytes(image))
@@ -121,7 +122,7 @@ def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
         page = refused_page(task, report.verdict)
     else:
         page = log_page(
-            job.log, task_file=job.path, package_path=settings.package_path, allow_outside=settings.allow_outside
+            job.log, meshes=report.meshes, package_path=settings.package_path, allow_outside=settings.allow_outside
         )
     if report.verdict.verdict == "passed" and found:
         page = replace(page, verdict=replace(page.verdict, verdict="failed"), causes=_causes(page, found))

@@ -13,7 +13,7 @@ from manipcli.cli import console
 from manipcli.core.errors import Finding, InvalidInput
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from manipcli.flow.load import Task
     from manipcli.judge.verdict import Verdict
@@ -96,6 +96,7 @@ class Outputs:
         task: Path | None = None,
         overrides: Sequence[str] = (),
         warnings: Sequence[Finding] = (),
+        meshes: Mapping[str, Path] = {},
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
     ) -> None:
@@ -106,7 +107,7 @@ class Outputs:
             verdict: on it.
             task, overrides: its file and what was set in it, where the command knows it.
             warnings: what was doubted before it was run.
-            package_path, allow_outside: where the meshes may be.
+            meshes, package_path, allow_outside: the meshes that are known, and where others may be.
         """
         from manipcli.flow.report import file_places, log_page, log_places
         from manipcli.record.reading import open_recording
@@ -121,7 +122,7 @@ class Outputs:
             file = str(task) if task is not None else ""
             self._write(self._junit, render_junit(verdict, *places, log=log.name, file=file))
         if self._report is not None:
-            page = log_page(log, task_file=task, package_path=package_path, allow_outside=allow_outside)
+            page = log_page(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
             self._write(self._report, render_page(replace(page, warnings=tuple(warnings))).encode())
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Finding]) -> None:

@@ -88,6 +88,7 @@ def run(
                 task=task,
                 overrides=words,
                 warnings=report.warnings,
+                meshes=report.meshes,
                 package_path=folders,
                 allow_outside=allow_outside,
             )

@@ -17,14 +17,15 @@ from manipcli.model.scene import Scene
 class MeshSearch:
     """Puts the paths of files into the meshes of a robot or a scene that have only their URIs.
 
-    What the log carries itself is taken from there. Packages are looked for as for a description beside the log, in the
-    folders of a project that holds the log in `runs/`, and in the working directory and its folders. What is not found
-    keeps its URI as its path: whoever draws it draws something else.
+    What the log carries itself, and files that are known, are taken. Packages are looked for as for a description
+    beside the log, in the folders of a project that holds the log in `runs/`, and in the working directory and its
+    folders. What is not found keeps its URI as its path: whoever draws it draws something else.
 
     Args:
         log: where the log is.
         hashes: SHA-256 of the files in the run, by URI, where they are known.
         embedded: files that the log carries, by URI.
+        known: files that the run had, by URI, where whoever asks has just run it.
         package_path, allow_outside: see `Packages`.
 
     Attributes:
@@ -37,6 +38,7 @@ class MeshSearch:
         *,
         hashes: Mapping[str, str] = {},
         embedded: Mapping[str, bytes] = {},
+        known: Mapping[str, Path] = {},
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
     ) -> None:
@@ -47,6 +49,7 @@ class MeshSearch:
         places = [*package_path, *project, *_folders(beside), here, *_folders(here)]
         self._packages = Packages(log, package_path=places, allow_outside=allow_outside)
         self._hashes = hashes
+        self._known = known
         self.folder = TemporaryDirectory(prefix="manipcli-") if embedded else None
         self._found = _unpacked(embedded, Path(self.folder.name)) if self.folder is not None else {}
         self._notes: dict[str, None] = {}
@@ -85,7 +88,7 @@ class MeshSearch:
 
     def _search(self, uri: str) -> Path:
         try:
-            path = self._packages.resolve(uri)
+            path = self._known.get(uri) or self._packages.resolve(uri)
         except NotFound as error:
             scheme, _, rest = uri.partition("://")
             if scheme == "package":
@@ -95,8 +98,8 @@ class MeshSearch:
                 note = error.message
             self._notes.setdefault(note)
             return Path(uri)
-        known = self._hashes.get(uri)
-        if known is not None and hashlib.sha256(path.read_bytes()).hexdigest() != known:
+        digest = self._hashes.get(uri)
+        if digest is not None and hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             self._notes.setdefault(f"mesh '{uri}' is not the file that it was in the run")
         return path
 

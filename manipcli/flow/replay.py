@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -28,6 +28,7 @@ def open_playback(
     *,
     rate: float = RATE,
     space: str | None = None,
+    meshes: Mapping[str, Path] = {},
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> Playback:
@@ -37,6 +38,7 @@ def open_playback(
         path: the log of a run, what a killed run left of it, or a ROS 2 log of another program.
         rate: [Hz] of what is shown.
         space: the namespace of the robot that is shown, of several that another program recorded, as `/r1`.
+        meshes: files that the run had, by URI, where they are known.
         package_path: folders to look for packages of meshes in, before those near the log and the working directory.
         allow_outside: lets a mesh lie anywhere.
 
@@ -45,13 +47,15 @@ def open_playback(
     """
     if space is None and is_own(path):
         try:
-            return _open_own(path, rate=rate, package_path=package_path, allow_outside=allow_outside)
+            return _open_own(path, rate=rate, known=meshes, package_path=package_path, allow_outside=allow_outside)
         except Thinned:
             return open_other(path, rate=rate, why=LEFT_OUT, package_path=package_path, allow_outside=allow_outside)
     return open_other(path, rate=rate, space=space, package_path=package_path, allow_outside=allow_outside)
 
 
-def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_outside: bool) -> Playback:
+def _open_own(
+    path: Path, *, rate: float, known: Mapping[str, Path], package_path: Sequence[Path], allow_outside: bool
+) -> Playback:
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
     if not len(samples.times):
@@ -62,6 +66,7 @@ def _open_own(path: Path, *, rate: float, package_path: Sequence[Path], allow_ou
         path,
         hashes=recording.metadata.get("meshes", {}),
         embedded=recording.embedded_meshes(),
+        known=known,
         package_path=package_path,
         allow_outside=allow_outside,
     )

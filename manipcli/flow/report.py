@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,23 +41,21 @@ Places = tuple[tuple[Written, ...], tuple[Written, ...]]
 
 
 def log_page(
-    path: Path, *, task_file: Path | None = None, package_path: Sequence[Path] = (), allow_outside: bool = False
+    path: Path, *, meshes: Mapping[str, Path] = {}, package_path: Sequence[Path] = (), allow_outside: bool = False
 ) -> RunPage:
     """The page about a log, from nothing but the log and the files of its meshes.
 
     Args:
         path: the log of a run, or what a killed run left of it.
-        task_file: the task, where that is known: meshes are looked for near the files that it names, too.
-        package_path, allow_outside: see `open_playback`.
+        meshes, package_path, allow_outside: see `open_playback`.
 
     Raises:
         InvalidInput: the file is no log of ours, is damaged, or holds no tick.
     """
     recording = open_recording(path)
     task = recorded_task_file(recording, path).spec
-    near = _near(task_file, task) if task_file is not None else ()
     playback = open_playback(
-        path, rate=_rate(recording), package_path=(*package_path, *near), allow_outside=allow_outside
+        path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
     )
     verdict = playback.verdict
     assert verdict is not None, "the log is one of ours"
@@ -162,13 +160,6 @@ def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
         return places | steps, [str(place) for place in plan.get("judged", ())]
     except (ValueError, KeyError, TypeError, AttributeError):
         return places, []
-
-
-def _near(task_file: Path, task: TaskSpec) -> tuple[Path, ...]:
-    """Where the packages of a task's robot and of its scene may be."""
-    folder = task_file.resolve().parent
-    robot = (folder / task.robot).resolve().parent
-    return (robot, *list(robot.parents)[:2], folder)
 
 
 def _rate(recording: Recording) -> float:

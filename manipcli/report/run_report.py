@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from manipcli.core.errors import ExitCode, Finding
 from manipcli.judge.verdict import INTERRUPTED, Verdict
@@ -29,6 +31,7 @@ class RunReport:
         log: path of the log, as text; None where nothing was run, or it was not kept.
         timing: the parts of `wall_time`.
         warnings: what was doubted before the run began: about its files, and about gains.
+        meshes: files of the robot and of the scene by the URIs that the log has for them, to draw the run with.
     """
 
     verdict: Verdict
@@ -37,6 +40,7 @@ class RunReport:
     log: str | None
     timing: Timing
     warnings: tuple[Finding, ...] = ()
+    meshes: Mapping[str, Path] = field(default_factory=dict)
 
 
 def exit_code(verdict: Verdict) -> ExitCode:

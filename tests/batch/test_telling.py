@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,8 @@ import pytest
 
 from manipcli.batch.baseline import Measure, baseline_path, write_baseline
 from manipcli.batch.job import Job, Settings
-from manipcli.batch.telling import against_baseline, junit, troubles
+from manipcli.batch.pool import run_jobs
+from manipcli.batch.telling import against_baseline, draw, junit, troubles
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case
@@ -85,3 +87,24 @@ def test_a_yml_is_compared_with_a_baseline_of_the_earlier_name(tmp_path: Path, m
     monkeypatch.setattr("manipcli.batch.telling.measured", lambda *_: {("duration",): Measure(2.0, "s")})
     ((trouble,), _) = against_baseline(one, VERDICT)
     assert "the task takes 2.00 s; its baseline is 1.00 s" in trouble.message
+
+
+@pytest.mark.slow
+def test_picture_and_page_are_drawn_with_the_meshes_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the folder of the task, as `cd tasks; manipcli test` is: the robot is in another one."""
+    shutil.copytree(ROOT / "robots" / "arm7_hand3", tmp_path / "robots" / "arm7_hand3")
+    (tmp_path / "tasks").mkdir()
+    monkeypatch.chdir(tmp_path / "tasks")
+    robot, controllers = "../robots/arm7_hand3/robot.yaml", f"{ROOT}/controllers/arm7_hand3.yaml"
+    expect = "expect: [{duration: {below: 1 ms}}]\n"
+    text = f"task: a\nrobot: {robot}\ncontrollers: {controllers}\nsteps: [{{wait: 1 ms}}]\n{expect}"
+    Path("a.yaml").write_text(text)
+    settings = Settings(folder=Path("runs/test"), pages=Path("pages"))
+    (report,) = run_jobs([Job(Case("a.yaml", "a"), Path("a.yaml"), settings)], at_once=1)
+    assert (report.outcome, report.notes) == ("failed", ())
+    assert report.log is not None and report.picture is not None and report.page is not None
+    with_meshes, without = tmp_path / "with.png", tmp_path / "without.png"
+    draw(Path(report.log), with_meshes, at=report.troubles[0].at, package_path=[tmp_path / "robots"])
+    draw(Path(report.log), without, at=report.troubles[0].at)
+    assert Path(report.picture).read_bytes() == with_meshes.read_bytes() != without.read_bytes()
+    assert "package-path" not in Path(report.page).read_text("utf-8")

@@ -193,6 +193,26 @@ def test_meshes_of_the_project_that_holds_the_runs_are_found_from_anywhere(
     assert open_playback(Path(shutil.copy(log, tmp_path / "project" / "downloads" / "lift.mcap"))).notes != ()
 
 
+def test_what_has_just_run_is_drawn_with_the_files_that_it_had(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A workspace of ROS: the description is in no folder beside, above or below the files of the project."""
+    shutil.copytree(ROOT / "robots" / "arm7_hand3", tmp_path / "ws" / "src" / "arm7_hand3")
+    robot = (ROOT / "robots" / "arm7_hand3" / "robot.yaml").read_text()
+    project = tmp_path / "projects" / "wave"
+    (project / "runs").mkdir(parents=True)
+    (project / "robot.yaml").write_text(
+        robot.replace("description: urdf", "description: ../../ws/src/arm7_hand3/urdf"), "utf-8"
+    )
+    task = TASK.replace(f"{ROOT}/robots/arm7_hand3/robot.yaml", "robot.yaml")
+    (project / "wave.yaml").write_text(task)
+    monkeypatch.chdir(project)
+    report = run_task(Path("wave.yaml"))
+    assert report.log is not None
+    known = open_playback(Path(report.log), meshes=report.meshes)
+    assert known.notes == ()
+    assert any(isinstance(one.shape, Mesh) for one in known.robot.links[1].visuals)
+    assert open_playback(Path(report.log)).notes != ()
+
+
 def test_a_mesh_that_is_another_file_than_in_the_run_is_told(log: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "robots" / "arm7_hand3", tmp_path / "arm7_hand3")
     victim = tmp_path / "arm7_hand3" / "meshes" / "palm.stl"

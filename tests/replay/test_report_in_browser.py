@@ -29,9 +29,9 @@ class Page(Protocol):
 @pytest.mark.slow
 def test_the_report_of_a_failed_run_leads_to_its_moments(browser: Page, tmp_path: Path) -> None:
     task = next((ROOT / "examples" / "02_pick_a_block").glob("task*.yaml"))
-    run_task(task, log=tmp_path / "run.mcap", overrides=["scene.block.friction=0.01"])
+    run = run_task(task, log=tmp_path / "run.mcap", overrides=["scene.block.friction=0.01"])
     file = tmp_path / "report.html"
-    file.write_text(render_page(log_page(tmp_path / "run.mcap", task_file=task)), "utf-8")
+    file.write_text(render_page(log_page(tmp_path / "run.mcap", meshes=run.meshes)), "utf-8")
     browser.open(file.as_uri())
     browser.wait_for("!!document.querySelector('.mc-player')?.player")
     assert str(browser.evaluate("document.querySelector('.why h3').textContent")).startswith("✗ ")
