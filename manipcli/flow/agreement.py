@@ -31,6 +31,8 @@ ABSENT: Final = 230
 UNCOMMANDED: Final = 232
 NOT_SWITCHED: Final = 233
 """Numbers of findings about a task."""
+OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
+"""Findings about a controllers file that speak of joints which are not there, or not its own."""
 
 
 def disagreements(
@@ -40,7 +42,7 @@ def disagreements(
     what the engine refuses, what no controller commands. Warnings and notes are among it."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
-    claims = None if misclaimed or not controllers else Claims.of(controllers.spec)
+    claims = Claims.of(controllers.spec) if controllers and controllers.source.untouched() and not misclaimed else None
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
     warned = () if found else unjudged(task, robot, scene)
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
@@ -140,6 +142,8 @@ def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
 
 
 def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
-    """What is wrong with who commands what, and what is only to be told."""
+    """What is wrong with who commands what, and what is only to be told; of a file from which something was left out
+    nothing but names."""
     period = task.simulation.control_period
-    return controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))
+    found = controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))
+    return found if file.source.untouched() else tuple(one for one in found if one.code in OF_NAMES)

@@ -124,6 +124,9 @@ def load_task(
     controllers_file = controllers_path and gathered(
         lambda: load.load_controllers(controllers_path, overrides=overrides)
     )
+    controllers_read = controllers_file or (
+        controllers_path and load.salvage_controllers_file(controllers_path, overrides=overrides)
+    )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = None
     if task is not None:
@@ -131,7 +134,7 @@ def load_task(
         scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), packages=packages))
     told: tuple[Finding, ...] = ()
     if built:
-        found = disagreements(read, controllers_file or None, built[0], scene or named_scene(read.spec))
+        found = disagreements(read, controllers_read or None, built[0], scene or named_scene(read.spec))
         gathered.findings += [finding for finding in found if finding.severity == "error"]
         told = tuple(finding for finding in found if finding.severity != "error")
     else:

@@ -237,6 +237,7 @@ def _told(
     hint = hints.of_type(kind, node, kinds)
     if hint is None and kind in ("model_type", "model_attributes_type"):
         hint = hints.to_write(shape.keys_of(kinds))
+    hint = hint or _described(_field(first, model), path)
     return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], hint
 
 

@@ -21,6 +21,7 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros import rewrite
 from manipcli.spec.ros.substitutions import open_substitutions
 from manipcli.spec.salvage import salvage
+from manipcli.spec.salvage_controllers import salvage_controllers
 from manipcli.spec.salvage_robot import salvage_robot
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode, child
@@ -204,11 +205,24 @@ def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[Co
 
 def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
     """As `load_controllers`, from text; places call it `name`."""
+    source, findings = _controllers_source(text, name, overrides)
+    return validate(source, ControllersSpec, findings=[*findings, *open_substitutions(source.root)])
+
+
+def _controllers_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Finding]]:
     written, told = _source(text, name, "CTRL", "controllers")
     root, more = rewrite(written.root)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
-    unfilled = open_substitutions(source.root)
-    return validate(source, ControllersSpec, findings=[*told, *more, *findings, *unfilled])
+    return source, [*told, *more, *findings]
+
+
+def salvage_controllers_file(path: Path, *, overrides: Sequence[str]) -> Located[ControllersSpec] | None:
+    """What remains of a controllers file that `load_controllers` refused; None where too little does."""
+    try:
+        source, _ = _controllers_source(read_bytes(path), str(path), overrides)
+    except InvalidInput:
+        return None
+    return salvage_controllers(source)
 
 
 def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Finding]]:

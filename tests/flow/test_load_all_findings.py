@@ -350,3 +350,65 @@ def test_a_body_called_as_a_word_and_as_a_link_is_told_once(tmp_path: Path) -> N
     told = findings(tmp_path, f"scene:\n  tool: {body}\nsteps: [wait: 1 s]\n")
     assert [line for line, *_ in told] == [5]
     assert "the word means something else in a task" in told[0][2]
+
+
+def of_controllers(tmp_path: Path, text: str) -> list[tuple[int, str, str | None]]:
+    """Line, code and hint of each finding about a controllers file."""
+    (tmp_path / "controllers.yaml").write_text(text)
+    file = tmp_path / "t.yaml"
+    file.write_text(
+        f"task: t\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: controllers.yaml\nsteps:\n  - move: {{to: zero}}\n"
+    )
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file)
+    return [(f.place.line, f.code, f.hint) for f in refused.value.findings if f.place is not None]
+
+
+def test_a_faulty_value_of_a_controller_hides_no_joint_that_is_not_there(tmp_path: Path) -> None:
+    found = of_controllers(
+        tmp_path,
+        """\
+controllers:
+  arm_controller:
+    type: joint_trajectory
+    joints: [joint_1, jont_3]
+    gains:
+      joint_1: {p: 300, d: fast}
+      joint_9: {p: 300, dd: 3}
+    constraints: {joints: {joint_1: {goal: 1 kg}, wrist: {goal: 0.1}}}
+  hand:
+    type: gripper
+    joint: finger_1_proximal
+    speed: {}
+    max_effort: [1]
+""",
+    )
+    assert [one[:2] for one in found] == [
+        (4, "CTRL144"), (6, "CTRL205"), (7, "CTRL102"), (7, "CTRL201"), (8, "CTRL207"), (8, "CTRL104"),
+        (10, "CTRL202"), (11, "CTRL201"), (12, "CTRL205"), (13, "CTRL205"),
+    ]  # fmt: skip
+    assert found[1][2] == "d: Derivative, 0 or more. Default 0."
+
+
+@pytest.mark.parametrize(
+    ("written", "faulty", "code"),
+    [
+        ("{p: 300, d: 12}", "{p: much, d: 12}", "CTRL205"),
+        ("command_interface: effort", "command_interface: efort", "CTRL203"),
+        ("[joint_1, joint_2", "[1, joint_2", "CTRL205"),
+        ("type: gripper", "type: griper", "CTRL203"),
+    ],
+)
+def test_of_a_controller_without_its_faulty_value_only_names_are_told(
+    tmp_path: Path, written: str, faulty: str, code: str
+) -> None:
+    """No gain of 0, no joint that nobody commands, no claim of another interface is made up."""
+    whole = (ROOT / "controllers" / "arm7_hand3.yaml").read_text()
+    assert written in whole
+    assert [one[1] for one in of_controllers(tmp_path, whole.replace(written, faulty, 1))] == [code]
+
+
+def test_a_name_that_a_launch_file_completes_is_not_called_absent(tmp_path: Path) -> None:
+    whole = (ROOT / "controllers" / "arm7_hand3.yaml").read_text()
+    text = whole.replace("[joint_1,", '["$(var prefix)joint_1",', 1).replace("type: gripper", "type: griper")
+    assert {one[1] for one in of_controllers(tmp_path, text)} == {"CTRL217", "CTRL203"}
