@@ -356,9 +356,8 @@ def of_controllers(tmp_path: Path, text: str) -> list[tuple[int, str, str | None
     """Line, code and hint of each finding about a controllers file."""
     (tmp_path / "controllers.yaml").write_text(text)
     file = tmp_path / "t.yaml"
-    file.write_text(
-        f"task: t\nrobot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: controllers.yaml\nsteps:\n  - move: {{to: zero}}\n"
-    )
+    head = HEAD.replace(f"{ROOT}/controllers/arm7_hand3.yaml", "controllers.yaml")
+    file.write_text(f"{head}steps:\n  - move: {{to: zero}}\n")
     with pytest.raises(InvalidInput) as refused:
         load_task(file)
     return [(f.place.line, f.code, f.hint) for f in refused.value.findings if f.place is not None]
