@@ -204,6 +204,8 @@ class StepsRun:
         """One attempt, planned anew where things are not as they were planned to be, or `again`."""
         before = cuts_of(self._session)
         now = self._measured.situation(self._believed)
+        if again and planned_start.carried is None and planned.plan.end.carried is not None:
+            now = replace(now, carried=None)  # it takes again what it took in vain, with a hand that is closed on it
         differences = self._measured.differences(planned_start, now, step)
         anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
         if anew:
