@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
@@ -98,7 +99,8 @@ def rewrite_log() -> Rewrite:
     """Writes a log once more with the mcap library, all its checksums valid.
 
     `message(topic, message)` gives the bytes that take the place of a message's, or None to leave it out;
-    `attachment(name, data)` and `metadata(name, values)` give what takes the place of those, or None.
+    `attachment(name, data)` and `metadata(name, values)` give what takes the place of those, or None. What is said
+    besides goes to the library's `Writer`.
     """
 
     def rewrite(
@@ -108,10 +110,10 @@ def rewrite_log() -> Rewrite:
         message: Callable[[str, Message], bytes | None] = lambda _, one: one.data,
         attachment: Callable[[str, bytes], bytes | None] = lambda _, data: data,
         metadata: Callable[[str, dict[str, str]], dict[str, str] | None] = lambda _, values: values,
-        chunk_size: int = 1 << 20,
+        **writing: Any,
     ) -> Path:
         with source.open("rb") as file, target.open("wb") as out:
-            reader, writer = make_reader(file), Writer(out, chunk_size=chunk_size)
+            reader, writer = make_reader(file), Writer(out, **writing)
             header, summary = reader.get_header(), reader.get_summary()
             assert summary is not None
             writer.start(profile=header.profile, library=header.library)

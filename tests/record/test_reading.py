@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 import tracemalloc
@@ -27,6 +28,7 @@ from manipcli.record.reading import open_recording, read_recording
 from manipcli.record.recording import Recording
 
 MakeRun = Callable[[int], Any]
+Rewrite = Callable[..., Path]
 MAGIC = b"\x89MCAP0\r\n"
 ARRAYS = ("time", "position", "velocity", "effort", "body_position", "body_quat_xyzw", "body_linear", "body_angular")
 
@@ -146,22 +148,15 @@ def test_a_file_that_shrinks_between_two_readings_is_refused(small: tuple[Any, P
         list(recording.spans)
 
 
-def test_controllers_are_recorded_at_every_tick_or_the_file_is_refused(small: tuple[Any, Path], tmp_path: Path) -> None:
+def test_controllers_are_recorded_at_every_tick_or_the_file_is_refused(
+    small: tuple[Any, Path], tmp_path: Path, rewrite_log: Rewrite
+) -> None:
     _, path = small
-    with path.open("rb") as source, (tmp_path / "copy.mcap").open("wb") as target:
-        reader = make_reader(source)
-        summary = reader.get_summary()
-        assert summary is not None
-        writer = Writer(target)
-        writer.start(profile="ros2")
-        for metadata in reader.iter_metadata():
-            writer.add_metadata(metadata.name, metadata.metadata)
-        ids = {s.id: writer.register_schema(s.name, s.encoding, s.data) for s in summary.schemas.values()}
-        ids = {c.id: writer.register_channel(c.topic, "cdr", ids[c.schema_id]) for c in summary.channels.values()}
-        for _, channel, m in reader.iter_messages():
-            if channel.topic != "/arm/controller_state" or m.log_time != 7_000_000:
-                writer.add_message(ids[channel.id], m.log_time, m.data, m.publish_time, m.sequence)
-        writer.finish()
+
+    def all_but_one(topic: str, one: Message) -> bytes | None:
+        return None if topic == "/arm/controller_state" and one.log_time == 7_000_000 else one.data
+
+    rewrite_log(path, tmp_path / "copy.mcap", message=all_but_one)
     with pytest.raises(BadRecording, match="left out messages"):
         read_recording(tmp_path / "copy.mcap")
 
@@ -309,48 +304,29 @@ def test_a_damaged_chunk_is_named_by_place_and_time(small: tuple[Any, Path], tmp
 @pytest.mark.parametrize("compression", list(CompressionType))
 @pytest.mark.parametrize("index_types", [IndexType.ALL, IndexType.NONE])
 def test_another_writer_s_copy_reads_the_same(
-    small: tuple[Any, Path], tmp_path: Path, compression: CompressionType, index_types: IndexType
+    small: tuple[Any, Path],
+    tmp_path: Path,
+    rewrite_log: Rewrite,
+    compression: CompressionType,
+    index_types: IndexType,
 ) -> None:
     """The mcap library's writer: other chunks, channels inside them, with and without indexes and checksums."""
     _, path = small
-    with path.open("rb") as source, (tmp_path / "copy.mcap").open("wb") as target:
-        reader = make_reader(source)
-        writer = Writer(target, chunk_size=7000, compression=compression, index_types=index_types)
-        writer.start(profile="ros2")
-        for attachment in reader.iter_attachments():
-            writer.add_attachment(0, 0, attachment.name, attachment.media_type, attachment.data)
-        for metadata in reader.iter_metadata():
-            writer.add_metadata(metadata.name, metadata.metadata)
-        summary = reader.get_summary()
-        assert summary is not None
-        ids = {s.id: writer.register_schema(s.name, s.encoding, s.data) for s in summary.schemas.values()}
-        ids = {
-            c.id: writer.register_channel(c.topic, c.message_encoding, ids[c.schema_id], c.metadata)
-            for c in summary.channels.values()
-        }
-        for _, channel, m in reader.iter_messages():
-            writer.add_message(ids[channel.id], m.log_time, m.data, m.publish_time, m.sequence)
-        writer.finish()
+    rewrite_log(path, tmp_path / "copy.mcap", chunk_size=7000, compression=compression, index_types=index_types)
     assert_same(read_recording(tmp_path / "copy.mcap"), read_recording(path))
 
 
-def test_messages_of_changing_length_are_read_one_by_one(tmp_path: Path, small: tuple[Any, Path]) -> None:
+def test_messages_of_changing_length_are_read_one_by_one(
+    tmp_path: Path, small: tuple[Any, Path], rewrite_log: Rewrite
+) -> None:
     """Two robots' worth of frames in one /tf channel: sizes differ, the bodies' numbers are found all the same."""
     _, path = small
-    with path.open("rb") as source, (tmp_path / "copy.mcap").open("wb") as target:
-        reader = make_reader(source)
-        summary = reader.get_summary()
-        assert summary is not None
-        writer = Writer(target)
-        writer.start(profile="ros2")
-        for metadata in reader.iter_metadata():
-            writer.add_metadata(metadata.name, metadata.metadata)
-        ids = {s.id: writer.register_schema(s.name, s.encoding, s.data) for s in summary.schemas.values()}
-        ids = {c.id: writer.register_channel(c.topic, "cdr", ids[c.schema_id]) for c in summary.channels.values()}
-        for k, (_, channel, m) in enumerate(reader.iter_messages()):
-            data = m.data + bytes(8 * (k % 3)) if channel.topic in ("/tf", "/joint_states") else m.data
-            writer.add_message(ids[channel.id], m.log_time, data, m.publish_time, m.sequence)
-        writer.finish()
+    number = itertools.count()
+
+    def longer(topic: str, one: Message) -> bytes:
+        return one.data + bytes(8 * (next(number) % 3)) if topic in ("/tf", "/joint_states") else one.data
+
+    rewrite_log(path, tmp_path / "copy.mcap", message=longer)
     ours, theirs = read_recording(path), read_recording(tmp_path / "copy.mcap")
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(ours.states, name), getattr(theirs.states, name))
