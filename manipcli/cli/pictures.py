@@ -13,6 +13,8 @@ from manipcli.core.errors import Finding, InvalidInput
 if TYPE_CHECKING:
     from manipcli.replay.playback import Playback
 
+VIEW, FPS, SPEED = "iso", 25.0, 1.0
+"""Where nothing else is said."""
 REDRAW_PERIOD = 0.2
 """[s] between two reports of how far a film is."""
 
@@ -26,8 +28,8 @@ class Pictures:
         sheet: all steps as PNG, or None.
         video: a film, or None.
         size: `960x540`, or None for what suits each.
-        view: from where.
-        fps, speed: of the film.
+        view: from where, or None.
+        fps, speed: of the film, or None.
 
     Raises:
         InvalidInput: an option that makes no picture, or what a film needs is not installed.
@@ -41,16 +43,28 @@ class Pictures:
         video: Path | None,
         *,
         size: str | None,
-        view: str,
-        fps: float,
-        speed: float,
+        view: str | None,
+        fps: float | None,
+        speed: float | None,
     ) -> None:
         self._picture, self._at, self._sheet, self._video = picture, at, sheet, video
-        self._size, self._view, self._fps, self._speed = size, view, fps, speed
+        self._size = size
+        self._view, self._fps, self._speed = (
+            view or VIEW,
+            FPS if fps is None else fps,
+            SPEED if speed is None else speed,
+        )
         if at is not None and picture is None:
             raise InvalidInput(
                 [Finding("USE062", "--at says which moment --picture draws", hint="give --picture, too")]
             )
+        for option, value in (("--fps", fps), ("--speed", speed)):
+            if value is not None and video is None:
+                raise InvalidInput([Finding("USE062", f"{option} is that of a film", hint="give --video, too")])
+        for option, given in (("--size", size), ("--view", view)):
+            if given is not None and not self.wanted:
+                hint = "give --picture, --sheet or --video, too"
+                raise InvalidInput([Finding("USE062", f"{option} is that of a picture or a film", hint=hint)])
         check_picture(picture)
         check_picture(sheet)
         if self.wanted:
@@ -58,8 +72,8 @@ class Pictures:
             from manipcli.replay.film import check_pace, kind_of
             from manipcli.replay.shots import parse_size
 
-            direction(view)
-            check_pace(fps, speed)
+            direction(self._view)
+            check_pace(self._fps, self._speed)
             if size is not None:
                 parse_size(size)
             if video is not None:

@@ -48,12 +48,20 @@ def replay(
         str | None, typer.Option("--size", metavar="WxH", help="Of a picture, 960x720 when absent; of a film, 640x360.")
     ] = None,
     view: Annotated[
-        str, typer.Option("--view", metavar="VIEW", help="iso, front, back, left, right, top, or AZIMUTH,ELEVATION.")
-    ] = "iso",
-    fps: Annotated[float, typer.Option("--fps", metavar="N", help="Frames of a film in one second.")] = 25.0,
+        str | None,
+        typer.Option(
+            "--view",
+            metavar="VIEW",
+            help="Of pictures and films: iso, front, back, left, right, top, or AZIMUTH,ELEVATION; iso when absent.",
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option("--fps", metavar="N", help="Frames of a film in one second; 25 when absent.")
+    ] = None,
     speed: Annotated[
-        float, typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film.")
-    ] = 1.0,
+        float | None,
+        typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film; 1 when absent."),
+    ] = None,
     robot: Annotated[
         str | None, typer.Option("--robot", metavar="NAMESPACE", help="Of several robots in a ROS 2 log, as /left.")
     ] = None,
@@ -75,7 +83,8 @@ def replay(
     Needs nothing but the log and the packages of its meshes. Ctrl-C ends it. With --verify: 0 identical, 1 not.
     """
     files = (("--html", html), ("--picture", picture), ("--sheet", sheet), ("--video", video))
-    shows = (*files, ("--at", at), ("--size", size), ("--robot", robot), ("--port", port), ("--open", open_ or None))
+    drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
+    shows = (*files, *drawn, ("--robot", robot), ("--port", port), ("--open", open_ or None))
     verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
     _check_options(verify=verify, shows=shows, verifies=verifies)
     with Interrupts() as interrupts:

@@ -58,6 +58,10 @@ def test_a_log_without_its_end_is_drawn_too(
     ("words", "code", "says"),
     [
         (["--at", "1"], "USE062", "give --picture"),
+        (["--speed", "1"], "USE062", "give --video"),
+        (["--fps", "25", "--sheet", "x.png"], "USE062", "give --video"),
+        (["--view", "iso"], "USE062", "give --picture, --sheet or --video"),
+        (["--size", "9x9", "--html", "x.html"], "USE062", "give --picture, --sheet or --video"),
         (["--picture", "a.jpg"], "USE063", "a picture is a .png"),
         (["--sheet", "a.pdf"], "USE063", "a picture is a .png"),
         (["--picture", "a.png", "--at", "fellow_1"], "REPLAY011", "did you mean 'follow_1'?"),

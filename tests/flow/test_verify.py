@@ -199,9 +199,11 @@ def test_a_log_without_its_files_and_a_foreign_one_are_refused(
 
 def test_options_that_show_a_run_are_refused_where_it_is_verified(capsys: pytest.CaptureFixture[str]) -> None:
     """And those of verifying where it is shown; no log is opened."""
-    shows = ["--picture", "x.png", "--at", "1", "--size", "9x9", "--robot", "left", "--port", "8765", "--open"]
+    shows = ["--picture", "x.png", "--at", "1", "--size", "9x9", "--view", "iso", "--fps", "25", "--speed", "1"]
+    shows += ["--robot", "left", "--port", "8765", "--open"]
     assert main(["replay", "absent.mcap", "--verify", *shows]) == 4
-    told = "USE080]: --verify shows nothing: leave out --picture, --at, --size, --robot, --port, --open"
+    told = "USE080]: --verify shows nothing: leave out --picture, --at, --size, --view, --fps, --speed, --robot, "
+    told += "--port, --open"
     assert told in capsys.readouterr().err
     assert main(["replay", "absent.mcap", "--allow-different", "--format", "json"]) == 4
     assert "--allow-different, --format json are for --verify alone" in capsys.readouterr().out
