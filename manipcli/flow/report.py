@@ -23,7 +23,7 @@ from manipcli.replay.shots import Shots, telling
 from manipcli.report.facts import run_facts
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
-from manipcli.report.text import STEP_WORDS
+from manipcli.report.text import went_wrong
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task as load_spec
 from manipcli.spec.located import Located
@@ -179,9 +179,7 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
     for step, written in zip(verdict.steps, places[0], strict=False):
         if step.outcome not in ("done", "not_run") and not step.tolerated:
             at = None if end is None else step.ended if step.ended is not None else end
-            tries = f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
-            title = f"step '{step.id}' {STEP_WORDS[step.outcome]}{tries}"
-            causes.append(Cause(title, step.text, at, written, hint))
+            causes.append(Cause(went_wrong(step), step.text, at, written, hint))
             hint = ""
     for one, written in zip(verdict.expectations, places[1], strict=False):
         if one.outcome != "passed" and end is not None:

@@ -15,7 +15,7 @@ from manipcli.core.text import escape
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Written
-from manipcli.report.text import STEP_WORDS
+from manipcli.report.text import went_wrong
 
 _NO_XML = re.compile("[\ufffe\uffff]")
 
@@ -86,8 +86,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
         SubElement(case, "system-out").text = safe(f"{step.outcome}, and the task says that it may: {step.text}")
     elif step.outcome != "done":
         when = "" if step.ended is None else f"at {step.ended:.3f} s"
-        tries = f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
-        message = f"step '{step.id}' {STEP_WORDS[step.outcome]}{tries}" + (f": {step.text}" if step.text else "")
+        message = went_wrong(step) + (f": {step.text}" if step.text else "")
         hints = [f"hint: {one.hint}" for one in verdict.errors if one.hint and verdict.verdict == "failed"]
         _add(case, "failure", message, step.outcome, [when, *hints])
     return case

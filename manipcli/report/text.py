@@ -99,7 +99,7 @@ def _causes(verdict: Verdict) -> list[str]:
         if undone or all(expectation.outcome == "passed" for expectation in verdict.expectations):
             return [f"{FAIL} {verdict.text}"]  # it ended before the first step, or after the last
     causes += [
-        f"{FAIL} step '{step.id}' {STEP_WORDS[step.outcome]}{_tries(step)}{f': {step.text}' if step.text else ''}"
+        f"{FAIL} {went_wrong(step)}{f': {step.text}' if step.text else ''}"
         for step in verdict.steps
         if step.outcome not in ("done", "not_run") and not step.tolerated
     ]
@@ -120,7 +120,12 @@ def _tries(step: StepOutcome) -> str:
     return f" at attempt {len(step.attempts)}" if len(step.attempts) > 1 else ""
 
 
-STEP_WORDS = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
+_WENT_WRONG = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
+
+
+def went_wrong(step: StepOutcome) -> str:
+    """That a step did, and how."""
+    return f"step '{step.id}' {_WENT_WRONG[step.outcome]}{_tries(step)}"
 
 
 def _summary(verdict: Verdict) -> str:
