@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -75,8 +76,9 @@ class FollowSpec(Model):
     """The joints follow a trajectory_msgs/JointTrajectory, written as ROS writes it.
 
     Between two points the curve is linear, cubic or quintic by what both give; the first is led to from where the robot
-    is, at rest. Position and velocity limits hold for every curve; a linear one has infinite acceleration at its points
-    and a cubic one infinite jerk, so those limits are asked only of curves that can keep them.
+    is, at rest, by continuous joints the short way round. Position and velocity limits hold for every curve; a linear
+    one has infinite acceleration at its points and a cubic one infinite jerk, so those limits are asked only of curves
+    that can keep them.
     """
 
     header: dict[str, Any] = Field({}, description="Ignored, so that a message can be pasted.")
@@ -115,7 +117,7 @@ class FollowSpec(Model):
 
 
 def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The points as they are, from the situation on.
+    """The points as they are, from the situation on; those of continuous joints by whole turns nearer to it.
 
     Raises:
         NotPlannable: a limit is left (names joint, value, limit and time), something is in the way, or a first point at
@@ -126,12 +128,16 @@ def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
     for k, point in enumerate(spec.points):
         written = [(names[i], value, ("points", k, "positions", i)) for i, value in enumerate(point.positions)]
         verify_written(planner.robot, written, when=f" at t = {point.seconds:.3f} s")
+    first = np.array(spec.points[0].positions)
+    endless = [planner.robot.joint(name).type == "continuous" for name in names]
+    turns = np.where(endless, math.tau * np.round((first - start) / math.tau), 0.0)
+    first = first - turns
     points = [
-        TrajectoryPoint(point.positions, point.seconds, point.velocities, point.accelerations) for point in spec.points
+        TrajectoryPoint(np.array(point.positions) - turns, point.seconds, point.velocities, point.accelerations)
+        for point in spec.points
     ]
     if points[0].time_from_start <= 0.0:
-        first = spec.points[0].positions
-        off = np.abs(np.array(first) - start)
+        off = np.abs(first - start)
         worst = int(np.argmax(off))
         if off[worst] > HERE:
             raise NotPlannable(
