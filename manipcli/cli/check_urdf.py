@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, PackagePath, xacro_arguments
+from manipcli.cli.options import AllowOutside, PackagePath, XacroArguments, xacro_arguments
 from manipcli.cli.outputs import check_outputs, check_picture
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
@@ -21,10 +21,7 @@ Codes = list[str] | None
 
 def check_urdf(
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)] = None,
-    arguments: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
-    ] = None,
+    arguments: XacroArguments = None,
     *,
     format_: Annotated[
         Literal["text", "json", "sarif"], typer.Option("--format", help="Text, one JSON object, or SARIF 2.1.0.")

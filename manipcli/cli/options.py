@@ -13,6 +13,10 @@ OutputFormat = Literal["text", "json"]
 
 Format = Annotated[OutputFormat, typer.Option("--format", help="Text for people, or one JSON object on stdout.")]
 TaskFile = Annotated[Path, typer.Argument(metavar="TASK", help="The task file.", show_default=False)]
+XacroArguments = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
+]
 LogFile = Annotated[Path, typer.Argument(metavar="LOG", help="An .mcap file.", show_default=False)]
 Overrides = Annotated[
     list[str] | None,

@@ -9,17 +9,14 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.cli.options import AllowOutside, OpenPage, PackagePath, PagePort, xacro_arguments
+from manipcli.cli.options import AllowOutside, OpenPage, PackagePath, PagePort, XacroArguments, xacro_arguments
 from manipcli.cli.serving import stay
 from manipcli.core.errors import ExitCode
 
 
 def view(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="URDF, xacro, robot file or task.", show_default=False)],
-    arguments: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a xacro file.", show_default=False),
-    ] = None,
+    arguments: XacroArguments = None,
     *,
     port: PagePort = None,
     open_: OpenPage = False,
