@@ -130,6 +130,8 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
 def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:
     """Plan one step; whatever refuses it is told with its id."""
     try:
+        if situation.at_start:
+            planner.outside(situation)
         return STEPS[step.verb].plan(step.body, planner, situation)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal

@@ -234,7 +234,7 @@ class Draft:
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
         self._motions.append(Motion("close", trajectory=None, grip=grip, duration=duration))
-        self._now = replace(self._now, position=closed, carried=carried, closed=True)
+        self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:
         """The hand to a pose; what it held stays where it is. It may touch that, or the body that it is `around`.

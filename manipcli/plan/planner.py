@@ -16,6 +16,7 @@ from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, Co
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Interior, Scene
+from manipcli.model.start_overlap import TOLERANCE
 from manipcli.plan.claims import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
@@ -226,6 +227,20 @@ class Planner:
         hit = self.query(situation, allowed).check(situation.position)
         if hit is not None:
             raise self.refusal(situation, hit, "is", "before it moves")
+
+    def outside(self, situation: Situation) -> None:
+        """Nothing, if the robot is inside of no body; where it is, the engine would throw them apart, or wedge them.
+
+        Raises:
+            NotPlannable: names the body and the deepest link.
+        """
+        hits = [
+            hit
+            for hit in self.query(situation).every(situation.position)
+            if hit.distance < -TOLERANCE and hit.a.startswith(ROBOT) != hit.b.startswith(ROBOT)
+        ]
+        if hits:
+            raise self.refusal(situation, min(hits, key=lambda hit: hit.distance), "is", "at the start")
 
     def refusal(self, situation: Situation, hit: CollisionHit, verb: str, when: str) -> NotPlannable:
         """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`."""

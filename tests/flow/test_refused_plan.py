@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.core.errors import NotPlannable
+from manipcli.flow.load import load_task
+from manipcli.flow.plan import plan_task
+from manipcli.model.kinematics import Kinematics
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\
@@ -20,6 +26,39 @@ steps:
   - id: reach
     move: {{to: {{pitch: 100}}}}
 """
+
+
+@pytest.mark.parametrize("name", ["block", "wall"])  # before and after `robot/...` in the order of names
+@pytest.mark.parametrize(
+    "body",
+    [
+        "{box: {size: [6 cm, 6 cm, 6 cm]}, pose: {xyz: [X]}, fixed: true}",
+        "{sphere: {radius: 3 cm}, mass: 1, pose: {xyz: [X]}}",
+    ],
+)
+def test_a_robot_that_starts_inside_of_a_body_is_told_so_also_where_nothing_moves_it(
+    body: str, name: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "task.yaml"
+    head = TASK[: TASK.index("steps:")]
+    tip = load_task(_written(file, head + "steps:\n  - wait: 0.1 s\n")).robot
+    x, y, z = Kinematics(tip).forward(np.zeros(len(tip.moving_joints)), tip.links[-1].name).p
+    placed = body.replace("X", f"{x:.4f}, {y:.4f}, {z:.4f}")
+    task = load_task(_written(file, f"{head}scene:\n  {name}: {placed}\nsteps:\n  - wait: 0.1 s\n  - wait: 0.1 s\n"))
+    with pytest.raises(NotPlannable) as refused:
+        plan_task(task)
+    (finding,) = refused.value.findings
+    assert finding.place is not None
+    assert (finding.place.line, finding.place.column) == (8, 5)
+    both = rf"('robot/\w+' and '{name}'|'{name}' and 'robot/\w+')"
+    assert re.fullmatch(rf"step 'wait_1': {both} overlap by [\d.]+ mm already, at the start", finding.message)
+    assert finding.hint is not None
+    assert "`start: POSE`" in finding.hint
+
+
+def _written(file: Path, text: str) -> Path:
+    file.write_text(text)
+    return file
 
 
 @pytest.mark.slow
