@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, PackagePath
+from manipcli.cli.options import AllowOutside, Format, PackagePath
 from manipcli.core.errors import ExitCode
 from manipcli.core.text import number_of
 
@@ -26,6 +28,7 @@ def bless(
     ] = None,
     *,
     jobs: Annotated[int, typer.Option("-n", metavar="N", min=1, help="Runs at a time.")] = 1,
+    format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
@@ -40,8 +43,11 @@ def bless(
         from manipcli.batch.discovery import read_case, shown_path, task_files
         from manipcli.batch.job import Job, Settings
         from manipcli.batch.pool import remove_empty, run_jobs
+        from manipcli.report.suite import Suite
+        from manipcli.report.suite_json import render_suite
         from manipcli.report.suite_text import render_case
 
+        began = time.monotonic()
         settings = Settings(
             folder=Path("runs") / "bless",
             keep_logs=True,
@@ -51,23 +57,29 @@ def bless(
         )
         files = task_files(paths or [Path()], tell=console.talk)
         chosen = [Job(read_case(file, shown=shown_path(file)), file, settings) for file in files]
-        if not chosen:
+        if not chosen and format_ == "text":
             console.result("nothing to bless: there is no task file")
-            return ExitCode.NOTHING_TO_RUN
-        code = ExitCode.PASSED
+        told: list[CaseReport] = []
         for done in run_jobs(chosen, at_once=jobs):
             job = next(job for job in chosen if job.case.id == done.case.id)
-            if done.passed:
-                console.result("\n".join(_blessed(job, done)))
-            else:
-                console.result(f"{render_case(done)}\n  nothing is blessed")
-                code = ExitCode.USAGE if ExitCode.USAGE in (code, _code(done)) else ExitCode.FAILED
+            lines = _blessed(job, done) if done.passed else [render_case(done), "  nothing is blessed"]
+            if format_ == "text":
+                console.result("\n".join(lines))
+            told.append(_without_log(done, lines) if done.passed else done)
+        if format_ == "json":
+            console.result(render_suite(Suite(tuple(told), len(chosen), jobs, time.monotonic() - began)))
         remove_empty(settings.folder)
-        return code
+        if not chosen:
+            return ExitCode.NOTHING_TO_RUN
+        if any(one.outcome == "invalid" for one in told):
+            return ExitCode.USAGE
+        return ExitCode.PASSED if all(one.passed for one in told) else ExitCode.FAILED
 
 
-def _code(done: CaseReport) -> ExitCode:
-    return ExitCode.USAGE if done.outcome == "invalid" else ExitCode.FAILED
+def _without_log(done: CaseReport, lines: Sequence[str]) -> CaseReport:
+    """What was blessed, and what was said of it; its log was removed."""
+    run = None if done.run is None else replace(done.run, log=None)
+    return replace(done, run=run, log=None, notes=(*done.notes, *(line.strip() for line in lines)))
 
 
 def _blessed(job: Job, done: CaseReport) -> Sequence[str]:

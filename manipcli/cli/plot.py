@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manipcli.cli import console
+from manipcli.cli.options import Format, OutputFormat
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
@@ -43,6 +44,7 @@ def plot(
         str | None, typer.Option("--to", metavar="T", help="Seconds, or the step with which it ends.")
     ] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List what the logs have to plot.")] = False,
+    format_: Format = "text",
 ) -> ExitCode:
     """Plot numbers of one log, or of several over each other.
 
@@ -54,8 +56,11 @@ def plot(
         hint = "`manipcli plot LOG.mcap [TOPIC.FIELD]...`"
         raise InvalidInput([Finding("USE060", f"no log is given: '{words[0]}' is no file", hint=hint)])
     if fields:
-        _list_fields(logs)
+        _list_fields(logs, format_)
         return ExitCode.PASSED
+    if format_ == "json":
+        message = "--format json is for --fields alone"
+        raise InvalidInput([Finding("USE064", message, hint="`--csv -` gives the numbers")])
     check_outputs(("--output", output), ("--csv", Path(csv) if csv not in (None, "-") else None), reads=logs)
     kind = None
     if output is not None:
@@ -104,12 +109,20 @@ def _write_table(chart: Chart, csv: str) -> None:
         console.talk(f"written: {csv}")
 
 
-def _list_fields(logs: list[Path]) -> None:
+def _list_fields(logs: list[Path], format_: OutputFormat) -> None:
     from manipcli.flow.chart import field_lines
+    from manipcli.report.json import dumps
     from manipcli.report.table import table
 
-    for log in logs:
-        lines = field_lines(log)
+    found = {str(log): field_lines(log) for log in logs}
+    if format_ == "json":
+        told = [
+            {"log": log, "fields": [{"name": line.name, "type": line.type, "messages": line.count} for line in lines]}
+            for log, lines in found.items()
+        ]
+        console.result(dumps({"logs": told}))
+        return
+    for log, lines in found.items():
         if len(logs) > 1:
             console.result(f"{log}:")
         rows = [[line.name, line.type, str(line.count)] for line in lines]

@@ -203,6 +203,10 @@ def test_bless_then_test_passes_until_something_is_worse(
     blessed = baseline_path(task).read_bytes()
     assert main(["bless"]) == 0
     assert "as before" in capsys.readouterr().out
+    assert main(["bless", "--format", "json"]) == 0
+    (case,) = json.loads(capsys.readouterr().out)["cases"]
+    assert (case["id"], case["outcome"], case["log"]) == ("nod.yaml::nod", "passed", None)
+    assert case["notes"][0].endswith("written: nod.baseline.json")
     assert baseline_path(task).read_bytes() == blessed
     assert main(["test"]) == 0
     capsys.readouterr()
@@ -242,4 +246,7 @@ def test_bless_then_test_passes_until_something_is_worse(
     task.write_text(TASK.replace("20 s", "10 ms"))
     assert main(["bless"]) == 1
     assert "nothing is blessed" in capsys.readouterr().out
+    assert main(["bless", "--format", "json"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["verdict"], answer["cases"][0]["outcome"]) == ("failed", "failed")
     assert json.loads(baseline_path(task).read_bytes()) == old

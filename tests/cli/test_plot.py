@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
@@ -104,6 +105,11 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
     fields = [line.split()[0] for line in out.splitlines()[1:]]
     assert "joint_states.position" in fields
     assert "tf.transform.translation.x" in fields
+    assert main(["plot", str(log), "--fields", "--format", "json"]) == 0
+    (listed,) = json.loads(capsys.readouterr().out)["logs"]
+    assert [one["name"] for one in listed["fields"]] == fields
+    assert main(["plot", str(log), "--format", "json"]) == 4
+    assert json.loads(capsys.readouterr().out)["errors"][0]["code"] == "USE064"
 
 
 @pytest.mark.slow
