@@ -111,12 +111,12 @@ def _write_table(chart: Chart, csv: str) -> None:
 
 def _list_fields(logs: list[Path], format_: OutputFormat) -> None:
     from manipcli.flow.chart import field_lines
-    from manipcli.report.json import dumps
+    from manipcli.report.json import Json, dumps
     from manipcli.report.table import table
 
     found = {str(log): field_lines(log) for log in logs}
     if format_ == "json":
-        told = [
+        told: Json = [
             {"log": log, "fields": [{"name": line.name, "type": line.type, "messages": line.count} for line in lines]}
             for log, lines in found.items()
         ]
