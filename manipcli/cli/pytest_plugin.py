@@ -209,10 +209,11 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
 
 
 def _run(case: Case, path: Path, settings: Settings) -> CaseReport:
+    from manipcli.batch.discovery import shown_path
     from manipcli.batch.job import Job
     from manipcli.batch.pool import run_jobs
 
-    (report,) = run_jobs([Job(case, path, settings)], at_once=1)
+    (report,) = run_jobs([Job(case, Path(shown_path(path)), settings)], at_once=1)
     return report
 
 

@@ -16,7 +16,7 @@ import pytest
 import manipcli.batch.discovery
 import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
-from manipcli.batch.job import Settings
+from manipcli.batch.job import Job, Settings
 from manipcli.cli.pytest_plugin import TaskFailed, _settings
 from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
 
@@ -206,6 +206,22 @@ def test_a_python_test_finds_tasks_beside_it_then_below_the_root(pytester: pytes
         pytester.path / name for name in ("sub/both.yaml", "below.yaml", "both.yaml")
     ]
     assert {(settings.keep_logs, settings.folder.name) for _, settings in given} == {(True, "0")}
+
+
+def test_findings_name_files_as_the_rest_of_a_failure_does(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Job] = []
+
+    def run(jobs: list[Job], *, at_once: int) -> list[CaseReport]:
+        asked.extend(jobs)
+        return [CaseReport(job.case, "crashed", 1.0, "", "not run") for job in jobs]
+
+    monkeypatch.setattr("manipcli.batch.pool.run_jobs", run)
+    (pytester.path / "tasks").mkdir()
+    (pytester.path / "tasks" / "t.yaml").write_text("task: t\nrobot: r.yaml\n")
+    pytester.runpytest_inprocess(*LOADED, *ALONE, "tasks").assert_outcomes(failed=1)
+    assert [(job.path, job.case.file) for job in asked] == [(Path("tasks/t.yaml"), "tasks/t.yaml")]
 
 
 @pytest.mark.parametrize(("words", "folder"), [([], "runs/test"), (["--manipcli-logs", "else/where"], "else/where")])
