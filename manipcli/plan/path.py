@@ -20,6 +20,7 @@ from manipcli.plan.inverse_kinematics import InverseKinematics, rotation_vector
 LINEAR_STEP = 0.005  # m between two points of a straight line
 ANGULAR_STEP = 0.02  # rad between two points of a straight line
 MAX_JUMP = 0.35  # rad or m of one joint between two points: more is a change of branch, or nearly singular
+_OTHERWISE = "start the line from another arm configuration, after a `pick` from another `yaw` of its `approach`"
 
 
 def joint_path(waypoints: npt.ArrayLike) -> Array:
@@ -90,7 +91,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
         if not found.converged:
             raise NotPlannable(
                 f"the straight line ends {where}: {found.explain()}",
-                hint="start the line from another arm configuration, make it shorter, or move `free` instead",
+                hint=f"{_OTHERWISE}, make it shorter, or move `free` instead",
             )
         jump = np.abs(found.q[columns] - q[columns])
         worst = int(np.argmax(jump))
@@ -98,7 +99,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
             raise NotPlannable(
                 f"the arm would have to jump {where}: joint '{solver.joints[worst]}' by {jump[worst]:.2f} within one "
                 f"point of the line (near singular: {solver.singularity(q)})",
-                hint="start the line from another arm configuration, or move `free` instead",
+                hint=f"{_OTHERWISE}, or move `free` instead",
             )
         q = found.q
         waypoints.append(q[columns])

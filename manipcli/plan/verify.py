@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,8 @@ TOLERANCE = 0.005
 """Relative excess of velocity, acceleration and jerk that is forgiven."""
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 """What of each is by the second, after the unit of the position."""
+ORDER = {"velocity": 1, "acceleration": 2, "jerk": 3}
+"""With what power of the time of the same path each falls."""
 _POSITION = 1e-9  # rad or m: rounding of a trajectory that touches its limit
 
 
@@ -134,6 +137,8 @@ def _bounded(word: str, values: Array, limit: Array, times: Array, limits: Motio
         name = limits.names[i]
         needed, most = told_apart(abs(values[k, i]), limit[i])
         unit = limits.unit(name) + PER[word]
+        longer = math.ceil(100.0 * float(ratio[k, i]) ** (1.0 / ORDER[word])) / 100.0
         raise NotPlannable(
-            f"joint '{name}' would need {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}"
+            f"joint '{name}' would need {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}",
+            hint=f"slower by {longer:g} it is kept: every `time_from_start` times that, `velocities` divided by it",
         )
