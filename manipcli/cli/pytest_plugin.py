@@ -76,7 +76,8 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
         return None
     stash = parent.config.stash
     if look in LEFT_OUT:
-        stash.setdefault(_TORN, {})[file_path] = LEFT_OUT[look]
+        if any(map(parent.session.isinitpath, file_path.parents)):  # pytest asks of what lies beside a named file, too
+            stash.setdefault(_TORN, {})[file_path] = LEFT_OUT[look]
         return None
     if stash.setdefault(_SEEN, {}).setdefault(file_path.resolve(), file_path) != file_path and not named:
         return None

@@ -116,6 +116,8 @@ def test_what_looks_like_a_task_and_is_none_is_told(project: pytest.Pytester) ->
     (project.path / "tasks" / "torn.yaml").write_text("task: torn\nrobo: r.yaml\nsteps: []\n")
     result = project.runpytest_inprocess(*LOADED, *ALONE, "--collect-only")
     assert "tasks/torn.yaml has `task:` but no `robot:`; not run" in result.outlines
+    beside = project.runpytest_inprocess(*LOADED, *ALONE, "--collect-only", "tasks/good.yaml")
+    assert "torn" not in beside.stdout.str()  # nobody asked for it
 
 
 def test_tags_and_engine_are_markers_that_need_no_registration(project: pytest.Pytester) -> None:
