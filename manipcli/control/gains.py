@@ -66,15 +66,14 @@ def build_pid(name: str, joints: tuple[str, ...], gains: tuple[GainsSpec, ...], 
                 f"controller '{name}': the gains of joint '{joint}' are all zero, so it would not move",
                 hint=f"give gains.{joint}.p",
             )
-    i_clamp = [math.inf if g.i_clamp is None else g.i_clamp for g in gains]
     return Pid(
         p=[g.p for g in gains],
         i=[g.i for g in gains],
         d=[g.d for g in gains],
         u_min=[-math.inf if g.u_clamp_min is None else g.u_clamp_min for g in gains],
         u_max=[math.inf if g.u_clamp_max is None else g.u_clamp_max for g in gains],
-        i_min=[-clamp if g.i_clamp_min is None else g.i_clamp_min for g, clamp in zip(gains, i_clamp, strict=True)],
-        i_max=[clamp if g.i_clamp_max is None else g.i_clamp_max for g, clamp in zip(gains, i_clamp, strict=True)],
+        i_min=[g.integral_bounds[0] for g in gains],
+        i_max=[g.integral_bounds[1] for g in gains],
         antiwindup=[_antiwindup(g, compat) for g in gains],
         tracking_time=[g.tracking_time_constant for g in gains],
         error_deadband=[g.error_deadband for g in gains],

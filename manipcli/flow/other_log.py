@@ -18,9 +18,7 @@ from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotat
 from manipcli.core.text import did_you_mean, listed
 from manipcli.flow.mesh_search import MeshSearch
 from manipcli.model.build_robot import bare_robot
-from manipcli.model.description import Description
-from manipcli.model.located_xml import element_of, parse_document
-from manipcli.model.packages import Unread
+from manipcli.model.description import unread_description
 from manipcli.model.robot import Joint, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.model.urdf import read_parts
@@ -31,6 +29,7 @@ from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
 from manipcli.record.namespaces import TYPES, meant, namespaces
 from manipcli.record.scan import METADATA, Scan
+from manipcli.record.snapshot import joint_state, transforms
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
 from manipcli.replay.playback import Playback
@@ -143,21 +142,15 @@ class _Log:
         self.start, self.end = min(self.start, time), max(self.end, time)
 
     def _joint_state(self, time: float, reader: CdrReader) -> None:
-        reader.header()
-        names = reader.texts()
-        runs = []
-        for _ in range(3):
-            values = [reader.f64() for _ in range(reader.count(8))]
-            runs.append(values if len(values) == len(names) else [np.nan] * len(names))
-        for name, *row in zip(names, *runs, strict=True):
+        names, runs = joint_state(reader)
+        whole = (run if len(run) == len(names) else [np.nan] * len(names) for run in runs)
+        for name, *row in zip(names, *whole, strict=True):
             samples = self.joints.setdefault(name, _Samples([], []))
             samples.times.append(time)
             samples.rows.append(row)
 
     def _transforms(self, time: float, reader: CdrReader) -> None:
-        for _ in range(reader.count(64)):
-            parent, child = reader.header().lstrip("/"), reader.text().lstrip("/")
-            row = [reader.f64() for _ in range(7)]
+        for parent, child, row in transforms(reader):
             samples = self.frames.setdefault((parent, child), _Samples([], []))
             if samples.rows and sum(a * b for a, b in zip(row[3:], samples.rows[-1][3:], strict=True)) < 0.0:
                 row[3:] = [-value for value in row[3:]]  # the same rotation, on the side of the one before it
@@ -248,9 +241,7 @@ def _robot(urdf: str, notes: list[str]) -> RobotModel | None:
     if not urdf:
         return None
     try:
-        document = parse_document(urdf.encode(), "robot_description")
-        assert document.documentElement is not None  # a document without a root element is not well-formed
-        parts = read_parts(Description(Path("robot_description"), element_of(document.documentElement), Unread(), ()))
+        parts = read_parts(unread_description(urdf.encode(), "robot_description"))
     except InvalidInput as error:
         notes.append(f"the robot is not shown: {error.findings[0].message}")
         return None

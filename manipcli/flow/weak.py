@@ -6,7 +6,6 @@ u = g holds the joint against gravity g: it gives way by e = (g - I) / p.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -108,7 +107,7 @@ def _sags(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | No
     weight = float(np.abs(gravity).max())
     left, clamped = gravity, ""
     if gains.i > 0.0:
-        least, most = integral_bounds(gains)
+        least, most = gains.integral_bounds
         left = gravity - np.clip(gravity, least, most)
         clamped = f", whose integral is clamped to {digits(least)} ... {digits(most)},"
     most_left = float(np.abs(left).max())
@@ -129,12 +128,3 @@ def _sags(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | No
         message += f"carries it, some {gains.p / gains.i:.2g} s with {ki}"
         return "CTRL156", message, f"{CARRY} at once"
     return None
-
-
-def integral_bounds(gains: GainsSpec) -> tuple[float, float]:
-    """The least and the greatest effort of the integral term."""
-    clamp = math.inf if gains.i_clamp is None else gains.i_clamp
-    return (
-        -clamp if gains.i_clamp_min is None else gains.i_clamp_min,
-        clamp if gains.i_clamp_max is None else gains.i_clamp_max,
-    )

@@ -11,12 +11,12 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.checks import CHECKS
-from manipcli.model.description import Description
+from manipcli.model.description import unread_description
 from manipcli.model.examine import examine
 from manipcli.model.joint_units import misread_units
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalise import portable_urdf
-from manipcli.model.packages import NotFound, Packages, Unread
+from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import (
     Group,
     Joint,
@@ -108,12 +108,7 @@ def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
     Raises:
         InvalidInput: the description or the robot file is damaged.
     """
-    from manipcli.model.located_xml import element_of, parse_document
-
-    document = parse_document(urdf, "robot.urdf")
-    assert document.documentElement is not None  # a document without a root element is not well-formed
-    description = Description(Path("robot.urdf"), element_of(document.documentElement), Unread(), ())
-    parts = read_parts(description)
+    parts = read_parts(unread_description(urdf, "robot.urdf"))
     reporter = Reporter(None)
     reporter.findings += parts.findings
     reporter.stop()

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
-from manipcli.model.located_xml import Element, element_of, invalid, read_document
-from manipcli.model.packages import Packages
+from manipcli.model.located_xml import Element, element_of, invalid, parse_document, read_document
+from manipcli.model.packages import Packages, Unread
 
 XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
 
@@ -64,6 +64,17 @@ def read_description(
     if root.tag != "robot":
         raise _other_format(root)
     return Description(path=path, root=root, packages=packages, findings=findings, expanded=expanded)
+
+
+def unread_description(urdf: bytes, name: str) -> Description:
+    """An expanded description whose files nobody will read, as that in a log; messages call it `name`.
+
+    Raises:
+        InvalidInput: it is no XML.
+    """
+    root = parse_document(urdf, name).documentElement
+    assert root is not None  # a document without a root element is not well-formed
+    return Description(path=Path(name), root=element_of(root), packages=Unread(), findings=())
 
 
 _FORMATS = {

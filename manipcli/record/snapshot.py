@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -93,27 +93,28 @@ def _take(taken: Snapshot, topic: Meant, several: bool, ns: int, reader: CdrRead
     if topic.usual == topics.ROBOT_DESCRIPTION:
         taken.urdf[before] = reader.text()
     elif topic.usual == topics.JOINT_STATES:
-        reader.header()
-        names = [before + name for name in reader.texts()]
-        values = [_doubles(reader) for _ in range(3)]
-        for k, name in enumerate(names):
+        names, values = joint_state(reader)
+        for k, name in enumerate(before + one for one in names):
             known = taken.joints.get(name)
             if known is None or known.time <= time:
                 taken.joints[name] = JointSample(time, *(run[k] if k < len(run) else None for run in values))
     else:
-        for child, frame in _frames(reader, before, time):
+        for *names, pose in transforms(reader):
+            # Who published it may have put the namespace there already.
+            parent, child = (before + name.removeprefix(before) for name in names)
             known_frame = taken.frames.get(child)
             if known_frame is None or known_frame.time <= time:
-                taken.frames[child] = frame
+                taken.frames[child] = FrameSample(time, parent, tuple(pose))
 
 
-def _frames(reader: CdrReader, before: str, time: float) -> Iterator[tuple[str, FrameSample]]:
+def joint_state(reader: CdrReader) -> tuple[Sequence[str], list[list[float]]]:
+    """The names of a sensor_msgs/JointState, and its positions, velocities and efforts, as many as there are."""
+    reader.header()
+    return reader.texts(), [[reader.f64() for _ in range(reader.count(8))] for _ in range(3)]
+
+
+def transforms(reader: CdrReader) -> Iterator[tuple[str, str, list[float]]]:
+    """Parent, child and pose (x y z, quaternion xyzw) of each of a tf2_msgs/TFMessage; names without a first `/`."""
     for _ in range(reader.count(64)):
-        names = [name.lstrip("/") for name in (reader.header(), reader.text())]
-        # Who published it may have put the namespace there already.
-        parent, child = (before + name.removeprefix(before) for name in names)
-        yield child, FrameSample(time, parent, tuple(reader.f64() for _ in range(7)))
-
-
-def _doubles(reader: CdrReader) -> tuple[float, ...]:
-    return tuple(reader.f64() for _ in range(reader.count(8)))
+        parent, child = reader.header().lstrip("/"), reader.text().lstrip("/")
+        yield parent, child, [reader.f64() for _ in range(7)]

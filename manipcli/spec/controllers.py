@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -89,6 +90,13 @@ class GainsSpec(Model):
     def idle(self) -> bool:
         """Whether nothing would ever be commanded by these."""
         return self.p == self.i == self.d == self.ff_velocity_scale == 0.0
+
+    @property
+    def integral_bounds(self) -> tuple[float, float]:
+        """The least and the greatest effort of the integral term."""
+        clamp = math.inf if self.i_clamp is None else self.i_clamp
+        least, most = self.i_clamp_min, self.i_clamp_max
+        return -clamp if least is None else least, clamp if most is None else most
 
 
 class JointConstraintSpec(Model):
