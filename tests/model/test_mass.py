@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats.qmc import Sobol
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.model import body_shapes
@@ -14,10 +15,9 @@ from manipcli.spec.task import CupSpec, TraySpec
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
-def brute_force(geometries: tuple[Geometry, ...], mass: float, low: Array, high: Array, n: int) -> tuple[Array, Array]:
-    """Centre of mass and inertia by summing over the midpoints of n^3 cells that lie in any of the shapes."""
-    axes = [np.linspace(a, b, n, endpoint=False) + (b - a) / (2 * n) for a, b in zip(low, high, strict=True)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+def brute_force(geometries: tuple[Geometry, ...], mass: float, low: Array, high: Array) -> tuple[Array, Array]:
+    """Centre of mass and inertia by summing over the 2^16 points of a Sobol sequence that lie in any of the shapes."""
+    points = low + (high - low) * Sobol(3, scramble=False).random_base2(16)
     inside = np.zeros(len(points), dtype=bool)
     for geometry in geometries:
         p = (points - geometry.X_LS.p) @ geometry.X_LS.R
@@ -36,11 +36,11 @@ def brute_force(geometries: tuple[Geometry, ...], mass: float, low: Array, high:
 
 
 @pytest.mark.parametrize("shape", [Box((0.2, 0.3, 0.4)), Sphere(0.2), Cylinder(0.1, 0.3)])
-def test_inertia_of_a_solid_is_that_of_its_cells(shape: Box | Sphere | Cylinder) -> None:
+def test_inertia_of_a_solid_is_that_of_its_points(shape: Box | Sphere | Cylinder) -> None:
     solid = (Geometry(X_LS=Transform.identity(), shape=shape),)
     made = union(solid, 2.0)
-    _, inertia = brute_force(solid, 2.0, np.full(3, -0.2), np.full(3, 0.2), 80)
-    # 80 cells an axis resolve a curved surface to about 1/80 of its radius; errors average out to well below 1 %.
+    _, inertia = brute_force(solid, 2.0, np.full(3, -0.2), np.full(3, 0.2))
+    # Evenly spread, the points miss by well below 1 %.
     np.testing.assert_allclose(made.inertia, inertia, atol=0.005 * np.max(inertia))
 
 
@@ -68,24 +68,19 @@ def test_a_turned_part_turns_its_inertia() -> None:
     np.testing.assert_allclose(union((turned,), 1.0).inertia, union((straight,), 1.0).inertia, atol=1e-15)
 
 
-@pytest.mark.slow
-def test_cup_has_centre_and_inertia_of_its_cells() -> None:
+def test_cup_has_centre_and_inertia_of_its_points() -> None:
     shape = body_shapes.cup(CupSpec(radius=0.036, height=0.11, wall=0.004), WHITE)
     made = union(shape.geometries, 0.15)
     low, high = shape.centre - shape.size / 2, shape.centre + shape.size / 2
-    centre, inertia = brute_force(shape.geometries, 0.15, low, high, 90)
-    # Cells of 0.8 mm in walls of 4 mm; the boxes' overlaps, counted twice in the sum of parts, are below 1 % of it.
-    np.testing.assert_allclose(made.X_LI.p, centre, atol=0.005 * 0.11)
-    np.testing.assert_allclose(made.inertia, inertia, atol=0.015 * np.max(inertia))
+    centre, inertia = brute_force(shape.geometries, 0.15, low, high)
+    # The boxes' overlaps, counted twice in the sum of parts, are below 1 % of it.
+    np.testing.assert_allclose(made.X_LI.p, centre, atol=0.003 * 0.11)
+    np.testing.assert_allclose(made.inertia, inertia, atol=0.004 * np.max(inertia))
 
 
-@pytest.mark.slow
-def test_tray_has_centre_and_inertia_of_its_cells() -> None:
+def test_tray_has_centre_and_inertia_of_its_points() -> None:
     shape = body_shapes.tray(TraySpec(size=(0.3, 0.2, 0.05), wall=0.01), WHITE)
     made = union(shape.geometries, 0.4)
-    # 100 cells an axis: 3.3 of them in a wall of 10 mm along x, whose sum is off by up to half a cell.
-    centre, inertia = brute_force(
-        shape.geometries, 0.4, shape.centre - shape.size / 2, shape.centre + shape.size / 2, 100
-    )
-    np.testing.assert_allclose(made.X_LI.p, centre, atol=0.01 * 0.05)
-    np.testing.assert_allclose(made.inertia, inertia, atol=0.03 * np.max(inertia))
+    centre, inertia = brute_force(shape.geometries, 0.4, shape.centre - shape.size / 2, shape.centre + shape.size / 2)
+    np.testing.assert_allclose(made.X_LI.p, centre, atol=0.001 * 0.05)
+    np.testing.assert_allclose(made.inertia, inertia, atol=0.001 * np.max(inertia))
