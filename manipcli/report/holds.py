@@ -2,13 +2,14 @@
 
 A body is held while links of the robot touch it, and carried while, besides, it stands on nothing: neither on a body
 that is fixed nor, through others, on one that stands on it. Both come from the recorded contacts alone, whatever the
-step was called.
+step was called. What was touched and never carried was held only if the hand closed meanwhile: else it was pushed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -26,6 +27,8 @@ BRIDGED = 0.05
 SHORTEST = 0.1
 """[s] of a hold, and of a time without support."""
 ROBOT = "robot/"
+CLOSING = "close"
+"""The phase of a step in which the hand closes on something."""
 
 Ending = Literal["set down", "lost", "let go", "held to the end"]
 
@@ -111,7 +114,9 @@ def find_holds(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], fl
     for name in movable:
         for begin, stop in touched[name].finish(end):
             if stop - begin >= SHORTEST:
-                found.append(_hold(name, begin, stop, free[name].finish(end), recording.events, end))
+                one = _hold(name, begin, stop, free[name].finish(end), recording.events, end)
+                if one.lifted is not None or _closed_within(begin, stop, recording.events):
+                    found.append(one)
     return tuple(sorted(found, key=lambda hold: hold.grasped)), end
 
 
@@ -126,6 +131,13 @@ def _hold(
     lifted, until = carried[0][0], carried[-1][1]
     ended: Ending = "set down" if until < stop else "held to the end" if stop >= end else "lost"
     return Hold(name, max((at for at in boundaries if at <= lifted), default=lifted), lifted, until, ended)
+
+
+def _closed_within(begin: float, stop: float, events: Sequence[TaskEvent]) -> bool:
+    """Whether the hand closed at any time between these, as far as is known: a recording without steps does not say."""
+    phases = [event for event in events if event.kind in ("phase_started", "step_ended")]
+    closing = [(phase.time, after.time) for phase, after in pairwise([*phases, *phases[-1:]]) if phase.text == CLOSING]
+    return not phases or any(since <= stop and until >= begin for since, until in closing)
 
 
 def _pressing(contacts: Iterable[Contact], *, robot: bool) -> list[tuple[str, str]]:

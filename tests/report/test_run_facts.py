@@ -94,6 +94,7 @@ def _recording(parts: int = 1, contacts: tuple[ContactSnapshot, ...] = TOUCHES) 
         mine = tuple(one for one in contacts if low <= one.time <= high)
         spans.append(_span(times[ticks], slip[ticks], angle[ticks], mine))
     events = (
+        TaskEvent(0.4, "phase_started", "a", "pick", "", "close", ""),
         TaskEvent(0.8, "step_ended", "a", "pick", "done", "", ""),
         TaskEvent(2.0, "step_ended", "b", "lift", "done", "", ""),
     )
@@ -200,6 +201,18 @@ def test_it_does_not_matter_where_spans_are_cut(facts: RunFacts) -> None:
 def test_how_a_hold_ends(contacts: tuple[ContactSnapshot, ...], lifted: float | None, until: float, ended: str) -> None:
     (held,) = run_facts(_recording(3, contacts), _robot(), _scene(), STEPS).holds
     assert (held.hold.lifted, held.hold.until, held.hold.ended) == (lifted, until, ended)
+
+
+def test_what_the_hand_did_not_close_on_and_is_never_lifted_is_pushed_and_not_held() -> None:
+    pushed = (
+        ContactSnapshot(0.0, (STANDS,)),
+        ContactSnapshot(1.0, (*FINGERS, STANDS)),
+        ContactSnapshot(2.0, (STANDS,)),
+    )
+    recording = _recording(3, pushed)
+    assert run_facts(recording, _robot(), _scene(), STEPS).holds == ()
+    (held,) = run_facts(replace(recording, events=()), _robot(), _scene(), ()).holds  # no step says what the hand did
+    assert held.hold.lifted is None
 
 
 def test_a_brush_is_no_hold_and_what_stands_on_what_stands_is_supported() -> None:
