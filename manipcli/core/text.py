@@ -100,7 +100,19 @@ def one_line(text: str) -> str:
 
 def shorten(text: str, *, width: int = 60) -> str:
     """`text`, escaped, and cut in the middle of nowhere with `...` when longer than `width`."""
-    line = escape(text)
+    return _cut(escape(text), width)
+
+
+def shorten_apart(one: str, other: str, *, width: int = 60) -> tuple[str, str]:
+    """Both as `shorten` has them; where they would look the same then, from `...` shortly before they differ on."""
+    a, b = escape(one), escape(other)
+    same = next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    start = same - width // 3 if max(len(a), len(b)) > width and same > width // 2 else 0
+    begins = "..." if start else ""
+    return _cut(begins + a[start:], width), _cut(begins + b[start:], width)
+
+
+def _cut(line: str, width: int) -> str:
     return line if len(line) <= width else line[: width - 3] + "..."
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from manipcli.core.text import number_of, shorten
+from manipcli.core.text import number_of, shorten, shorten_apart
 from manipcli.record.compare import Comparison, Difference, TopicComparison
 from manipcli.record.compare_entries import EntryDifference
 from manipcli.report.json import Json, number
@@ -24,7 +24,8 @@ def first_text(first: Difference, names: Names) -> str:
         there = names[0] if first.b is None else names[1]
         return f"{where}: there is one {there} alone; message {first.index + 1} of the topic"
     by = "" if first.by is None else f" (by {first.by:+.6g})"
-    values = f"{_value(first.a)} {names[0]}, {_value(first.b)} {names[1]}{by}" if first.a != first.b else "differ"
+    a, b = _values(first.a, first.b)
+    values = f"{a} {names[0]}, {b} {names[1]}{by}" if first.a != first.b else "differ"
     return f"{where}: {values}; message {first.index + 1} of the topic"
 
 
@@ -68,7 +69,8 @@ def entries_lines(entries: Sequence[EntryDifference], names: Names) -> list[str]
     lines = []
     for one in entries[:MOST_ENTRIES]:
         where = f"{one.kind} '{one.name}'" + (f", {one.where}" if one.where else "")
-        values = f"{_entry(one.a)} {names[0]}, {_entry(one.b)} {names[1]}"
+        a, b = _values(one.a, one.b)
+        values = f"{a} {names[0]}, {b} {names[1]}"
         more = f" (and {one.count - 1} more)" if one.count > 1 else ""
         lines.append(f"{where}: {values}{more}")
     if len(entries) > MOST_ENTRIES:
@@ -118,9 +120,15 @@ def _plain(value: float | int | str | None) -> Json:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _value(value: float | int | str) -> str:
+def _values(a: float | int | str | None, b: float | int | str | None) -> tuple[str, str]:
+    """As text, so that texts which differ look different."""
+    if isinstance(a, str) and isinstance(b, str):
+        one, other = shorten_apart(a, b)
+        return f"'{one}'", f"'{other}'"
+    return _value(a), _value(b)
+
+
+def _value(value: float | int | str | None) -> str:
+    if value is None:
+        return "nothing"
     return f"'{shorten(value)}'" if isinstance(value, str) else repr(value)
-
-
-def _entry(value: str | None) -> str:
-    return "nothing" if value is None else f"'{shorten(value)}'"

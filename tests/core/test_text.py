@@ -18,6 +18,7 @@ from manipcli.core.text import (
     nearest_file,
     number_of,
     shorten,
+    shorten_apart,
     told_apart,
 )
 
@@ -57,6 +58,22 @@ def test_escaped_text_has_no_control_characters(text: str) -> None:
 @given(st.text(), st.integers(4, 80))
 def test_shortened_text_fits(text: str, width: int) -> None:
     assert len(shorten(text, width=width)) <= width
+
+
+@given(st.text(), st.text(), st.text(), st.integers(12, 80))
+def test_shortened_texts_that_differ_look_different(before: str, one: str, other: str, width: int) -> None:
+    told = shorten_apart(before + one, before + other, width=width)
+    assert (told[0] == told[1]) == (escape(before + one) == escape(before + other))
+    assert max(map(len, told)) <= width
+
+
+def test_a_difference_far_behind_is_shown_with_what_is_before_it() -> None:
+    said = "joint 'joint_1' is outside its goal tolerance: error +0.2"
+    assert shorten_apart(f"{said}22133 rad", f"{said}31 rad") == (
+        "...olerance: error +0.222133 rad",
+        "...olerance: error +0.231 rad",
+    )
+    assert shorten_apart("passed", "failed") == ("passed", "failed")
 
 
 @given(st.text(), st.lists(st.text(), max_size=5))
