@@ -263,9 +263,9 @@ class Draft:
         self._now = replace(self._now, carried=None, closed=False)
         self._add("open", None, replace(grip, must_arrive=must_arrive), allowed=allowed)
 
-    def dwell(self, label: str, duration: float, *, awaits: bool) -> None:
-        """Hold still for `duration` [s]."""
-        self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=awaits))
+    def dwell(self, label: str, duration: float) -> None:
+        """Hold still for `duration` [s], and until what the step waits for holds."""
+        self._motions.append(Motion(label, trajectory=None, grip=None, duration=duration, awaits=True))
 
     def spill(self, into: str) -> None:
         """What lay in the carried object is predicted to lie on the floor of the container `into` now."""

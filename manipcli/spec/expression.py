@@ -195,12 +195,12 @@ class _Parser:
         return Quantity(float(value), NUMBER)
 
 
-def substitute(root: Node, area: str, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Finding], frozenset[Place]]:
+def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Finding], frozenset[Place]]:
     """The task with every expression computed, what could not be, and which values are unknown because of that.
 
     Parameters may use those above them in `params:`. `refused`: places of values that are none.
     """
-    work = _Substitution(area, refused)
+    work = _Substitution(refused)
     if not isinstance(root, MappingNode):
         return root, [], frozenset()
     block = root.get("params")
@@ -228,8 +228,7 @@ class _Substitution:
     """`params`: those with a value; `lost`: those without one, which has been told; `below`: not reached yet, the one
     that is computed first."""
 
-    def __init__(self, area: str, refused: Iterable[Place]) -> None:
-        self.area = area
+    def __init__(self, refused: Iterable[Place]) -> None:
         self.params: dict[str, Scalar] = {}
         self.lost: set[str] = set()
         self.declared: list[str] = []
@@ -257,7 +256,7 @@ class _Substitution:
             self.in_order(names)
             return ScalarNode(evaluate(node.value, self.params), node.place, written=node.value)
         except ExpressionError as error:
-            code = f"{self.area}{203 if error.unknown else 211}"
+            code = "TASK203" if error.unknown else "TASK211"
             self.findings.append(Finding(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
             self.refused.add(node.place)
             return node

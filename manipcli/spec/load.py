@@ -147,7 +147,7 @@ def _task_source(
     written, told = _source(text, name, "TASK", "task")
     source, findings = _changed(written, wanted, model)
     refused = {finding.place for finding in told if finding.place is not None}
-    root, more, unknown = substitute(source.root, "TASK", refused=refused)
+    root, more, unknown = substitute(source.root, refused=refused)
     source = Source(name, root, "TASK", unknown=unknown)
     return source, [*told, *findings, *more, *_taken_twice(source)]
 

@@ -20,7 +20,7 @@ from manipcli.spec import shape
 from manipcli.spec.base import Model
 from manipcli.spec.located import Area
 from manipcli.spec.task import StepSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, dotted, shown
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, dotted, shown
 from manipcli.spec.yaml import parse
 
 _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
@@ -172,11 +172,11 @@ def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput
 
 def step_ids(steps: SequenceNode) -> tuple[str, ...]:
     """The ids that the steps have or will get."""
-    given = {node.value for item in steps.items if isinstance(node := _get(item, "id"), ScalarNode)}
+    given = {node.value for item in steps.items if isinstance(node := child(item, "id"), ScalarNode)}
     counts: dict[str, int] = {}
     ids: list[str] = []
     for item in steps.items:
-        own = _get(item, "id")
+        own = child(item, "id")
         keys = item.entries if isinstance(item, MappingNode) else ()
         verb = next((key for key in keys if key not in StepSpec.model_fields), "")
         number = counts.get(verb, 0) + 1
@@ -186,7 +186,3 @@ def step_ids(steps: SequenceNode) -> tuple[str, ...]:
         counts[verb] = number
         ids.append(str(own.value) if isinstance(own, ScalarNode) and is_named else f"{verb}_{number}")
     return tuple(ids)
-
-
-def _get(node: Node, key: str) -> Node | None:
-    return node.get(key) if isinstance(node, MappingNode) else None

@@ -36,7 +36,7 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
         entries[name] = Entry(entry.key_place, _escaped(entry.node))
     block = Entry(changed.place, MappingNode(entries, changed.place))
     changed_root = MappingNode({"params": block, **root.without("params").entries}, root.place)
-    again, findings, unknown = substitute(changed_root, "TASK")
+    again, findings, unknown = substitute(changed_root)
     tree = replace(source, root=again, unknown=unknown)
     return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
 

@@ -74,7 +74,7 @@ def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft = Draft(planner, situation)
         draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.speed)
         draft.turn("tilt", a, theta, speed=spec.speed)
-        draft.dwell("dwell", spec.dwell, awaits=True)
+        draft.dwell("dwell", spec.dwell)
         if spec.tilt > math.pi / 2:
             draft.spill(spec.into)
         draft.back("tilt back")

@@ -42,7 +42,7 @@ class WaitSpec(Model):
 def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:
     """One motion that commands nothing."""
     draft = Draft(planner, situation)
-    draft.dwell("wait", spec.duration, awaits=True)
+    draft.dwell("wait", spec.duration)
     return draft.plan()
 
 
