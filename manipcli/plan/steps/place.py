@@ -18,6 +18,7 @@ from pydantic import Field
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.condition import Problem, unknown_body
+from manipcli.model.landing import landing
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
@@ -38,6 +39,8 @@ LEANS = tuple(np.radians([0.0, 2.0, 4.0]))
 """How far [rad] an object may lean when it is let go."""
 ROUND = ("cup", "cylinder", "sphere")
 """Bodies as wide along their diagonal as along their axes."""
+FORMED = ("urdf", "mesh")
+"""Bodies whose top need not be that of their bounding box: a drawer, a shelf."""
 POINTING = 0.5
 """A tool that points less than this (cosine) along the ground points up or down."""
 _OVER = (
@@ -61,7 +64,11 @@ class PlaceSpec(Model):
     at: Literal["start"] | tuple[Length, Length] = Field(
         "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `on`."
     )
-    on: str | None = Field(None, description="The body that takes the object at [x, y]: on its top, or inside a tray.")
+    on: str | None = Field(
+        None,
+        description="The body that takes the object at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh "
+        "where it is met from above.",
+    )
     yaw: Turn | None = Field(None, description="About the world's z axis, at [x, y] [rad]. Default: as it is held.")
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
@@ -174,7 +181,13 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
     bottom = float(body.centre[2] - body.size[2] / 2)
     x_axis = planner.body_pose(situation, spec.object).R[:, 0]
     yaw = float(np.arctan2(x_axis[1], x_axis[0])) if spec.yaw is None else spec.yaw
-    return Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
+    X_WG = Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
+    if under.kind not in FORMED:
+        return X_WG
+    deeper = landing(body, X_WG, under, X_WU)
+    if deeper is None:
+        raise NotPlannable(f"nothing of '{spec.on}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m")
+    return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
 
 
 def _surface(under: Body) -> tuple[float, tuple[float, float]]:
