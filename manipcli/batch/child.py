@@ -14,7 +14,7 @@ from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core import collector
 from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
 from manipcli.judge.verdict import StepOutcome
-from manipcli.report.suite import troubles_of
+from manipcli.report.suite import Trouble, troubles_of
 
 if TYPE_CHECKING:
     from manipcli.flow.plan import PlannedStep
@@ -98,6 +98,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
     from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
+    from manipcli.record.faults import RecordingFailed
 
     beats.doing("loading")
     settings = job.settings
@@ -116,6 +117,8 @@ def _end_of(job: Job, beats: _Beats) -> End:
         )
     except InvalidInput as invalid:
         return End(None, invalid.findings)
+    except RecordingFailed as failure:  # said to the parent: its words have no room on that disk either
+        return End(None, troubles=(Trouble(str(failure), at=failure.time),), warnings=beats.warnings)
     beats.judged()
     found = troubles(job, report.verdict)
     findings: tuple[Finding, ...] = ()

@@ -148,10 +148,10 @@ class Beat:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """A run that came to its end.
+    """A run that came to its end, or whose log could not be written.
 
     Attributes:
-        report: None where nothing was run.
+        report: None where nothing was run, or not to its end.
         findings: why nothing was run.
         troubles: why it did not pass, with places in the task file.
         warnings: what was doubted before it began.

@@ -167,6 +167,8 @@ class Process:
                 hint = "; was there too little memory?" if -code == signal.SIGKILL else ""
                 return self._report("crashed", f"{cause}; {self.doing}{hint}")
             return self._report("crashed", f"ended with exit code {code} before it was done: {self._last_line()}")
+        if end.report is None and end.troubles:
+            return self._report("error", end.troubles[0].message, end=end)
         if end.report is None:
             return self._report("invalid", "the task cannot be run", end=end)
         word = _WORDS.get(exit_code(end.report.verdict), "error")
@@ -178,10 +180,11 @@ class Process:
         job, took = self.job, self.elapsed
         if end is None:
             end = End(None, troubles=(Trouble(text, self.doing.place(job.case.file), self.doing.at),))
+        unfinished = outcome in ("crashed", "hung") or (outcome == "error" and end.report is None)
         if outcome == "passed" and not job.settings.keep_logs:
             job.log.unlink(missing_ok=True)
             end = replace(end, report=replace(end.report, log=None) if end.report is not None else None)
-        if outcome not in ("crashed", "hung"):
+        if not unfinished:
             job.output.unlink(missing_ok=True)
         else:
             self._draw_what_is_left()
@@ -206,7 +209,7 @@ class Process:
             junit=end.junit,
             notes=end.notes,
         )
-        return report if outcome not in ("crashed", "hung") else self._with_page(report)
+        return self._with_page(report) if unfinished else report
 
     def _with_page(self, report: CaseReport) -> CaseReport:
         """With the page about it that its own process did not write, where one is wanted."""

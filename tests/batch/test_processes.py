@@ -19,12 +19,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from manipcli.batch.child import _Beats
+from manipcli.batch.child import _Beats, _end_of
 from manipcli.batch.job import Beat, End, Job, Settings, limit
 from manipcli.batch.pool import remove_empty, run_jobs
 from manipcli.batch.process import Process
 from manipcli.core.errors import Finding, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Trouble
 
@@ -91,6 +92,26 @@ def test_an_exit_without_an_end_is_a_crash_with_the_last_words(tmp_path: Path) -
     )
     assert report.output is not None
     assert Path(report.output).read_text().splitlines() == ["before", "no physics here"]
+
+
+def test_a_disk_that_is_full_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its run says so to its parent: the file of its last words lies on the same disk."""
+    (job,) = jobs(tmp_path, "")
+    full = RecordingFailed(job.partial, "No space left on device", time=0.5)
+
+    def refused(*_: object, **__: object) -> None:
+        raise full
+
+    monkeypatch.setattr("manipcli.pipeline.run_task", refused)
+    _ours, childs = Pipe()
+    end = _end_of(job, _Beats(childs))
+    assert (end.report, end.findings, [one.at for one in end.troubles]) == (None, (), [0.5])
+    code = f"import pickle; open(job.partial, 'w').close(); parent.send(pickle.loads({pickle.dumps(end)!r}))"
+    (job,) = jobs(tmp_path, code)
+    (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "pages"))])
+    assert (report.outcome, report.text) == ("error", str(full))
+    assert (report.log, report.output) == (str(job.partial), None)
+    assert report.page is not None and "No space left on device" in Path(report.page).read_text("utf-8")
 
 
 @pytest.mark.parametrize("wanted", [None, "3"])
