@@ -76,6 +76,7 @@ class Executor:
         self._tell = told
         self._alarm = alarm
         self._handles: tuple[GoalHandle, ...] = ()
+        self._joints: tuple[tuple[str, ...], ...] = ()
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
         """Send the motion's goals and tick until all are reached and its duration is over.
@@ -116,10 +117,13 @@ class Executor:
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if over:
                 late = "this motion was" if busy else "the condition under `until` held"
+                late = f"the time of the step was over before {late}"
+                if busy and session.ticks >= last_tick:  # it should be over by now
+                    late += f"; {self._furthest()}"
                 self._cancel()
-                return MotionEnd("timeout", f"the time of the step was over before {late}", awaited=not busy)
+                return MotionEnd("timeout", late, awaited=not busy)
             if deadline is None and session.time >= given_up:
-                late = f"it is not over {PATIENCE:g} s after its planned end; {_unreached(handles)}"
+                late = f"it is not over {PATIENCE:g} s after its planned end; {self._furthest()}"
                 self._cancel()
                 return MotionEnd("timeout", late)
 
@@ -163,17 +167,20 @@ class Executor:
     def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
         handles = []
         manager = self._session.manager
+        self._joints = ()
         if motion.trajectory is not None:
             follower = manager.serving(motion.trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             handle = follower.send_goal(self._completed(motion.trajectory, follower))
             handles.append(self._announced(follower.name, handle))
+            self._joints += (follower.joints,)
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
             handles.append(self._announced(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip))))
+            self._joints += (gripper.joints,)
         return tuple(handles)
 
     def _announced(self, controller: str, handle: GoalHandle) -> GoalHandle:
@@ -201,6 +208,18 @@ class Executor:
             (*trajectory.names, *others), trajectory.times, np.hstack([trajectory.positions, stay]),
             widened(trajectory.velocities, rest), widened(trajectory.accelerations, rest),
         )  # fmt: skip
+
+    def _furthest(self) -> str:
+        """Of the joints whose goals are still active, the one that is furthest from its reference."""
+        active = [
+            (abs(error), name)
+            for joints, handle in zip(self._joints, self._handles, strict=True)
+            if handle.active
+            for name, error in zip(joints, handle.feedback().error.tolist(), strict=True)
+        ]
+        far, name = max(active)
+        unit = self._session.robot.joint(name).unit
+        return f"joint '{name}' is {far:.3g} {unit} from its reference, further than the others"
 
     def _cancel(self) -> None:
         for handle in self._handles:
@@ -231,12 +250,6 @@ def _held(motion: Motion, handles: tuple[GoalHandle, ...], touch: bool) -> Motio
             return MotionEnd("failed", f"the hand did not open: {text}")
         weak = motion.grip.force is not None and "stalled" in stops
     return MotionEnd("done", text, weak=weak)
-
-
-def _unreached(handles: tuple[GoalHandle, ...]) -> str:
-    """How far what is still active is from what it wants."""
-    far = max((float(np.abs(handle.feedback().error).max()) for handle in handles if handle.active), default=0.0)
-    return f"the joint that is furthest from its reference misses it by {far:.3g}"
 
 
 def _gripper_goal(gripper: Hand, grip: Grip) -> GripperGoal:
