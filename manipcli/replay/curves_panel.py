@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.replay.playback import Playback, PlotTable
+from manipcli.replay.playback import Playback, PlotTable, filled
 
 if TYPE_CHECKING:
     import viser
@@ -28,7 +28,7 @@ COLOURS = (
 )  # fmt: skip
 
 
-def thinned(times: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
+def binned(times: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
     """About two rows for each of `bins` intervals: the least and the greatest value of every column.
 
     Args:
@@ -61,9 +61,7 @@ def with_cursor(times: Array, values: Array, now: float) -> tuple[Array, Array, 
         values: (T, c).
         now: [s].
     """
-    known = ~np.isnan(values)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(times))[:, None], known.argmax(axis=0)), axis=0)
-    values = np.nan_to_num(np.take_along_axis(values, last, axis=0))
+    values = filled(values)
     k = int(np.searchsorted(times, now))
     here = np.array([np.interp(now, times, column) for column in values.T]).reshape(1, -1)
     cursor = np.full(len(times) + 3, values.min())
@@ -158,7 +156,7 @@ class CurvesPanel:
     def _data(self) -> tuple[tuple[Array, ...], list[str]]:
         times, found = self._shown()
         values = np.stack([each for _, _, each in found], axis=1)
-        times, values, cursor = with_cursor(*thinned(times, values), self._now)
+        times, values, cursor = with_cursor(*binned(times, values), self._now)
         return (times, *values.T, cursor), [f"{name} [{unit}]" for name, unit, _ in found]
 
     def place(self, now: float) -> None:

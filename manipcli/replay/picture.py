@@ -19,7 +19,7 @@ from manipcli.model.posture import posture
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw
-from manipcli.replay.image import Image, sky, write_png
+from manipcli.replay.image import Image, png_bytes, sky
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.surface import Surface, surface
 
@@ -234,5 +234,5 @@ def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
     """
     drawing, poses = draw(robot), Placing(robot).start(posture(robot))
     with Studio(drawing) as studio:
-        write_png(path, studio.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1])))
+        path.write_bytes(png_bytes(studio.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))))
     return drawing.missing

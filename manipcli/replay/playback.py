@@ -148,12 +148,7 @@ class Playback:
     def stance(self) -> Array:
         """(T, n) where the joints are drawn: as measured, without a measurement as they were last, before the first one
         as they are then, and at zero where there is none at all."""
-        known = ~np.isnan(self.position)
-        if known.all():
-            return self.position
-        rows = np.arange(len(self.times))[:, None]
-        last = np.maximum.accumulate(np.where(known, rows, known.argmax(axis=0)), axis=0)
-        return np.nan_to_num(np.take_along_axis(self.position, last, axis=0))
+        return filled(self.position)
 
     def poses(self) -> Poses:
         """Where the frames of `draw(robot, scene)` are at every time."""
@@ -183,6 +178,15 @@ class Playback:
             ),
             *((forces,) if forces.columns else ()),
         )
+
+
+def filled(values: Array) -> Array:
+    """(T, c) without NaN: each is the value before it, before the first one that, and 0 where there is none at all."""
+    known = ~np.isnan(values)
+    if known.all():
+        return values
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], known.argmax(axis=0)), axis=0)
+    return np.nan_to_num(np.take_along_axis(values, last, axis=0))
 
 
 def joint_tables(

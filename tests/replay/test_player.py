@@ -19,7 +19,7 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel, Sphere, Tool
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact
-from manipcli.replay.curves_panel import thinned, with_cursor
+from manipcli.replay.curves_panel import binned, with_cursor
 from manipcli.replay.drawing import draw
 from manipcli.replay.forces import Forces
 from manipcli.replay.playback import Phase, Playback, PlaybackStep
@@ -194,14 +194,14 @@ def test_thinned_curves_keep_their_peaks() -> None:
     rng = np.random.default_rng(3)
     values = rng.normal(size=(10_003, 2))
     values[4321, 0], values[77, 1] = 50.0, -60.0
-    times, few = thinned(np.arange(10_003) * 0.001, values, bins=100)
+    times, few = binned(np.arange(10_003) * 0.001, values, bins=100)
     assert len(times) == len(few) < 350
     assert (np.diff(times) > 0).all()
     np.testing.assert_array_equal(few.max(axis=0), values.max(axis=0))
     np.testing.assert_array_equal(few.min(axis=0), values.min(axis=0))
     assert abs(times[np.argmax(few[:, 0])] - 4.321) < 0.11
     short = np.arange(50.0)
-    assert thinned(short, values[:50], bins=100)[0] is short
+    assert binned(short, values[:50], bins=100)[0] is short
 
 
 def test_the_line_of_now_stands_in_curves_without_gaps() -> None:
