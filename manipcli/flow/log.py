@@ -19,7 +19,7 @@ from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import SAMPLE
-from manipcli.judge.judge import judge
+from manipcli.judge.judge import STORED, UNTIL, judge
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
@@ -245,11 +245,12 @@ def known_of(task: Task, log: Path) -> Mapping[str, str | int]:
 
 
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:
-    """What the log keeps of its own verdict, for whoever looks at it without manipcli."""
+    """What the log keeps of its own verdict, for whoever looks at it without manipcli; and up to when it was judged."""
     return {
-        "verdict": {
+        STORED: {
             "verdict": verdict.verdict,
             "text": verdict.text,
+            UNTIL: repr(verdict.simulated_time),
             **{f"step.{step.id}": step.outcome for step in verdict.steps},
             **{
                 f"expect.{e.name}": f"{e.outcome} {'' if e.margin is None else repr(e.margin)} {e.unit}".strip()

@@ -12,11 +12,14 @@ from manipcli.judge.examine import examine
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording
 from manipcli.spec.condition import ExpectationSpec
 
+STORED, UNTIL = "verdict", "until"
+"""Metadata of the log: the verdict when it was written, and the time [s] of the last tick that was judged."""
 RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
@@ -47,6 +50,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
+    errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     word, text = _verdict(errors, cause, steps, examined.outcomes)
     return Verdict(
@@ -91,6 +95,17 @@ def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
     elif status == RunStatus.COMPLETE and left_out(recording):
         errors.append(Finding("RUN104", f"the log is incomplete: {left_out(recording)}"))
     return tuple(errors)
+
+
+def _cut_short(recording: Recording, end: float) -> tuple[Finding, ...]:
+    """A copy without the last of its messages, though what was stored behind them is there."""
+    try:
+        until = float(recording.metadata.get(STORED, {}).get(UNTIL, ""))
+    except ValueError:
+        return ()
+    if until - end > ROUNDING:
+        return (Finding("RUN104", f"the log is incomplete: it ends at {end:.3f} s, and the run at {until:.3f} s"),)
+    return ()
 
 
 def _verdict(

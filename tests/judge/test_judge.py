@@ -333,6 +333,18 @@ def test_a_complete_run_whose_events_are_missing_is_not_judged_as_if_it_were_who
     assert "no message of /task/events" in silent.text
 
 
+@pytest.mark.parametrize(("until", "verdict"), [("3.0", "error"), ("nan", "passed"), ("", "passed"), (None, "passed")])
+def test_a_copy_without_its_last_ticks_is_not_judged_as_if_it_were_whole(until: str | None, verdict: str) -> None:
+    """A filter of messages leaves the metadata behind them; `until` is where the run that stored its verdict ended."""
+    whole = recording()
+    end = judged(whole).simulated_time
+    stored = {"verdict": {"verdict": "passed", "until": repr(end) if until is None else until}}
+    found = judged(recording(metadata=run() | stored))
+    assert (end, found.verdict) == (2.0, verdict)
+    if verdict == "error":
+        assert found.text == "the log is incomplete: it ends at 2.000 s, and the run at 3.000 s"
+
+
 def test_what_needs_contacts_is_not_evaluated_without_any_message_of_them() -> None:
     never: tuple[str, Any] = ("no_collision", {"pairs": [["ball", "desk"]]})
     assert judged(recording(), never).verdict == "passed"
