@@ -14,6 +14,7 @@ from manipcli.control.controller import ControllerOutput, FeedForward, JointStat
 from manipcli.control.gains import build_pid, joint_gains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.model.robot import JointType
 from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface, Role
 
@@ -45,6 +46,7 @@ class GripperController:
         joints: (n) distinct names.
         interface: effort, or position, which needs no gains and knows no maximum effort.
         gains: by joint name.
+        types: (n) joint types, for texts; None: they turn.
         fingers: joint indices of each finger, where a goal does not say; empty: each joint is a finger.
         speed: [rad/s or m/s] of the references.
         max_effort: (n) or a number, N m or N; None: unlimited here.
@@ -69,6 +71,7 @@ class GripperController:
         joints: Sequence[str],
         gains: Mapping[str, GainsSpec] | None = None,
         interface: Literal["position", "effort"] = "effort",
+        types: Sequence[JointType] | None = None,
         fingers: tuple[tuple[int, ...], ...] = (),
         speed: float = 1.0,
         max_effort: npt.ArrayLike | None = None,
@@ -82,6 +85,7 @@ class GripperController:
     ) -> None:
         self.name = name
         self.joints = distinct(name, joints)
+        self._units = ["m" if kind == "prismatic" else "rad" for kind in types or ["revolute"] * len(self.joints)]
         self.interfaces: tuple[Interface, ...] = (interface,)
         self.feed_forward: FeedForward = feed_forward
         n = len(self.joints)
@@ -299,7 +303,8 @@ class GripperController:
             elif time - moved[f] >= self._stall_time:
                 away = [abs(float(self._target[j]) - position[j]) for j in self._fingers[f]]
                 k = away.index(max(away))
-                text = f"stalled {away[k]:.3g} before the target of '{self.joints[self._fingers[f][k]]}'"
+                j = self._fingers[f][k]
+                text = f"stalled {away[k]:.3g} {self._units[j]} before the target of '{self.joints[j]}'"
                 if force is not None:
                     text += f", where it felt {self._felt[f]:.3g} N of the {wanted:.3g} N asked"
                 self._stop(f, "stalled", text)

@@ -138,7 +138,7 @@ def test_a_hand_that_something_stops_has_not_opened(session_of: SessionOf, scrip
     opening = Grip(("knuckle", "tip"), np.zeros(2), None, must_hold=False, must_arrive=True)
     end = Executor(session_of(scripted(stuck))).run(Motion("open", None, opening, 0.2), until=None, deadline=None)
     assert end.outcome == "failed"
-    assert end.text.startswith("the hand did not open: finger of 'knuckle': stalled 0.4 before the target")
+    assert end.text.startswith("the hand did not open: finger of 'knuckle': stalled 0.4 rad before the target")
     assert Executor(session_of()).run(Motion("open", None, opening, 0.2), until=None, deadline=None).outcome == "done"
     moving = Motion("move", None, replace(opening, must_arrive=False), 0.2)
     assert Executor(session_of(scripted(stuck))).run(moving, until=None, deadline=None).outcome == "done"

@@ -57,6 +57,7 @@ def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
         joints=spec.joints,
         gains=spec.gains,
         interface=spec.command_interface,
+        types=[joint.type for joint in joints],
         fingers=fingers(fit.robot, spec.joints),
         speed=closing_speed(fit.robot, spec.joints, spec.speed),
         max_effort=effort if spec.command_interface == "effort" else None,

@@ -165,7 +165,28 @@ def test_a_stall_takes_its_time(settings, at, target, stalls):
     for k in range(ticks - 3, ticks + 3):
         controller.update(k * PERIOD, PERIOD, stuck)
     assert handle.result.fingers == ("stalled", "stalled")
-    assert f"stalled {abs(target - at):g} before the target" in handle.result.text
+    assert f"stalled {abs(target - at):g} rad before the target of '{JOINTS[0]}'" in handle.result.text
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("prismatic", "m"), ("revolute", "rad")])
+def test_a_stall_is_told_in_the_unit_of_its_joint(kind, unit):
+    spec = GripperSpec(type="gripper", joints=JOINTS, gains={joint: GainsSpec(p=1.0) for joint in JOINTS})
+    controller = build("hand", spec, Fit(robot_of(kind), kinematics=None, compat=None))
+    stuck = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
+    handle = controller.send_goal(GripperGoal(target=0.5))
+    for k in range(1000):
+        controller.update(k * PERIOD, PERIOD, stuck)
+    assert f"stalled 0.5 {unit} before the target of '{JOINTS[0]}'" in handle.result.text
+
+
+def robot_of(kind):
+    """A palm with one joint of this kind for each of `JOINTS`."""
+    joints = tuple(
+        Joint(name, kind, "palm", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits(0, 1, 1, 1))
+        for name in JOINTS
+    )
+    links = tuple(Link(name, None, (), ()) for name in ("palm", *(joint.child for joint in joints)))
+    return RobotModel("hand", "palm", links, joints, (), (), (), Transform.identity(), "")
 
 
 def test_a_finger_has_not_stalled_as_long_as_its_reference_winds_it_up():
@@ -305,19 +326,11 @@ def test_contact_is_allowed_where_stalling_is_not():
     [("effort", True, "gravity"), ("effort", False, "none"), ("position", True, "none"), ("position", False, "none")],
 )
 def test_gravity_is_asked_for_where_it_is_wanted_and_commanded_as_an_effort(interface, asked, expected):
-    joints = tuple(
-        Joint(
-            name, "revolute", "palm", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits(0, 1, 1, 1)
-        )
-        for name in JOINTS
-    )
-    links = tuple(Link(name, None, (), ()) for name in ("palm", *(joint.child for joint in joints)))
-    robot = RobotModel("hand", "palm", links, joints, (), (), (), Transform.identity(), "")
     spec = GripperSpec(
         type="gripper", joints=JOINTS, command_interface=interface, gravity_compensation=asked,
         gains={joint: GainsSpec(p=1.0) for joint in JOINTS},
     )  # fmt: skip
-    assert build("hand", spec, Fit(robot, kinematics=None, compat=None)).feed_forward == expected
+    assert build("hand", spec, Fit(robot_of("revolute"), kinematics=None, compat=None)).feed_forward == expected
 
 
 def test_on_the_position_interface_it_commands_its_reference():
