@@ -34,7 +34,6 @@ from manipcli.simulate.engines import ENGINES
 
 STEP = 1e-3
 G = 9.81
-EFFORT: tuple[Mode, ...] = ("effort",)
 
 every_engine = pytest.mark.parametrize("member", list(ENGINES), ids=lambda member: member.name)
 with_physics = pytest.mark.parametrize(

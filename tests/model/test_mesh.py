@@ -119,7 +119,6 @@ def test_collada_polylists_strips_and_reused_nodes(tmp_path: Path) -> None:
     assert len(read_mesh(write(tmp_path / "t.dae", twice)).faces) == 8
 
 
-TRIANGLES = b"".ljust(80) + (4).to_bytes(4, "little")
 DAE = collada_tetrahedron()
 DAMAGED = {
     "empty.stl": (b"", "is empty"),

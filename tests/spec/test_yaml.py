@@ -159,15 +159,6 @@ def test_constructors_that_others_registered_are_never_asked() -> None:
     assert ran == []
 
 
-SCALARS = st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats(allow_nan=False, allow_infinity=False)
-TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=8)
-DATA = st.recursive(
-    SCALARS | TEXTS,
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS, inner, max_size=4),
-    max_leaves=20,
-)
-
-
 @given(st.text(st.sampled_from(string.ascii_letters + "0123456789 \n\t:-[]{}&*!|>'\"#%@,?.~<$"), max_size=60))
 def test_any_text_is_a_tree_or_refused_with_places(text: str) -> None:
     try:
