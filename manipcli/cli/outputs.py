@@ -114,6 +114,7 @@ class Outputs:
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 
+        self._forget()
         if self._junit is not None:
             if task is not None:
                 places = file_places(task, overrides)
@@ -131,6 +132,7 @@ class Outputs:
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 
+        self._forget()
         if self._junit is not None:
             self._write(self._junit, render_junit(verdict, *task_places(task.file), file=str(file)))
         if self._report is not None:
@@ -146,11 +148,18 @@ class Outputs:
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 
+        self._forget()
         verdict, name = invalid_verdict(file, findings), log.name if log is not None else ""
         if self._junit is not None:
             self._write(self._junit, render_junit(verdict, (), (), log=name))
         if self._report is not None:
             self._write(self._report, render_page(invalid_page(verdict, findings, log=name)).encode())
+
+    def _forget(self) -> None:
+        """Removes what tells of an earlier run, so that it stands for none where this one cannot be told (full disk)."""
+        for path in (self._report, self._junit):
+            if path is not None and path.is_file():
+                Path(os.path.realpath(path)).unlink(missing_ok=True)
 
     def _write(self, path: Path, data: bytes) -> None:
         from manipcli.core.whole_file import write_whole

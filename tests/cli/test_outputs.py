@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,28 @@ def test_a_log_that_stays_keeps_its_page_and_its_junit(folder: Path, capsys: pyt
     assert main(words) == 4
     assert "the file exists" in capsys.readouterr().err
     assert {name: (folder / name).read_bytes() for name in before} == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing", ["report.html", "junit.xml"])
+def test_no_page_of_an_earlier_run_stays_beside_a_new_log(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    """Where the disk is full when the files about the run are written, what there was before is gone, too."""
+    words = ["run", str(TASK), "--set", "simulation.engine=kinematic", "-q", "--report", "report.html"]
+    (folder / "real.xml").write_text("old")
+    (folder / "junit.xml").symlink_to("real.xml")
+    (folder / "report.html").write_text("old")
+
+    def full(path: Path, data: bytes) -> None:
+        if path.name == missing:
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        path.write_bytes(data)
+
+    monkeypatch.setattr("manipcli.core.whole_file.write_whole", full)
+    assert main([*words, "--junit", "junit.xml"]) == 3
+    assert (folder / "runs" / "home.mcap").is_file()
+    assert not (folder / missing).exists()
+    assert all(
+        "old" not in path.read_text() for path in (folder / "report.html", folder / "junit.xml") if path.exists()
+    )
