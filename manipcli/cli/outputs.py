@@ -156,7 +156,7 @@ class Outputs:
             self._write(self._report, render_page(invalid_page(verdict, findings, log=name)).encode())
 
     def _forget(self) -> None:
-        """Removes what tells of an earlier run, so that it stands for none where this one cannot be told (full disk)."""
+        """Removes what tells of an earlier run: where this one cannot be told (a full disk), it stands for none."""
         for path in (self._report, self._junit):
             if path is not None and path.is_file():
                 Path(os.path.realpath(path)).unlink(missing_ok=True)
