@@ -71,7 +71,10 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
     if parts.errors:
         raise InvalidInput(parts.errors)
     if len(parts.links) != 1:
-        raise ValueError(f"'{spec.file}' has {len(parts.links)} links; an object of the scene has one")
+        raise ValueError(
+            f"'{spec.file}' has {len(parts.links)} links; an object of the scene has one, "
+            "as nothing joins two of them: give each part that moves a file of its own"
+        )
     (link,) = parts.links
     if not link.collisions:
         raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")
