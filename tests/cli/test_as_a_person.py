@@ -206,6 +206,21 @@ def test_a_signal_while_the_program_starts_is_2_as_well(long_task: Path) -> None
             assert "Traceback" not in err
 
 
+def test_a_signal_while_a_text_is_executed_is_2_as_well(nod: Path, tmp_path: Path) -> None:
+    """As by the definition of a dataclass: CPython remembers it, whoever catches it, until the next text."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\nimport manipcli.report.json, manipcli.report.text\n"
+        "class Finder:\n    @staticmethod\n    def find_spec(name, *_):\n"
+        "        if name == 'manipcli.flow.load': exec('raise KeyboardInterrupt')\nsys.meta_path.insert(0, Finder)\n"
+    )
+    paths = os.pathsep.join([str(tmp_path), str(ROOT)])
+    ran = subprocess.run(
+        [*MANIPCLI, "run", str(nod)], env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (ran.returncode, ran.stderr) == (2, "error[USE002]: interrupted\n")
+
+
 def test_what_a_killed_run_leaves_is_readable(long_task: Path, nod: Path) -> None:
     process = begin(long_task)
     time.sleep(0.3)
