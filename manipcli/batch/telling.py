@@ -39,7 +39,7 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
     steps = [
         Trouble(describe_step(step), _place(job, task, "steps", k), step.ended)
         for k, step in enumerate(verdict.steps)
-        if step.outcome not in ("done", "not_run") and not step.tolerated
+        if step.went_wrong
     ]
     refused = any(step.outcome == "failed" and step.started is None for step in verdict.steps)
     unmet = [

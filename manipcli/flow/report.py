@@ -23,7 +23,7 @@ from manipcli.replay.shots import Shots, telling
 from manipcli.report.facts import run_facts
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
-from manipcli.report.text import went_wrong
+from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task as load_spec
 from manipcli.spec.located import Located
@@ -177,15 +177,14 @@ def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cau
         causes = [Cause(finding.message, "", end, hint=finding.hint or "") for finding in verdict.errors]
         hint = ""
     for step, written in zip(verdict.steps, places[0], strict=False):
-        if step.outcome not in ("done", "not_run") and not step.tolerated:
+        if step.went_wrong:
             at = None if end is None else step.ended if step.ended is not None else end
-            causes.append(Cause(went_wrong(step), step.text, at, written, hint))
+            causes.append(Cause(how_wrong(step), step.text, at, written, hint))
             hint = ""
     for one, written in zip(verdict.expectations, places[1], strict=False):
         if one.outcome != "passed" and end is not None:
             causes.append(Cause(f"expectation '{one.name}' {_missed(one)}", one.text, one.at, written))
-    failing = [step for step in verdict.steps if step.outcome not in ("done", "not_run") and not step.tolerated]
-    if verdict.verdict == "failed" and not failing and _before_or_after(verdict):
+    if verdict.verdict == "failed" and verdict.ended_between:
         causes.insert(0, Cause(verdict.text, "", end))
     return tuple(causes)
 
@@ -194,12 +193,6 @@ def _missed(one: ExpectationOutcome) -> str:
     if one.outcome == "not_evaluated":
         return "was never evaluated"
     return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
-
-
-def _before_or_after(verdict: Verdict) -> bool:
-    """Whether the run ended before its first step or after its last: neither a step nor an expectation says why."""
-    undone: list[StepOutcome] = [step for step in verdict.steps if step.outcome == "not_run"]
-    return bool(undone) or all(one.outcome == "passed" for one in verdict.expectations)
 
 
 def _limit(spec: Model) -> float | None:

@@ -117,7 +117,7 @@ def _verdict(
     """The word, and in one line why. `cause`: what ended the simulation, in a step, before the first or after all."""
     if errors:
         return "error", errors[0].message
-    if cause and all(step.outcome in ("done", "not_run") or step.tolerated for step in steps):
+    if cause and not any(step.went_wrong for step in steps):
         return "failed", cause
     undone = next((step for step in steps if step.outcome != "done" and not step.tolerated), None)
     if undone is not None:

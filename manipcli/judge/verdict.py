@@ -48,6 +48,11 @@ class StepOutcome:
     tolerated: bool = False
     replanned: tuple[str, ...] = ()
 
+    @property
+    def went_wrong(self) -> bool:
+        """Whether it began, was not done, and the task does not say that it may fail."""
+        return self.outcome not in ("done", "not_run") and not self.tolerated
+
 
 @dataclass(frozen=True, slots=True)
 class ExpectationOutcome:
@@ -89,3 +94,11 @@ class Verdict:
     text: str = ""
     drawn: Drawn | None = None
     cuts: Cuts = field(default_factory=Cuts)
+
+    @property
+    def ended_between(self) -> bool:
+        """Whether the run ended before its first step or after its last: neither step nor expectation says why."""
+        if any(step.went_wrong for step in self.steps):
+            return False
+        undone = any(step.outcome == "not_run" for step in self.steps)
+        return undone or all(one.outcome == "passed" for one in self.expectations)

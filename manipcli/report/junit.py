@@ -15,7 +15,7 @@ from manipcli.core.text import escape
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Written
-from manipcli.report.text import went_wrong
+from manipcli.report.text import how_wrong
 
 _NO_XML = re.compile("[\ufffe\uffff]")
 
@@ -71,8 +71,7 @@ def _run(verdict: Verdict) -> Element:
     if verdict.verdict == "error":
         lines = [str(finding) + (f"\nhint: {finding.hint}" if finding.hint else "") for finding in verdict.errors]
         _add(case, "error", verdict.text or "error", verdict.errors[0].code if verdict.errors else "error", lines)
-    elif verdict.verdict == "failed" and not _steps_failed(verdict) and (_undone(verdict) or not _unmet(verdict)):
-        # It ended before its first step, or after its last.
+    elif verdict.verdict == "failed" and verdict.ended_between:
         _add(case, "failure", verdict.text, "failed", [])
     return case
 
@@ -86,7 +85,7 @@ def _step(verdict: Verdict, step: StepOutcome, attributes: dict[str, str]) -> El
         SubElement(case, "system-out").text = safe(f"{step.outcome}, and the task says that it may: {step.text}")
     elif step.outcome != "done":
         when = "" if step.ended is None else f"at {step.ended:.3f} s"
-        message = went_wrong(step) + (f": {step.text}" if step.text else "")
+        message = how_wrong(step) + (f": {step.text}" if step.text else "")
         hints = [f"hint: {one.hint}" for one in verdict.errors if one.hint and verdict.verdict == "failed"]
         _add(case, "failure", message, step.outcome, [when, *hints])
     return case
@@ -100,24 +99,12 @@ def _expectation(verdict: Verdict, one: ExpectationOutcome, attributes: dict[str
         size = f" by {quantity(one.distance, one.unit)}" if one.distance else ""
         _add(case, "failure", f"expectation '{one.name}' fails{size}: {one.text}", "failed", [margin, when])
     elif one.outcome == "not_evaluated":
-        excused = verdict.verdict == "error" or _steps_failed(verdict)
+        excused = verdict.verdict == "error" or any(step.went_wrong for step in verdict.steps)
         message = f"expectation '{one.name}' was never evaluated: {one.text}"
         _add(case, "skipped" if excused else "failure", message, "not_evaluated", [])
     elif margin:
         SubElement(case, "system-out").text = safe(", ".join(part for part in (margin, when, one.text) if part))
     return case
-
-
-def _steps_failed(verdict: Verdict) -> bool:
-    return any(step.outcome not in ("done", "not_run") and not step.tolerated for step in verdict.steps)
-
-
-def _undone(verdict: Verdict) -> bool:
-    return any(step.outcome == "not_run" for step in verdict.steps)
-
-
-def _unmet(verdict: Verdict) -> bool:
-    return any(one.outcome != "passed" for one in verdict.expectations)
 
 
 def _case(verdict: Verdict, kind: str, name: str, time: float, attributes: dict[str, str]) -> Element:

@@ -94,14 +94,10 @@ def _causes(verdict: Verdict) -> list[str]:
     if verdict.verdict == "passed":
         return []
     causes = [describe(finding) for finding in verdict.errors]
-    if not causes and all(step.outcome in ("done", "not_run") or step.tolerated for step in verdict.steps):
-        undone = any(step.outcome == "not_run" for step in verdict.steps)
-        if undone or all(expectation.outcome == "passed" for expectation in verdict.expectations):
-            return [f"{FAIL} {verdict.text}"]  # it ended before the first step, or after the last
+    if not causes and verdict.ended_between:
+        return [f"{FAIL} {verdict.text}"]
     causes += [
-        f"{FAIL} {went_wrong(step)}{f': {step.text}' if step.text else ''}"
-        for step in verdict.steps
-        if step.outcome not in ("done", "not_run") and not step.tolerated
+        f"{FAIL} {how_wrong(step)}{f': {step.text}' if step.text else ''}" for step in verdict.steps if step.went_wrong
     ]
     causes += [
         f"{FAIL} expectation '{expectation.name}' {_margin(expectation)}"
@@ -123,8 +119,8 @@ def _tries(step: StepOutcome) -> str:
 _WENT_WRONG = {"failed": "failed", "timeout": "ran out of time", "interrupted": "was interrupted"}
 
 
-def went_wrong(step: StepOutcome) -> str:
-    """That a step did, and how."""
+def how_wrong(step: StepOutcome) -> str:
+    """That a step went wrong, and how."""
     return f"step '{step.id}' {_WENT_WRONG[step.outcome]}{_tries(step)}"
 
 
