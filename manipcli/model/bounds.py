@@ -80,7 +80,8 @@ def _parsed(text: str) -> Bounds:
         name, _, number = word.partition("=")
         if name not in known or not number.isascii() or not number.isdigit() or not 0 < int(number[:12]) < 10**10:
             message = f"{VARIABLE}: '{shorten(word)}' is no bound; expected NAME=NUMBER"
-            raise InvalidInput([Finding("USE040", message, hint=did_you_mean(name, known, kind="bounds"))])
+            hint = "whole numbers above 0" if name in known else did_you_mean(name, known, kind="bounds")
+            raise InvalidInput([Finding("USE040", message, hint=hint)])
         own[name] = int(number)
     return dataclasses.replace(Bounds(), **own)
 

@@ -212,8 +212,17 @@ def test_a_bound_is_raised_as_its_error_says(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv("MANIPCLI_BOUNDS", "depth=99999")
     assert codes(look(tmp_path, deep.replace("<x>", "<x>" * 30).replace("</x>", "</x>" * 30))) == ["URDF052"]
     monkeypatch.setenv("MANIPCLI_BOUNDS", "deep=3")
-    with pytest.raises(InvalidInput, match="'deep=3' is no bound"):
+    with pytest.raises(InvalidInput, match="'deep=3' is no bound") as refused:
         bounds()
+    assert "did you mean 'depth'" in (refused.value.findings[0].hint or "")
+
+
+@pytest.mark.parametrize("number", ["0.5", "0", "-1", "1e3", ""])
+def test_a_bound_that_is_no_whole_number_is_told_that(number: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIPCLI_BOUNDS", f"seconds={number}")
+    with pytest.raises(InvalidInput, match=f"'seconds={number}' is no bound") as refused:
+        bounds()
+    assert refused.value.findings[0].hint == "whole numbers above 0"
 
 
 def test_real_robots_are_far_from_the_bounds() -> None:
