@@ -110,10 +110,11 @@ class Tolerances:
 
     def goal_text(self, facts: JointFacts, errors: Sequence[Array], time: float, late: float) -> str:
         joint, what = _worst(facts, errors, self.goal, GOAL)
-        grace = "" if self.goal_time > 0.0 else ": no grace; `compat: ros2` waits without end"
+        grace = "without end" if math.isinf(self.goal_time) else f"{self.goal_time:.6g} s"
+        grace += "" if self.goal_time > 0.0 else ": no grace; `compat: ros2` waits without end"
         return (
             f"joint '{joint}' is outside its {what}, at t = {time:.3f} s, "
-            f"{late:.3f} s after the end (goal_time {self.goal_time:.6g} s{grace})"
+            f"{late:.3f} s after the end (goal_time {grace})"
         )
 
 
