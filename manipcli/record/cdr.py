@@ -115,7 +115,8 @@ class CdrReader:
             raise CdrError("is not little-endian CDR")
         self.offset = 4
 
-    def _advance(self, size: int, align: int) -> int:
+    def skip(self, size: int, align: int) -> int:
+        """The offset of `size` bytes that are aligned to `align`."""
         start = self.offset + (-(self.offset - 4) % align)
         if size < 0 or start + size > len(self._data):
             raise CdrError("ends too early")
@@ -123,16 +124,16 @@ class CdrReader:
         return start
 
     def u32(self) -> int:
-        return int(_U32.unpack_from(self._data, self._advance(4, 4))[0])
+        return int(_U32.unpack_from(self._data, self.skip(4, 4))[0])
 
     def f64(self) -> float:
-        return float(_F64.unpack_from(self._data, self._advance(8, 8))[0])
+        return float(_F64.unpack_from(self._data, self.skip(8, 8))[0])
 
     def text(self) -> str:
         size = self.u32()
         if size == 0:
             return ""
-        start = self._advance(size, 1)
+        start = self.skip(size, 1)
         return bytes(self._data[start : start + size - 1]).decode("utf-8", errors="replace")
 
     def count(self, smallest: int) -> int:
@@ -148,15 +149,7 @@ class CdrReader:
     def doubles(self) -> tuple[int, int]:
         """(offset of the first element, count) of a float64[]."""
         count = self.count(8)
-        return (self._advance(8 * count, 8), count) if count else (self.offset, 0)
-
-    def skip_f64(self, count: int) -> int:
-        """The offset of `count` bare doubles."""
-        return self._advance(8 * count, 8)
-
-    def skip(self, size: int, align: int) -> int:
-        """The offset of `size` bytes that are aligned to `align`."""
-        return self._advance(size, align)
+        return (self.skip(8 * count, 8), count) if count else (self.offset, 0)
 
     def expect(self, size: int) -> None:
         """Raises CdrError where fewer than `size` bytes are left."""
@@ -165,5 +158,5 @@ class CdrReader:
 
     def header(self) -> str:
         """Skips the stamp; the frame."""
-        self._advance(8, 4)
+        self.skip(8, 4)
         return self.text()

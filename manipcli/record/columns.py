@@ -67,13 +67,13 @@ def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
     if len(entries) and (size < PAYLOAD or entries[:, 1].max() > size - PAYLOAD):
         return None
     at = entries[:, 1].astype(np.int64)
-    lengths = _every(data, "<u8")[at + 1]
+    lengths = every(data, "<u8")[at + 1]
     fits = (
         (np.frombuffer(data, dtype=np.uint8)[at] == MESSAGE_OPCODE)
         & (lengths >= PAYLOAD - 9)
         & (lengths <= size)
-        & (_every(data, "<u2")[at + 9] == channel)
-        & (_every(data, "<u8")[at + 15] == entries[:, 0])
+        & (every(data, "<u2")[at + 9] == channel)
+        & (every(data, "<u8")[at + 15] == entries[:, 0])
     )
     if not fits.all():
         return None
@@ -111,7 +111,7 @@ def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
     return found, others
 
 
-def _every(data: bytes, code: str) -> npt.NDArray[np.uint64]:
+def every(data: bytes, code: str) -> npt.NDArray[np.uint64]:
     """The number that begins at each byte of `data`, as a view."""
     kind = np.dtype(code)
     return np.ndarray((max(len(data) - kind.itemsize + 1, 0),), dtype=kind, buffer=data, strides=(1,))
@@ -225,8 +225,7 @@ def _message(data: bytes, places: Places, k: int) -> memoryview:
 def _rows(data: bytes, starts: Int, size: int) -> npt.NDArray[np.void]:
     """(T) rows of `size` bytes, at least one, that begin at `starts`."""
     kind = np.dtype((np.void, size))
-    every = np.ndarray((len(data) - size + 1,), dtype=kind, buffer=data, strides=(1,))
-    return every[starts]
+    return np.ndarray((len(data) - size + 1,), dtype=kind, buffer=data, strides=(1,))[starts]
 
 
 def _equal(data: bytes, starts: Int, size: int) -> bool:
@@ -251,7 +250,7 @@ def singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
 
 def sequences(data: bytes, places: Places) -> Int:
     """The sequence number of each message."""
-    return _every(data, "<u4")[places.starts - PAYLOAD + 11].astype(np.int64)
+    return every(data, "<u4")[places.starts - PAYLOAD + 11].astype(np.int64)
 
 
 def joint_state_layout(reader: CdrReader) -> Layout:
@@ -268,7 +267,7 @@ def body_layout(bodies: frozenset[str], world: str) -> Callable[[CdrReader], Lay
         names, runs = [], []
         for _ in range(reader.count(64)):
             parent, child = reader.header(), reader.text()
-            offset = reader.skip_f64(7)
+            offset = reader.skip(7 * 8, 8)
             if parent == world and child in bodies:
                 names.append(child)
                 runs.append((offset, 7))

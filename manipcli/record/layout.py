@@ -182,7 +182,7 @@ class _Walk:
                             one.names.insert(0, label)
                             found.append(one)
                     if len(found) > MAX_LEAVES:
-                        raise CdrError(_MANY)
+                        raise CdrError(MANY)
                 return found
             case _:
                 return []
@@ -193,7 +193,7 @@ class _Walk:
             return list(range(count))
         asked = [int(word) % count for word in (key.words if key else ()) if word.lstrip("-").isdecimal()]
         if not asked:
-            raise CdrError(_MANY)
+            raise CdrError(MANY)
         return asked[:MAX_LEAVES]
 
     def _skip(self, kind: Type) -> None:
@@ -248,4 +248,4 @@ class _Walk:
             raise CdrError("has too many parts to be looked through")
 
 
-_MANY = f"has more than {MAX_LEAVES} numbers there; say which ones in brackets"
+MANY = f"has more than {MAX_LEAVES} numbers there; say which ones in brackets"

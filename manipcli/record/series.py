@@ -14,11 +14,11 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Int, Places
+from manipcli.record.columns import Int, Places, every
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording
 from manipcli.record.fields import Way
-from manipcli.record.layout import MAX_LEAVES, Layout, layout
+from manipcli.record.layout import MANY, MAX_LEAVES, Layout, layout
 from manipcli.record.schemas import CONTACTS
 from manipcli.record.topics import Topics
 
@@ -141,7 +141,7 @@ class _Gathered:
             times = seconds[alike]
             for leaf, values in _values(data, places.starts[alike], found):
                 if leaf not in self._parts and len(self._parts) >= MAX_LEAVES:
-                    raise CdrError(f"has more than {MAX_LEAVES} numbers there; say which ones in brackets")
+                    raise CdrError(MANY)
                 self._parts.setdefault(leaf, []).append((times, values))
                 added += len(values)
             rest = np.setdiff1d(rest, alike, assume_unique=True)
@@ -190,10 +190,10 @@ class _Gathered:
         times, values = times[order], values[order]
         if self._held:
             # Each message says all that touches: who is not in it touches no more.
-            every = np.unique(np.concatenate(self._seen))
-            whole = np.full(len(every), np.nan)
-            whole[np.searchsorted(every, times)] = values
-            times, values = every, whole
+            seen = np.unique(np.concatenate(self._seen))
+            whole = np.full(len(seen), np.nan)
+            whole[np.searchsorted(seen, times)] = values
+            times, values = seen, whole
         return Series(label, frozen(times), frozen(values), self._held)
 
 
@@ -213,6 +213,4 @@ def _values(data: bytes, starts: Int, found: Layout) -> list[tuple[str, Array]]:
 
 def _numbers(data: bytes, at: Int, code: str) -> Array:
     """(T,) the numbers that begin at these bytes."""
-    kind = np.dtype(code)
-    every = np.ndarray((len(data) - kind.itemsize + 1,), dtype=kind, buffer=data, strides=(1,))
-    return every[at].astype(np.float64)
+    return every(data, code)[at].astype(np.float64)
