@@ -30,7 +30,7 @@ from manipcli.model.robot import (
 )
 from manipcli.model.urdf import Parts, read_parts
 from manipcli.spec.located import Source
-from manipcli.spec.robot import AttachSpec, LimitsSpec, PoseSpec, RobotSpec
+from manipcli.spec.robot import AttachSpec, LimitsSpec, RobotSpec
 
 
 class Reporter:
@@ -155,7 +155,7 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
         groups=groups,
         poses=poses,
         transmissions=transmissions,
-        X_WB=transform(spec.mount),
+        X_WB=spec.mount.transform,
         urdf=portable_urdf(spec.robot, links, joints, transmissions),
         tool=tool,
         collision_ignore=spec.collision_ignore,
@@ -163,11 +163,6 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
         compat=spec.compat or "ros2",
         actuators=actuators,
     )
-
-
-def transform(pose: PoseSpec) -> Transform:
-    """The transform that a pose in a file says."""
-    return Transform.of(xyz=pose.xyz, rpy=pose.rpy, quat_xyzw=pose.quat_xyzw)
 
 
 class _Descriptions:
@@ -231,7 +226,7 @@ class _Body:
                 type="fixed",
                 parent=spec.parent,
                 child=prefix + parts.root,
-                X_PJ=transform(spec.pose).by_angles,
+                X_PJ=spec.pose.transform.by_angles,
                 axis=frozen([1.0, 0.0, 0.0]),
                 limits=JointLimits(),
             )
@@ -365,4 +360,4 @@ def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: S
         return None if tip is None else Tool(link=tip, X_LT=Transform.identity())
     if not _known_link(reporter, spec.tool.link, links, ("tool", "link")):
         return None
-    return Tool(link=spec.tool.link, X_LT=transform(spec.tool.pose))
+    return Tool(link=spec.tool.link, X_LT=spec.tool.pose.transform)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -19,6 +19,9 @@ from manipcli.spec.quantity import (
     Length,
     Turn,
 )
+
+if TYPE_CHECKING:
+    from manipcli.core.geometry import Transform
 
 Vector3 = tuple[Length, Length, Length]
 _VERSION = re.compile(r"\d+\.\d+\.\d+")
@@ -67,6 +70,13 @@ class PoseSpec(Model):
             hint = "the order is x, y, z, w: no rotation is [0, 0, 0, 1]"
             raise problem("range", f"not a unit quaternion: its length is {norm:.6g}", at=("quat_xyzw",), hint=hint)
         return self
+
+    @property
+    def transform(self) -> Transform:
+        """The transform that it says."""
+        from manipcli.core.geometry import Transform
+
+        return Transform.of(xyz=self.xyz, rpy=self.rpy, quat_xyzw=self.quat_xyzw)
 
 
 class ChainSpec(Model):

@@ -13,7 +13,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from manipcli.model.build_scene import pose_transform
 from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -80,7 +79,7 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
         draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
     elif spec.pose is not None:
-        X_WT = planner.frame(spec.frame, situation) @ pose_transform(spec.pose)
+        X_WT = planner.frame(spec.frame, situation) @ spec.pose.transform
         if spec.path == "linear":
             draft.straight("move", X_WT, speed=spec.speed)
         else:
