@@ -23,8 +23,8 @@ from manipcli.spec.controllers import GainsSpec, GripperSpec
 ENOUGH: Final = 1.01
 """A force that is asked beyond this share of what there is is not met."""
 LIGHT: Final = 740.0
-"""[N/kg] A force so large for the mass lets an object creep: measured with two hands, by 0.2 to 0.5 mm in a carry of
-4 s at 500 N/kg, by 1 to 4 mm at 1000 N/kg, and by a centimetre at 7000 to 10000 N/kg."""
+"""[N/kg] A force so large for the mass may let an object creep. Measured in carries of 2 to 5 s: two fingers by 0.2 to
+0.4 mm up to 3500 N/kg, and by 1.5 mm at 7000; three by 0.4 mm at 400 N/kg, by 2 to 3 mm from 800 on."""
 NUDGE: Final = 1e-4
 """[rad or m] by which a finger is moved to see how its parts move."""
 
