@@ -49,7 +49,7 @@ def driven_joints(task: Task, active: Collection[str]) -> tuple[Driven, ...]:
         interface = next((one for one in spec.interfaces if one in ("position", "velocity")), None)
         if name not in active or interface is None or "effort" in spec.interfaces:
             continue
-        ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
+        ticks = spec.ticks(period)
         for joint in spec.joints:
             gains: GainsSpec | None = None
             key: tuple[str, ...] = ("joints",)

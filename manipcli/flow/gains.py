@@ -155,7 +155,7 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
             continue
         if spec.interfaces != ("effort",):
             continue
-        ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
+        ticks = spec.ticks(period)
         weightless = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
         for joint in spec.joints:
             tolerance = None

@@ -46,7 +46,7 @@ def modelled_joints(task: Task, active: Collection[str]) -> tuple[Modelled, ...]
     for name, spec in task.controllers.controllers.items():
         if name not in active or not isinstance(spec, ComputedTorqueSpec | CartesianImpedanceSpec):
             continue
-        ticks = 1 if spec.update_rate is None else max(1, round(1.0 / (spec.update_rate * period)))
+        ticks = spec.ticks(period)
         place = task.controllers_file.place("controllers", name, "joints")
         found += [Modelled(name, joint, ticks, place) for joint in spec.joints]
     return tuple(found)

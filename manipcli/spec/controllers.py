@@ -35,6 +35,10 @@ class ControllerSpec(Model):
         None, description="How often it is updated [Hz]; divides the control rate. Default: at every control tick."
     )
 
+    def ticks(self, period: float) -> int:
+        """Control ticks of `period` [s] from one update to the next, for a rate that divides the control rate."""
+        return 1 if self.update_rate is None else max(1, round(1.0 / (self.update_rate * period)))
+
     @property
     def interfaces(self) -> tuple[Interface, ...]:
         """What it commands of each of its joints."""
