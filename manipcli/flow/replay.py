@@ -113,7 +113,7 @@ def _step(step: StepOutcome, events: Sequence[TaskEvent], end: float) -> Playbac
     return PlaybackStep(
         id=step.id,
         verb=step.verb,
-        label=step.id if step.id.startswith(step.verb) else f"{step.id} ({step.verb})",
+        label=step.label,
         start=start,
         end=last,
         outcome=step.outcome,

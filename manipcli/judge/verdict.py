@@ -49,6 +49,11 @@ class StepOutcome:
     replanned: tuple[str, ...] = ()
 
     @property
+    def label(self) -> str:
+        """Its id, and its verb where that does not say it."""
+        return self.id if self.id.startswith(self.verb) else f"{self.id} ({self.verb})"
+
+    @property
     def went_wrong(self) -> bool:
         """Whether it began, was not done, and the task does not say that it may fail."""
         return self.outcome not in ("done", "not_run") and not self.tolerated

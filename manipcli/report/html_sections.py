@@ -6,6 +6,7 @@ from __future__ import annotations
 from manipcli.core.text import number_of
 from manipcli.judge.drawn import value_text
 from manipcli.judge.verdict import StepOutcome
+from manipcli.replay.playback import Phase
 from manipcli.report.facts import RunFacts
 from manipcli.report.html_parts import (
     anchor,
@@ -189,16 +190,20 @@ def _late(seconds: float) -> str:
 
 
 def _step_name(page: RunPage, step: StepOutcome, written: Written) -> Markup:
-    run = page.playback
-    shown = next((one for one in run.steps if one.id == step.id), None) if run is not None else None
-    phases = " · ".join(phase.name for phase in shown.phases) if shown is not None and len(shown.phases) > 1 else ""
-    label = step.id if step.id.startswith(step.verb) else f"{step.id} ({step.verb})"
+    shown = _phases(page, step)
+    named = element("small", " · ".join(phase.name for phase in shown)) if len(shown) > 1 else None
     told: Markup | None = None
     if step.text and page.facts is not None:
         folded = element("details", element("summary", "what it told"), element("small", step.text))
         told = folded if step.outcome == "done" else element("small", step.text)
     again = [element("small", f"planned again: {why}") for why in step.replanned]
-    return joined(element("b", label), line_link(written), element("small", phases) if phases else None, *again, told)
+    return joined(element("b", step.label), line_link(written), named, *again, told)
+
+
+def _phases(page: RunPage, step: StepOutcome) -> tuple[Phase, ...]:
+    """Those of a step that is shown; none of another."""
+    shown = page.playback.steps if page.playback is not None else ()
+    return next((one.phases for one in shown if one.id == step.id), ())
 
 
 def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
@@ -207,9 +212,7 @@ def _gantt(page: RunPage, step: StepOutcome, end: float) -> Markup:
         return element("small", "not begun")
     last = end if step.ended is None else step.ended
     scale = 1000.0 / end
-    run = page.playback
-    shown = next((one for one in run.steps if one.id == step.id), None) if run is not None else None
-    starts = [phase.start for phase in shown.phases[1:]] if shown is not None else []
+    starts = [phase.start for phase in _phases(page, step)[1:]]
     planned = min(step.planned_duration, end - step.started)
     told = f"{step.id}: planned {step.planned_duration:.2f} s, measured {last - step.started:.2f} s"
     drawn = (
