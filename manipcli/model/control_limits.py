@@ -44,11 +44,10 @@ def _limited(joint: Joint, element: Element) -> JointLimits:
         if low is not None and high is not None and low > high:
             continue  # the check of numbers tells
         if name == "position" and joint.type != "continuous":
-            limits = dataclasses.replace(
-                limits,
-                lower=max((v for v in (limits.lower, low) if v is not None), default=None),
-                upper=min((v for v in (limits.upper, high) if v is not None), default=None),
-            )
+            lower = max((v for v in (limits.lower, low) if v is not None), default=None)
+            upper = min((v for v in (limits.upper, high) if v is not None), default=None)
+            if lower is None or upper is None or lower <= upper:  # else the check of numbers tells
+                limits = dataclasses.replace(limits, lower=lower, upper=upper)
         elif name == "velocity":
             limits = dataclasses.replace(limits, velocity=_smaller(limits.velocity, low, high))
         elif name == "effort":

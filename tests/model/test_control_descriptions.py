@@ -53,6 +53,11 @@ def rated(rate: str) -> str:
     return description(component(BOTH, attributes=f'{ATTRIBUTES} rw_rate="{rate}"'))
 
 
+def ranged(low: float, high: float) -> str:
+    bounds = f'<param name="min">{low}</param><param name="max">{high}</param>'
+    return description(component(joint("first", f'<command_interface name="position">{bounds}</command_interface>')))
+
+
 REFUSED = {
     "empty": ("", "not well-formed"),
     "another root": ('<robt name="r"/>', "the root element is <robt>"),
@@ -101,6 +106,8 @@ REFUSED = {
     ),
     "fixed": (description(component(BOTH), inside="", kind="fixed"), "joint 'second' is fixed"),
     "two roots": (description(component(BOTH), links='<link name="z"/>'), "2 root links: 'a', 'z'"),
+    "a range above the limits": (ranged(50, 60), "joint 'first': min 50 leaves nothing of its limits -1 to 1"),
+    "a range below the limits": (ranged(-60, -50), "joint 'first': max -50 leaves nothing of its limits -1 to 1"),
     "a comma for a point": (
         description(
             component(
@@ -111,6 +118,7 @@ REFUSED = {
     ),
 }
 ACCEPTED = {
+    "a range that leaves one position": ranged(1, 3),
     "two joints and a gear": description(component(BOTH, gear())),
     "a rate and a size": description(
         component(

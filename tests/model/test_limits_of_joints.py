@@ -104,6 +104,7 @@ def interface(name: str, low: float | str, high: float | str, more: str = "") ->
     [
         (interface("position", -0.5, 9), {"lower": -0.5}),  # narrows, never widens
         (interface("position", -9, 1), {"upper": 1.0}),
+        (interface("position", 5, 9), {}),  # would leave nothing: an error, and nothing follows from it
         (interface("velocity", -2, 2.5), {"velocity": 2.0}),  # the smaller of the sizes, both ways
         (interface("velocity", -8, 8), {}),
         (interface("effort", -1, 3), {"effort": 1.0}),

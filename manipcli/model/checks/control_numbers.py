@@ -51,10 +51,16 @@ def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[
     if "min" in values and "max" in values and values["min"] > values["max"]:
         message = f"{joint}: min {values['min']:g} is above max {values['max']:g}"
         yield Finding("URDF324", message, interface.place, None)
-    start = values.get("initial_value")
-    if start is None or interface.attributes.get("name") != "position":
+    if interface.attributes.get("name") != "position":
         return
     lower, upper = limits.range
+    for key, beyond in (("min", values.get("min", lower) > upper), ("max", values.get("max", upper) < lower)):
+        if beyond and interface.tag == "command_interface":
+            message = f"{joint}: {key} {values[key]:g} leaves nothing of its limits {lower:g} to {upper:g}"
+            yield Finding("URDF324", message, interface.place, "it narrows those of <limit>, in rad or m")
+    start = values.get("initial_value")
+    if start is None:
+        return
     if not lower - 1e-9 <= start <= upper + 1e-9:
         message = f"{joint}: the initial position {start:g} is outside of its limits"
         hint = f"limits: {lower:g} to {upper:g}" if None not in (limits.lower, limits.upper) else None
