@@ -147,3 +147,15 @@ def test_what_is_told_to_be_written_is_taken(block: str, written: str, guess: st
 )
 def test_what_is_no_list_of_names_and_no_percentage_has_no_such_hint(block: str) -> None:
     assert not (told(block).hint or "").startswith(("in percent", "write ["))
+
+
+@pytest.mark.parametrize("to", ["[0.1, 0.2]", "{arm: [0.1, 0.2]}"])
+def test_positions_of_a_group_are_told_to_go_by_joint(to: str) -> None:
+    """As they stand in the poses of the robot file."""
+    finding = told(f"steps: [{{move: {{to: {to}}}}}]")
+    assert finding.code == "TASK205"
+    where = "steps[0].move.to" if to.startswith("[") else "steps[0].move.to.arm"
+    assert finding.message == f"{where}: positions go by joint, not as a list"
+    written = re.search(r"\{joint: 30 deg\}", finding.hint or "")
+    assert written is not None, finding.hint
+    load_task_text(f"{TASK}steps: [{{move: {{to: {written.group()}}}}}]", "t.yaml", model=task_spec())

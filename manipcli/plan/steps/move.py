@@ -8,10 +8,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
@@ -50,6 +51,17 @@ class MoveSpec(Model):
     )
     speed: Speed = 1.0
     touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
+
+    @field_validator("to", mode="before")
+    @classmethod
+    def _by_joint(cls, to: object) -> object:
+        by_name = to.items() if isinstance(to, Mapping) else [("", to)]
+        listed = next((name for name, value in by_name if isinstance(value, list | tuple)), None)
+        if listed is not None:
+            hint = "name each of them: {joint: 30 deg}; what a group has in a list is a pose of the robot file"
+            message = "positions go by joint, not as a list"
+            raise problem("type", message, at=(listed,) if listed else (), hint=hint)
+        return to
 
     @model_validator(mode="after")
     def _one_target(self) -> MoveSpec:
