@@ -10,6 +10,7 @@ from manipcli.core.errors import Finding, InvalidInput, Loc
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
+from manipcli.model.landing import FORMED, landing
 from manipcli.model.mass import union
 from manipcli.model.packages import NotFound, Packages
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Rgba
@@ -17,7 +18,6 @@ from manipcli.model.scene import Body, Frame, Interior, Scene
 from manipcli.model.scene_names import Locate, misnamed
 from manipcli.model.start_overlap import overlaps
 from manipcli.spec.base import Model
-from manipcli.spec.robot import PoseSpec
 from manipcli.spec.task import BodySpec, TaskSpec
 
 SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
@@ -217,7 +217,7 @@ class _Builder:
             if spec.yaw != 0.0:
                 hint = "say it in the pose: `rpy: [0, 0, yaw]`"
                 self._error("TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), hint)
-            return pose_transform(spec.pose)
+            return spec.pose.transform
         word = "rests_on" if spec.rests_on is not None else "inside"
         other = spec.rests_on or spec.inside or ""
         known = other in self.spec.scene or other in self.poses  # what is not has been told
@@ -229,14 +229,16 @@ class _Builder:
         return self._resting(name, spec, other, X_WB)
 
     def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """Bottom of the body on the top face of the other, exactly touching: the settling lets it land."""
+        """Bottom of the body on the top face of the other, or on what it meets from above of a body from a file: the
+        settling lets it land."""
         loc: Loc = ("scene", name, "rests_on")
         support, shape = self.shapes[other], self.shapes[name]
         assert spec.at is not None
         if X_WB.R[2, 2] < UPRIGHT:
             self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
             return None
-        if not support.flat_top:
+        formed = self.kinds[other] in FORMED
+        if not support.flat_top and not formed:
             flat = "rest it on a box, a cylinder or the floor"
             hint = f"say `inside: {other}`" if support.interior is not None else flat
             self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
@@ -256,7 +258,14 @@ class _Builder:
             hint = f"the top of '{other}' is {across}, its middle at [{middle[0]:g}, {middle[1]:g}] m"
             self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"), hint)
             return None
-        return X_WO
+        if not formed:
+            return X_WO
+        fall = landing(shape, X_WO, support, X_WB)
+        if fall is None:
+            message = f"nothing of '{other}' lies below '{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m"
+            self._error("TASK224", message, ("scene", name, "at"))
+            return None
+        return Transform.of(xyz=(0.0, 0.0, -fall)) @ X_WO
 
     def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
         """On the floor of the other's hollow, in its middle or `at` a place, axes along the other's (turned by yaw)."""
@@ -289,7 +298,7 @@ class _Builder:
 
     def _frames(self) -> Iterable[Frame]:
         for name, frame in self.spec.frames.items():
-            yield Frame(name=name, parent=frame.parent, X_PF=pose_transform(frame.pose))
+            yield Frame(name=name, parent=frame.parent, X_PF=frame.pose.transform)
 
     # -- findings
 
@@ -305,11 +314,6 @@ def _written(value: object, loc: Loc) -> Iterator[Loc]:
             yield from _written(getattr(value, key), (*loc, key))
     elif isinstance(value, tuple):
         yield from ((*loc, k) for k in range(len(value)))
-
-
-def pose_transform(spec: PoseSpec) -> Transform:
-    """X_AB of a pose as users write it."""
-    return Transform.of(xyz=spec.xyz, rpy=spec.rpy, quat_xyzw=spec.quat_xyzw)
 
 
 def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:

@@ -7,19 +7,22 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from manipcli.core.geometry import Transform
+from manipcli.model.body_shapes import BodyShape
 from manipcli.model.coal_shape import coal_shape
 from manipcli.model.scene import Body
 
 if TYPE_CHECKING:
     import coal
 
+FORMED: Final = ("urdf", "mesh")
+"""Kinds of bodies whose top need not be that of their bounding box: a drawer, a shelf."""
 TOUCHES: Final = 1e-6
 """[m] What is nearer has met."""
 LEAST: Final = 2e-4
 """[m] Least step down, and so the greatest depth that is found: beside a wall distances are small on the whole way."""
 
 
-def landing(falling: Body, X_WF: Transform, under: Body, X_WU: Transform) -> float | None:
+def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape, X_WU: Transform) -> float | None:
     """[m] how far a body at X_WF falls until it meets `under`; None where it falls past it.
 
     Conservative advancement: a step as long as the distance meets nothing, whichever way it goes.
@@ -48,10 +51,10 @@ def _placed(X: Transform) -> coal.Transform3s:
     return coal.Transform3s(np.array(X.R), np.array(X.p))
 
 
-def _top(body: Body, X_WO: Transform) -> float:
+def _top(body: Body | BodyShape, X_WO: Transform) -> float:
     """Height [m] of the highest corner of its bounding box."""
     return float(X_WO.apply(body.centre)[2] + np.abs(X_WO.R[2]) @ body.size / 2.0)
 
 
-def _bottom(body: Body, X_WO: Transform) -> float:
+def _bottom(body: Body | BodyShape, X_WO: Transform) -> float:
     return float(X_WO.apply(body.centre)[2] - np.abs(X_WO.R[2]) @ body.size / 2.0)

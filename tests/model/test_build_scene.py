@@ -363,6 +363,22 @@ def test_a_urdf_of_one_link_is_a_body(tmp_path: Path) -> None:
     np.testing.assert_allclose(heavy.inertia, 2 * made.inertia, rtol=1e-12)
 
 
+def test_what_rests_on_a_urdf_stands_on_what_it_meets_from_above(tmp_path: Path) -> None:
+    """An angle: a floor of 2 cm by 20 cm by 20 cm, and along one edge a wall of 2 cm, 30 cm high."""
+    parts = (((0, 0, 0.01), "0.2 0.2 0.02"), ((0.09, 0, 0.15), "0.02 0.2 0.3"))
+    shapes = "".join(
+        f'<collision><origin xyz="{x} {y} {z}"/><geometry><box size="{size}"/></geometry></collision>'
+        for (x, y, z), size in parts
+    )
+    (tmp_path / "angle.urdf").write_text(URDF.format(links=f'<link name="angle">{shapes}</link>'))
+    angle = {"urdf": {"file": "angle.urdf"}, "fixed": True, "pose": {"xyz": [1, 0, 0.5]}}
+    for x, z in ((1.0, 0.52), (1.09, 0.8)):
+        bodies = {"angle": angle, "x": CUBE | {"rests_on": "angle", "at": [x, 0]}}
+        made = build_scene(task(bodies), packages=Packages(tmp_path / "task.yaml")).body("x")
+        bottom = made.X_WO.p[2] + made.centre[2] - made.size[2] / 2
+        assert bottom == pytest.approx(z, abs=3e-4), x
+
+
 def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
     (tmp_path / "two.urdf").write_text(URDF.format(links=LINK.format(name="a") + LINK.format(name="b") + joint))

@@ -18,7 +18,7 @@ from pydantic import Field
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.condition import Problem, unknown_body
-from manipcli.model.landing import landing
+from manipcli.model.landing import FORMED, landing
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
@@ -39,8 +39,6 @@ LEANS = tuple(np.radians([0.0, 2.0, 4.0]))
 """How far [rad] an object may lean when it is let go."""
 ROUND = ("cup", "cylinder", "sphere")
 """Bodies as wide along their diagonal as along their axes."""
-FORMED = ("urdf", "mesh")
-"""Bodies whose top need not be that of their bounding box: a drawer, a shelf."""
 POINTING = 0.5
 """A tool that points less than this (cosine) along the ground points up or down."""
 _OVER = (
