@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -51,7 +52,7 @@ def run(
     with Interrupts() as interrupts, stdout_or(log) as path:
         from manipcli import pipeline
         from manipcli.cli.progress import StepProgress
-        from manipcli.record.faults import RecordingRefused
+        from manipcli.record.faults import RecordingFailed, RecordingRefused
         from manipcli.report import json, text
         from manipcli.report.run_report import exit_code
 
@@ -72,6 +73,10 @@ def run(
                 )
             except RecordingRefused:
                 raise  # nothing was run: what there is tells of the log that stays
+            except RecordingFailed as failure:
+                with suppress(OSError):  # nor may there be room for this
+                    outputs.of_invalid(failure.findings, task=task, log=failure.partial)
+                raise
             except InvalidInput as invalid:
                 outputs.of_invalid(invalid.findings, task=task)
                 raise

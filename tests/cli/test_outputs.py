@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import errno
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from manipcli.cli.app import main
+from manipcli.record.faults import RecordingFailed
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
 
@@ -91,3 +93,25 @@ def test_no_page_of_an_earlier_run_stays_beside_a_new_log(
     assert all(
         "old" not in path.read_text() for path in (folder / "report.html", folder / "junit.xml") if path.exists()
     )
+
+
+@pytest.mark.parametrize("room", [True, False])
+def test_a_run_whose_log_the_disk_refused_is_not_told_by_the_page_of_an_earlier_one(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, room: bool
+) -> None:
+    for name in ("report.html", "junit.xml"):
+        (folder / name).write_text("old")
+
+    def failing(*_: object, **__: object) -> NoReturn:
+        raise RecordingFailed(folder / "home.mcap.partial", "No space left on device", time=1.5)
+
+    def full(path: Path, data: bytes) -> NoReturn:
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr("manipcli.pipeline.run_task", failing)
+    if not room:
+        monkeypatch.setattr("manipcli.core.whole_file.write_whole", full)
+    assert main(["run", str(TASK), "--report", "report.html", "--junit", "junit.xml"]) == 3
+    for path in (folder / "report.html", folder / "junit.xml"):
+        assert path.exists() == room
+        assert not room or "stopped after t = 1.500 s" in path.read_text()
