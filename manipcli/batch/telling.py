@@ -32,7 +32,7 @@ SIZE = (960, 720)
 
 
 def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
-    """Steps that went wrong, then expectations that are not met, then what neither tells; none of what passed."""
+    """What no step or expectation tells, then steps that went wrong, then expectations; none of what passed."""
     if verdict.verdict == "passed":
         return ()
     task = load.load_task(job.path, model=task_spec(), overrides=job.settings.overrides, seed=job.settings.seed)
@@ -47,7 +47,7 @@ def troubles(job: Job, verdict: Verdict) -> tuple[Trouble, ...]:
         for key, one in zip(task.spec.judged_at, verdict.expectations, strict=False)
         if one.outcome != "passed" and not refused
     ]
-    if verdict.verdict == "error" or not (steps or unmet):
+    if verdict.verdict == "error" or verdict.ended_between:
         told = [Trouble(finding.message, finding.place) for finding in verdict.errors]
         return (*(told or [Trouble(verdict.text)]), *steps, *unmet)
     return (*steps, *unmet)

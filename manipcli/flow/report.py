@@ -6,12 +6,21 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from manipcli import __version__
 from manipcli.flow.load import Task
-from manipcli.flow.log import CONTROLLERS, ROBOT, TASK, recorded_robot, recorded_scene, recorded_task_file
+from manipcli.flow.log import (
+    CONTROLLERS,
+    ROBOT,
+    TASK,
+    judge_recording,
+    recorded_robot,
+    recorded_scene,
+    recorded_task_file,
+)
 from manipcli.flow.replay import open_playback
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.steps import PLAN_FILE
@@ -50,33 +59,42 @@ def log_page(
         meshes, package_path, allow_outside: see `open_playback`.
 
     Raises:
-        InvalidInput: the file is no log of ours, is damaged, or holds no tick.
+        InvalidInput: the file is no log of ours, or is damaged.
     """
     recording = open_recording(path)
-    task = recorded_task_file(recording, path).spec
+    if not any(len(span.states.time) for span in recording.spans):  # it ended before the start
+        return _page(recording, path, judge_recording(recording, path), end=None)
     playback = open_playback(
         path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
     )
     verdict = playback.verdict
     assert verdict is not None, "the log is one of ours"
-    places = log_places(recording, path, verdict.steps)
-    causes = _causes(verdict, places, end=playback.end)
-    worst = causes[0].at if causes else None
+    page = _page(recording, path, verdict, end=playback.end)
+    worst = page.causes[0].at if page.causes else None
     with Shots(playback, size=PICTURE, captions=False) as shots:
         pictures = {step.id: _picture(shots, telling(playback, step)) for step in playback.steps}
         moment = _picture(shots, worst) if worst is not None else None
-    return RunPage(
-        verdict=verdict,
-        log=path.name,
-        lost=recording.lost,
-        causes=causes,
-        steps=places[0],
-        expectations=places[1],
-        limits=tuple(_limit(one.body) for one in task.judged),
+    return replace(
+        page,
         facts=run_facts(recording, recorded_robot(recording, path), recorded_scene(recording, path), verdict.steps),
         playback=playback,
         pictures=pictures,
         moment=moment,
+        notes=playback.notes,
+    )
+
+
+def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | None) -> RunPage:
+    """What needs no tick of a log. `end` [s]: of the run; None where it did not begin."""
+    places = log_places(recording, path, verdict.steps)
+    return RunPage(
+        verdict=verdict,
+        log=path.name,
+        lost=recording.lost,
+        causes=_causes(verdict, places, end=end),
+        steps=places[0],
+        expectations=places[1],
+        limits=tuple(_limit(one.body) for one in recorded_task_file(recording, path).spec.judged),
         sources=tuple(
             Source(name, recording.attachments[name].decode("utf-8", "replace"))
             for name in (TASK, ROBOT, CONTROLLERS)
@@ -84,7 +102,6 @@ def log_page(
         ),
         provenance=_provenance(recording, verdict, path),
         hashes=_hashes(recording, path),
-        notes=playback.notes,
     )
 
 

@@ -60,7 +60,6 @@ def test_a_broken_watch_is_told_at_its_line(tmp_path: Path) -> None:
     [
         ({"outcome": "failed"}, ["5:5", "7:5"]),
         ({"outcome": "failed", "tolerated": True}, ["7:5"]),
-        ({"outcome": "not_run", "started": None, "ended": None}, ["7:5"]),
         ({"outcome": "failed", "started": None, "ended": None}, ["5:5"]),  # refused: nothing ran that could be judged
     ],
 )
@@ -68,6 +67,19 @@ def test_only_what_is_a_reason_is_a_trouble(tmp_path: Path, changes: dict[str, A
     verdict = replace(VERDICT, steps=(replace(VERDICT.steps[0], **changes),))
     assert [str(one.place) for one in troubles(job(tmp_path), verdict)] == [f"t/nod.yaml:{at}" for at in places]
     assert troubles(job(tmp_path), replace(verdict, verdict="passed")) == ()
+
+
+def test_why_a_run_ended_before_its_first_step_comes_first(tmp_path: Path) -> None:
+    """No step failed, and what was never evaluated is a consequence."""
+    steps = (replace(VERDICT.steps[0], outcome="not_run", started=None, ended=None),)
+    unknown = tuple(
+        ExpectationOutcome(one.name, "not_evaluated", None, "", None, "the recording holds no state")
+        for one in VERDICT.expectations
+    )
+    verdict = replace(VERDICT, steps=steps, expectations=unknown, text="joint 'roll' runs away")
+    first, *others = troubles(job(tmp_path), verdict)
+    assert (first.message, first.place) == ("joint 'roll' runs away", None)
+    assert [str(one.place) for one in others] == ["t/nod.yaml:9:5", "t/nod.yaml:7:5"]
 
 
 def test_a_watch_that_is_worse_than_it_was_is_told_at_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 
 from manipcli.flow.report import log_page
 from manipcli.pipeline import run_task, verify_log
@@ -57,6 +58,19 @@ def test_the_page_tells_what_was_drawn(log: Path) -> None:
     shown = render_page(page)
     assert str(page.verdict.drawn) in shown
     assert "1 value of the sample" in shown
+
+
+def test_what_ended_before_its_first_tick_has_a_page(log: Path, tmp_path: Path) -> None:
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    cut = tmp_path / "cut.mcap.partial"
+    cut.write_bytes(log.read_bytes()[: summary.chunk_indexes[0].chunk_start_offset + 20])
+    page = log_page(cut)
+    assert (page.verdict.verdict, page.playback, page.facts) == ("error", None, None)
+    assert {cause.at for cause in page.causes} == {None}
+    shown = render_page(page)
+    assert all(told in shown for told in (page.causes[0].title, "mine.yaml:9", "cut.mcap.partial"))
 
 
 def test_a_log_is_simulated_again_with_the_places_of_its_run(log: Path) -> None:
