@@ -72,7 +72,7 @@ def test_a_crash_has_the_line_of_its_step_and_a_page_with_what_it_left(tmp_path:
     (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "pages"))])
     assert report.troubles[0].place == Place("t0.yaml", 8, 5)
     assert report.page == str(tmp_path / "pages" / "t0.html")
-    page = Path(report.page).read_text()
+    page = Path(report.page).read_text("utf-8")
     assert "crashed by signal 6" in page
     assert "t0.yaml:8:5" in page
     assert 'href="../runs/t0.mcap.partial"' in page
@@ -379,7 +379,7 @@ def test_what_an_earlier_run_left_is_not_taken_for_what_this_one_leaves(tmp_path
     (report,) = run([replace(job, settings=replace(job.settings, pages=tmp_path / "runs"))])
     assert (report.log, report.picture) == (None, None)
     assert report.page is not None
-    assert "ended with exit code 3" in Path(report.page).read_text()
+    assert "ended with exit code 3" in Path(report.page).read_text("utf-8")
 
 
 def test_folders_that_hold_nothing_are_removed(tmp_path: Path) -> None:

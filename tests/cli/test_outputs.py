@@ -91,7 +91,7 @@ def test_no_page_of_an_earlier_run_stays_beside_a_new_log(
     assert (folder / "runs" / "home.mcap").is_file()
     assert not (folder / missing).exists()
     assert all(
-        "old" not in path.read_text() for path in (folder / "report.html", folder / "junit.xml") if path.exists()
+        "old" not in path.read_text("utf-8") for path in (folder / "report.html", folder / "junit.xml") if path.exists()
     )
 
 
@@ -114,4 +114,4 @@ def test_a_run_whose_log_the_disk_refused_is_not_told_by_the_page_of_an_earlier_
     assert main(["run", str(TASK), "--report", "report.html", "--junit", "junit.xml"]) == 3
     for path in (folder / "report.html", folder / "junit.xml"):
         assert path.exists() == room
-        assert not room or "stopped after t = 1.500 s" in path.read_text()
+        assert not room or "stopped after t = 1.500 s" in path.read_text("utf-8")
