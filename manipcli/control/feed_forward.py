@@ -96,8 +96,8 @@ class ModelFeedForward:
                 acceleration[follower] = factor * acceleration[driver]
                 rate[follower] = factor * rate[driver]
             efforts = self._kinematics.inverse_dynamics(position, velocity, acceleration)
-            np.multiply(self._damping, rate, out=rate)
-            efforts += rate
+            np.multiply(self._damping, rate, rate)
+            np.add(efforts, rate, efforts)
         else:
             efforts = self._kinematics.gravity(position)
         for follower, driver, factor in self._followers:

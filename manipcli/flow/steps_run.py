@@ -84,7 +84,8 @@ class StepsRun:
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
         self._watching = Watching(task.spec.watch, task.spec.expect, live)
-        self._executor = Executor(session, touch=self._physics, told=told, alarm=self._alarm)
+        alarm = self._alarm if task.spec.watch else None
+        self._executor = Executor(session, touch=self._physics, told=told, alarm=alarm)
         replan = task.spec.replan
         self._replans = replan is not False
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()

@@ -89,7 +89,7 @@ class Executor:
         What does not end well ends with all goals canceled: the controllers bring the joints to rest.
         """
         session = self._session
-        given_up = session.time + motion.duration + PATIENCE
+        latest = session.time + motion.duration + PATIENCE if deadline is None else deadline
         told = ""
         if motion.switch is not None:
             switched = session.manager.carry_out(motion.switch, time=session.time)
@@ -109,20 +109,18 @@ class Executor:
                 self._cancel()
                 return _fault(session)
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
-            over = deadline is not None and session.time >= deadline
+            over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
-            if not busy and awaited is not None and looks and awaited(state):
-                awaited = None
-            if not busy and awaited is None:
+            if not busy and (awaited is None or (looks and awaited(state))):
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
-            if over:
+            if over and deadline is not None:
                 late = "this motion was" if busy else "the condition under `until` held"
                 late = f"the time of the step was over before {late}"
                 if busy and session.ticks >= last_tick:  # it should be over by now
                     late += f"; {self._furthest()}"
                 self._cancel()
                 return MotionEnd("timeout", late, awaited=not busy)
-            if deadline is None and session.time >= given_up:
+            if over:
                 late = f"it is not over {PATIENCE:g} s after its planned end; {self._furthest()}"
                 self._cancel()
                 return MotionEnd("timeout", late)

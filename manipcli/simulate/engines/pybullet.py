@@ -20,10 +20,8 @@ from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines.pybullet_contacts import (
     ContactMerger,
     ContactPoint,
-    Pair,
+    ContactWatch,
     Vector,
-    greatest_force,
-    touching_pairs,
 )
 from manipcli.simulate.engines.pybullet_flywheels import add_flywheels
 from manipcli.simulate.engines.pybullet_motors import Motors
@@ -35,10 +33,6 @@ from manipcli.simulate.quiet import silence, stdout_to_stderr
 SOLVER_ITERATIONS: Final = 200
 """At most: Bullet stops where its solver has converged, to a residual of 1e-7. With 50, its default, it has not while a
 hand holds something: of a cup pressed with 34 N in all by three fingers it told 39 N that swayed by 7."""
-KNOCK: Final = 1.5
-"""A contact point that carries so many times the force of the strongest one, and `KNOCK_LEAST` more, is a knock."""
-KNOCK_LEAST: Final = 1.0
-"""[N]"""
 
 
 class PybulletEngine:
@@ -81,8 +75,7 @@ class PybulletEngine:
         n, m = len(self._joints), len(self._movable)
         state = self._state = WorldState.room(n, m)
         self._buffer, self._pack = state.numbers.data.cast("B"), struct.Struct(f"{state.numbers.size}d").pack_into
-        self._pairs: set[Pair] = set()
-        self._greatest = 0.0
+        self._watch = ContactWatch(self._robot)
         self._points: tuple[ContactPoint, ...] | None = None
         self._substeps = settings.substeps
 
@@ -175,14 +168,11 @@ class PybulletEngine:
         self._points = None
 
     def touches_changed(self) -> bool:
-        points = self._contact_points()
-        if touching_pairs(points) != self._pairs:
-            return True
-        return greatest_force(points, self._robot) > KNOCK * self._greatest + KNOCK_LEAST
+        return self._watch.changed(self._contact_points())
 
     def contacts(self) -> tuple[Contact, ...]:
         points = self._contact_points()
-        self._pairs, self._greatest = touching_pairs(points), greatest_force(points, self._robot)
+        self._watch.seen(points)
         return self._merge(points)
 
     def _contact_points(self) -> tuple[ContactPoint, ...]:

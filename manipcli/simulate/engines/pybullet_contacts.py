@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import attrgetter
+from operator import attrgetter, itemgetter
+from typing import Final
 
 from manipcli.model.state import Contact
 
@@ -13,17 +14,43 @@ Pair = tuple[int, int, int, int]
 ContactPoint = tuple[int, int, int, int, int, Vector, Vector, Vector, float, float, float, Vector, float, Vector]
 """What PyBullet says of a contact point: a flag, bodies and links a and b, places on a and b, the normal on b, the
 distance, the normal force on a, and twice: friction on a along a direction."""
+KNOCK: Final = 1.5
+"""A contact point that carries so many times the force of the strongest one, and `KNOCK_LEAST` more, is a knock."""
+KNOCK_LEAST: Final = 1.0
+"""[N]"""
 _sides = attrgetter("a", "b")
+_force = itemgetter(9)
 
 
-def touching_pairs(points: Sequence[ContactPoint]) -> set[Pair]:
-    """The pairs of links that touch."""
-    return {point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0}
+class ContactWatch:
+    """Whether other links touch than before, or a point of `body` is pressed much harder: a knock."""
+
+    def __init__(self, body: int) -> None:
+        self._body = body
+        self._pairs: list[Pair] = []
+        self._knock = KNOCK_LEAST
+
+    def changed(self, points: Sequence[ContactPoint]) -> bool:
+        """Compared with what was `seen`. Asked at every tick: what is nearly always enough comes first."""
+        pairs = _touching(points)
+        if pairs != self._pairs and set(pairs) != set(self._pairs):
+            return True
+        return max(map(_force, points), default=0.0) > self._knock and self._greatest(points) > self._knock
+
+    def seen(self, points: Sequence[ContactPoint]) -> None:
+        """From now on compared with these."""
+        self._pairs = _touching(points)
+        self._knock = KNOCK * self._greatest(points) + KNOCK_LEAST
+
+    def _greatest(self, points: Sequence[ContactPoint]) -> float:
+        """[N] of a single point of the body."""
+        body = self._body
+        return max([point[9] for point in points if point[1] == body or point[2] == body], default=0.0)
 
 
-def greatest_force(points: Sequence[ContactPoint], body: int) -> float:
-    """[N] of a single point of this body."""
-    return max([point[9] for point in points if point[1] == body or point[2] == body], default=0.0)
+def _touching(points: Sequence[ContactPoint]) -> list[Pair]:
+    """The pairs of links that touch, one a point."""
+    return [point[1:5] for point in points if point[9] > 0.0 or point[8] <= 0.0]
 
 
 class ContactMerger:
