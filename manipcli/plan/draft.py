@@ -191,7 +191,7 @@ class Draft:
             points.names, times, q, v if points.order >= CUBIC else None, a if smooth else None
         )
         with self._told(label):
-            verify(trajectory, limits)
+            verify(trajectory, limits, given=points)
         self._add(label, trajectory, None)
 
     def close(self, posture: str, *, force: float, must_hold: bool, body: str | None, roomier: str = "") -> None:

@@ -23,7 +23,13 @@ ORDER = {"velocity": 1, "acceleration": 2, "jerk": 3}
 _POSITION = 1e-9  # rad or m: rounding of a trajectory that touches its limit
 
 
-def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: float = TOLERANCE) -> None:
+def verify(
+    trajectory: JointTrajectory,
+    limits: MotionLimits,
+    *,
+    tolerance: float = TOLERANCE,
+    given: JointTrajectory | None = None,
+) -> None:
     """Refuse a trajectory that leaves a limit of position, velocity, acceleration or (where finite) jerk.
 
     Velocity and acceleration are checked both as stated by the points and as what the positions do: difference
@@ -34,6 +40,7 @@ def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: floa
         trajectory: a point at every control tick; its names are those of `limits`.
         limits: infinite entries are not checked.
         tolerance: relative; position has none.
+        given: the points that a user wrote, if the trajectory is of such: the hint says how to make them slower.
 
     Raises:
         NotPlannable: names the joint, the value, the limit and the time.
@@ -43,17 +50,17 @@ def verify(trajectory: JointTrajectory, limits: MotionLimits, *, tolerance: floa
     dt = np.diff(times)[:, None]
     rate = np.diff(q, axis=0) / dt
     v = trajectory.velocities
-    _bounded("velocity", rate, limits.velocity, times, limits, tolerance)
+    _bounded("velocity", rate, limits.velocity, times, limits, tolerance, given)
     if v is None:
         return
-    _bounded("velocity", v, limits.velocity, times, limits, tolerance)
-    _bounded("acceleration", np.diff(v, axis=0) / dt, limits.acceleration, times, limits, tolerance)
+    _bounded("velocity", v, limits.velocity, times, limits, tolerance, given)
+    _bounded("acceleration", np.diff(v, axis=0) / dt, limits.acceleration, times, limits, tolerance, given)
     a = trajectory.accelerations
     if a is None:
         return
-    _bounded("acceleration", a, limits.acceleration, times, limits, tolerance)
+    _bounded("acceleration", a, limits.acceleration, times, limits, tolerance, given)
     if np.isfinite(limits.jerk).any():
-        _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits, tolerance)
+        _bounded("jerk", np.diff(a, axis=0) / dt, limits.jerk, times, limits, tolerance, given)
 
 
 def verify_written(
@@ -129,7 +136,15 @@ def _position(trajectory: JointTrajectory, limits: MotionLimits) -> None:
         raise _beyond(name, value, limit, side, soft, f"goes to {{}} at t = {trajectory.times[k]:.3f} s", unit)
 
 
-def _bounded(word: str, values: Array, limit: Array, times: Array, limits: MotionLimits, tolerance: float) -> None:
+def _bounded(
+    word: str,
+    values: Array,
+    limit: Array,
+    times: Array,
+    limits: MotionLimits,
+    tolerance: float,
+    given: JointTrajectory | None,
+) -> None:
     """|values| (k, n) <= limit (n) within `tolerance`."""
     ratio = np.abs(values) / limit
     k, i = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
@@ -140,5 +155,15 @@ def _bounded(word: str, values: Array, limit: Array, times: Array, limits: Motio
         longer = math.ceil(100.0 * float(ratio[k, i]) ** (1.0 / ORDER[word])) / 100.0
         raise NotPlannable(
             f"joint '{name}' would need {word} {needed} {unit} at t = {times[k]:.3f} s; its limit is {most} {unit}",
-            hint=f"slower by {longer:g} it is kept: every `time_from_start` times that, `velocities` divided by it",
+            hint=None if given is None else _slower(given, longer),
         )
+
+
+def _slower(given: JointTrajectory, longer: float) -> str:
+    """How the same path takes `longer` times as long."""
+    words = ["every `time_from_start` times that"]
+    if given.velocities is not None:
+        words.append("`velocities` divided by it")
+    if given.accelerations is not None:
+        words.append("`accelerations` by its square")
+    return f"slower by {longer:g} it is kept: {', '.join(words)}"

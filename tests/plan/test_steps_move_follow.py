@@ -366,6 +366,43 @@ def test_points_beyond_a_limit_name_joint_value_limit_and_time(bench: Make) -> N
     assert "joint 'joint_2' goes to 9.0000 rad at t = 60.000 s, beyond its upper limit" in cause
 
 
+@pytest.mark.parametrize("words", [(), ("velocities",), ("velocities", "accelerations")])
+def test_points_that_are_slowed_down_to_the_letter_of_the_hint_keep_the_limits(
+    bench: Make, words: tuple[str, ...]
+) -> None:
+    arm = bench()
+    limits = arm.robot.joint("joint_1").limits
+    fast = {
+        (): {"positions": [1.6 * limits.velocity, 0.1], "time_from_start": 1.0},
+        ("velocities",): {"positions": [0.3, 0.1], "velocities": [3.0 * limits.velocity, 0], "time_from_start": 1.0},
+        ("velocities", "accelerations"): {
+            "positions": [0.3, 0.1],
+            "velocities": [0.3, 0],
+            "accelerations": [1.5 * limits.acceleration, 0],
+            "time_from_start": 1.0,
+        },
+    }[words]
+    last = {"positions": [0.6, 0.1], "time_from_start": 2.0} | {word: [0, 0] for word in words}
+    hint = arm.refused("follow", follow(fast, last)).hint or ""
+    assert [word for word in ("velocities", "accelerations") if f"`{word}`" in hint] == list(words)
+    found = re.fullmatch(
+        r"slower by (\S+) it is kept: every `time_from_start` times that"
+        r"(, `velocities` divided by it(, `accelerations` by its square)?)?",
+        hint,
+    )
+    assert found is not None
+    longer = float(found[1])
+    power = {"positions": 0, "velocities": -1, "accelerations": -2}
+    slow = [
+        {
+            word: value * longer if isinstance(value, float) else [longer ** power[word] * one for one in value]
+            for word, value in point.items()
+        }
+        for point in (fast, last)
+    ]
+    assert arm.plan("follow", follow(*slow)).duration == pytest.approx(2.0 * longer)
+
+
 def test_points_that_make_no_trajectory_are_refused_where_they_are_read() -> None:
     spec = STEPS["follow"].spec
     good = {"positions": [0.1, 0.1], "time_from_start": 1}

@@ -50,8 +50,9 @@ def test_a_motion_that_touches_every_limit_passes() -> None:
 def test_one_percent_beyond_a_limit_is_refused_with_joint_value_limit_and_time(
     limit: str, value: float, message: str
 ) -> None:
-    with pytest.raises(NotPlannable, match=message):
+    with pytest.raises(NotPlannable, match=message) as refused:
         verify(sine(), limits(**{limit: value}))
+    assert refused.value.hint is None, "nobody wrote these points"
 
 
 def test_a_joint_that_slides_is_told_in_metres() -> None:
