@@ -21,7 +21,7 @@ from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import LONGEST
-from manipcli.plan.step import Grip, Motion, Situation, StepPlan
+from manipcli.plan.step import CLOSING, Grip, Motion, Situation, StepPlan
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
@@ -215,7 +215,7 @@ class Draft:
             raise _no_gripper(posture)
         duration = grip_time(self._planner, self._now, grip)
         if body is None:
-            self._accept("close", None, grip, duration)
+            self._accept(CLOSING, None, grip, duration)
             self._now = replace(self._now, closed=True)
             return
         query = planner.grasping(self._now, body)
@@ -227,13 +227,13 @@ class Draft:
             )
         stopped = replace(grip, target=frozen(closed[planner.robot.indices(grip.joints)]))
         try:
-            refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), "close", None, stopped)
+            refuse_collision(planner, self._now, self._query(planner.hand_contacts(body)), CLOSING, None, stopped)
         except NotPlannable as refusal:
             raise NotPlannable(refusal.cause, hint=roomier or refusal.hint) from refusal
         link = planner.tool_link
         X_LW = planner.kinematics.forward(closed, link).inverse()
         carried = Carried(body=body, link=link, X_LO=X_LW @ planner.body_pose(self._now, body))
-        self._motions.append(Motion("close", trajectory=None, grip=grip, duration=duration))
+        self._motions.append(Motion(CLOSING, trajectory=None, grip=grip, duration=duration))
         self._now = replace(self._now.moved(closed), carried=carried, closed=True)
 
     def open(self, posture: str, *, around: str | None = None, must_arrive: bool = False) -> None:

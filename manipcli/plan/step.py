@@ -26,6 +26,8 @@ S = TypeVar("S", bound=Model)
 
 Strictness = Literal["strict", "best_effort"]
 """Of a switch of controllers: all of it or nothing, or what of it can be done."""
+CLOSING = "close"
+"""The phase of a step in which the hand closes on something."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
+from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 
 BRIDGED = 0.05
@@ -27,8 +28,6 @@ BRIDGED = 0.05
 SHORTEST = 0.1
 """[s] of a hold, and of a time without support."""
 ROBOT = "robot/"
-CLOSING = "close"
-"""The phase of a step in which the hand closes on something."""
 
 Ending = Literal["set down", "lost", "let go", "held to the end"]
 

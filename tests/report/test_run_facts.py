@@ -13,6 +13,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel, Tool
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
+from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
 from manipcli.report.facts import RunFacts, run_facts
 
@@ -94,7 +95,7 @@ def _recording(parts: int = 1, contacts: tuple[ContactSnapshot, ...] = TOUCHES) 
         mine = tuple(one for one in contacts if low <= one.time <= high)
         spans.append(_span(times[ticks], slip[ticks], angle[ticks], mine))
     events = (
-        TaskEvent(0.4, "phase_started", "a", "pick", "", "close", ""),
+        TaskEvent(0.4, "phase_started", "a", "pick", "", CLOSING, ""),
         TaskEvent(0.8, "step_ended", "a", "pick", "done", "", ""),
         TaskEvent(2.0, "step_ended", "b", "lift", "done", "", ""),
     )
