@@ -55,7 +55,7 @@ class StepOutcome:
 
     @property
     def went_wrong(self) -> bool:
-        """Whether it began, was not done, and the task does not say that it may fail."""
+        """Whether it was not done though it was its turn, and the task does not say that it may fail."""
         return self.outcome not in ("done", "not_run") and not self.tolerated
 
 
