@@ -16,22 +16,23 @@ if TYPE_CHECKING:
 
 FORMED: Final = ("urdf", "mesh")
 """Kinds of bodies whose top need not be that of their bounding box: a drawer, a shelf."""
-TOUCHES: Final = 1e-6
-"""[m] What is nearer has met."""
+GRAZES: Final = 1e-5
+"""[m] What overlaps by no more has not met: a thing flush with a wall slides down along it."""
 LEAST: Final = 2e-4
-"""[m] Least step down, and so the greatest depth that is found: beside a wall distances are small on the whole way."""
+"""[m] Least step down, and so the greatest gap that is left: beside a wall distances are small on the whole way."""
 
 
 def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape, X_WU: Transform) -> float | None:
     """[m] how far a body at X_WF falls until it meets `under`; None where it falls past it.
 
-    Conservative advancement: a step as long as the distance meets nothing, whichever way it goes.
+    Conservative advancement: a step as long as the distance meets nothing, whichever way it goes. It has landed where
+    the least step further down would make it overlap.
     """
     import coal
 
     pairs = [(a, b, coal_shape(a.shape), coal_shape(b.shape)) for a in falling.geometries for b in under.geometries]
     still = [_placed(X_WU @ b.X_LS) for _, b, _, _ in pairs]
-    fallen, deepest = 0.0, _top(falling, X_WF) - _bottom(under, X_WU)
+    fallen, step, deepest = 0.0, 0.0, _top(falling, X_WF) - _bottom(under, X_WU)
     while fallen < deepest:
         X_WN = Transform.of(xyz=(0.0, 0.0, -fallen)) @ X_WF
         apart = np.inf
@@ -39,9 +40,10 @@ def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape,
             result = coal.DistanceResult()
             coal.distance(shape, _placed(X_WN @ a.X_LS), other, X_WB, coal.DistanceRequest(), result)
             apart = min(apart, float(result.min_distance))
-        if apart <= TOUCHES:
-            return fallen
-        fallen += max(apart, LEAST)
+        if apart < -GRAZES:
+            return fallen - step
+        step = max(apart, LEAST)
+        fallen += step
     return None
 
 
