@@ -263,7 +263,7 @@ class _Builder:
         fall = landing(shape, X_WO, support, X_WB)
         if fall is None:
             message = f"nothing of '{other}' lies below '{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m"
-            self._error("TASK224", message, ("scene", name, "at"))
+            self._error("TASK224", message, ("scene", name, "at"), f"choose `at` over a part of '{other}'")
             return None
         return Transform.of(xyz=(0.0, 0.0, -fall)) @ X_WO
 

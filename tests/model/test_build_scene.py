@@ -379,6 +379,21 @@ def test_what_rests_on_a_urdf_stands_on_what_it_meets_from_above(tmp_path: Path)
         assert bottom == pytest.approx(z, abs=3e-4), x
 
 
+def test_what_would_fall_through_a_urdf_is_told_where_to_stand(tmp_path: Path) -> None:
+    rails = "".join(
+        f'<collision><origin xyz="{x} 0 0"/><geometry><box size="0.02 0.2 0.02"/></geometry></collision>'
+        for x in (-0.09, 0.09)
+    )
+    (tmp_path / "rails.urdf").write_text(URDF.format(links=f'<link name="rails">{rails}</link>'))
+    bodies = {"rails": {"urdf": {"file": "rails.urdf"}, "fixed": True, "pose": {"xyz": [1, 0, 0.5]}}}
+    bodies["x"] = CUBE | {"rests_on": "rails", "at": [1, 0]}
+    with pytest.raises(InvalidInput) as caught:
+        build_scene(task(bodies), packages=Packages(tmp_path / "task.yaml"))
+    (told,) = caught.value.findings
+    assert told.message == "nothing of 'rails' lies below 'x' at [1, 0] m"
+    assert told.hint == "choose `at` over a part of 'rails'"
+
+
 def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>'
     (tmp_path / "two.urdf").write_text(URDF.format(links=LINK.format(name="a") + LINK.format(name="b") + joint))

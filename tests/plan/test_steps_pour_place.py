@@ -256,21 +256,25 @@ def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any)
 @pytest.mark.slow
 def test_what_is_placed_in_an_open_urdf_stands_on_its_floor(bench: Make, tmp_path: Any) -> None:
     """A drawer of five boxes, 4 cm high with a floor of 1 cm: not on the top of the box about it."""
-    parts = ["0 0 0.005, 0.2 0.2 0.01"]
-    parts += [f"{x} {y} 0.02, {0.01 if x else 0.2} {0.01 if y else 0.2} 0.04" for x, y in DRAWER_SIDES]
-    shapes = "".join(
-        f'<collision><origin xyz="{xyz}"/><geometry><box size="{size}"/></geometry></collision>'
-        for xyz, size in (part.split(", ") for part in parts)
-    )
-    (tmp_path / "drawer.urdf").write_text(f'<robot name="drawer"><link name="drawer">{shapes}</link></robot>')
+    sides = [f"{x} {y} 0.02, {0.01 if x else 0.2} {0.01 if y else 0.2} 0.04" for x, y in DRAWER_SIDES]
+    for name, parts in (("drawer", ["0 0 0.005, 0.2 0.2 0.01", *sides]), ("frame", sides)):
+        shapes = "".join(
+            f'<collision><origin xyz="{xyz}"/><geometry><box size="{size}"/></geometry></collision>'
+            for xyz, size in (part.split(", ") for part in parts)
+        )
+        (tmp_path / f"{name}.urdf").write_text(f'<robot name="{name}"><link name="{name}">{shapes}</link></robot>')
     scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
     scene += f"  drawer: {{urdf: {{file: {tmp_path}/drawer.urdf}}, fixed: true, rests_on: table, at: [0.5, 0.2]}}\n"
+    scene += f"  frame: {{urdf: {{file: {tmp_path}/frame.urdf}}, fixed: true, pose: {{xyz: [0.5, -0.5, 0.2]}}}}\n"
     scene += "  cube: {box: {size: [3 cm, 3 cm, 3 cm]}, mass: 50 g, rests_on: table, at: [0.5, -0.1]}\n"
     panda = bench("panda", scene)
     panda.do("pick", {"object": "cube", "approach": {"from": "top"}})
     panda.do("lift", {"object": "cube"})
     beside = panda.refused("place", {"object": "cube", "at": [0.5, 0.31], "on": "drawer"})
     assert "lies beside 'drawer'" in beside.cause
+    through = panda.refused("place", {"object": "cube", "at": [0.5, -0.5], "on": "frame"})
+    assert "nothing of 'frame' lies below 'cube'" in through.cause
+    assert through.hint == "choose `at` over a part of 'frame'"
     panda.do("place", {"object": "cube", "at": [0.5, 0.2], "on": "drawer"})
     np.testing.assert_allclose(panda.body("cube").p, [0.5, 0.2, 0.2 + 0.01 + 0.015], atol=3e-4)
 

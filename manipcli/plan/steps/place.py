@@ -184,7 +184,10 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
         return X_WG
     deeper = landing(body, X_WG, under, X_WU)
     if deeper is None:
-        raise NotPlannable(f"nothing of '{spec.on}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m")
+        raise NotPlannable(
+            f"nothing of '{spec.on}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
+            hint=f"choose `at` over a part of '{spec.on}'",
+        )
     return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
 
 
