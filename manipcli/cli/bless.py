@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -45,7 +45,7 @@ def bless(
         from manipcli.batch.pool import remove_empty, run_jobs
         from manipcli.report.suite import Suite
         from manipcli.report.suite_json import render_suite
-        from manipcli.report.suite_text import render_case
+        from manipcli.report.suite_text import render_case, render_summary
 
         began = time.monotonic()
         settings = Settings(
@@ -60,20 +60,28 @@ def bless(
         if not chosen and format_ == "text":
             console.result("nothing to bless: there is no task file")
         told: list[CaseReport] = []
-        for done in run_jobs(chosen, at_once=jobs):
-            job = next(job for job in chosen if job.case.id == done.case.id)
-            lines = _blessed(job, done) if done.passed else [render_case(done), "  nothing is blessed"]
-            if format_ == "text":
-                console.result("\n".join(lines))
-            told.append(_without_log(done, lines) if done.passed else done)
+        stopped: Literal["", "interrupted"] = ""
+        running = run_jobs(chosen, at_once=jobs)
+        try:
+            for done in running:
+                job = next(job for job in chosen if job.case.id == done.case.id)
+                lines = _blessed(job, done) if done.passed else [render_case(done), "  nothing is blessed"]
+                if format_ == "text":
+                    console.result("\n".join(lines))
+                told.append(_without_log(done, lines) if done.passed else done)
+        except KeyboardInterrupt:
+            stopped = "interrupted"
+        finally:
+            running.close()
+        known = {one.case.id for one in told}
+        undone = tuple(job.case for job in chosen if job.case.id not in known)
+        suite = Suite(tuple(told), len(chosen), jobs, time.monotonic() - began, stopped, undone=undone)
         if format_ == "json":
-            console.result(render_suite(Suite(tuple(told), len(chosen), jobs, time.monotonic() - began)))
+            console.result(render_suite(suite))
+        elif stopped:
+            console.result(render_summary(suite))
         remove_empty(settings.folder)
-        if not chosen:
-            return ExitCode.NOTHING_TO_RUN
-        if any(one.outcome == "invalid" for one in told):
-            return ExitCode.USAGE
-        return ExitCode.PASSED if all(one.passed for one in told) else ExitCode.FAILED
+        return suite.exit_code
 
 
 def _without_log(done: CaseReport, lines: Sequence[str]) -> CaseReport:
