@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
+from manipcli.cli.app import main
 from manipcli.core.errors import Finding, Place
+from manipcli.flow import chart
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
@@ -33,7 +35,7 @@ CASE = CaseReport(
 )
 OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
-    "cases", "cases.tightest", "cases.troubles",
+    "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators"}
@@ -73,3 +75,10 @@ def test_keys_are_those_that_are_written(which: int) -> None:
     elsewhere = ("cases.run.", "cases.warnings.")
     written = {one for one in _written(json.loads(text)) if not one.startswith(elsewhere)}
     assert set(_documented(list(_rows())[which])) == written
+
+
+def test_keys_of_what_can_be_plotted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    line = chart.FieldLine("joint_states.position", "sensor_msgs/msg/JointState", 3)
+    monkeypatch.setattr(chart, "field_lines", lambda _: (line,))
+    assert main(["plot", "a.mcap", "--fields", "--format", "json"]) == 0
+    assert set(_documented(list(_rows())[2])) == set(_written(json.loads(capsys.readouterr().out)))
