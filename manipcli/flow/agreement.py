@@ -42,7 +42,9 @@ def disagreements(
     what the engine refuses, what no controller commands. Warnings and notes are among it."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
-    claims = Claims.of(controllers.spec) if controllers and controllers.source.untouched() and not misclaimed else None
+    claims = None
+    if controllers and controllers.source.untouched() and not misclaimed:
+        claims = Claims.of(controllers.spec, controllers.place)
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
     warned = () if found else unjudged(task, robot, scene)
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]

@@ -6,10 +6,10 @@ files alone, step by step, so it is told before anything is planned.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from manipcli.core.errors import Loc
+from manipcli.core.errors import Loc, Place
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
@@ -17,18 +17,27 @@ from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
 _GRIPPER = "add a controller of type `gripper` for the hand's joints to the controllers file"
+_THIS_TYPE = "`type: gripper`"
 _FOLLOWERS = "`joint_trajectory`, `computed_torque` or `cartesian_impedance`"
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One controller: what steps may ask of it, what it commands of its joints while active, and whether it is."""
+    """One controller: what steps may ask of it, what it commands of its joints while active, and whether it is; its
+    type and where it stands in the controllers file."""
 
     name: str
     role: Role
     joints: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     active: bool
+    type: str = ""
+    place: Place | None = None
+
+    @property
+    def described(self) -> str:
+        """`'arm' (controllers.yaml:3:3)`."""
+        return f"'{self.name}'" if self.place is None else f"'{self.name}' ({self.place})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +47,14 @@ class Claims:
     controllers: tuple[Claim, ...]
 
     @classmethod
-    def of(cls, spec: ControllersSpec) -> Claims:
-        """Those of a controllers file, at the start."""
+    def of(cls, spec: ControllersSpec, place: Callable[..., Place | None] = lambda *_: None) -> Claims:
+        """Those of a controllers file, at the start; `place` of a location in it."""
         return cls(
             tuple(
-                Claim(name, one.role, one.joints, one.interfaces, one.active) for name, one in spec.controllers.items()
+                Claim(
+                    name, one.role, one.joints, one.interfaces, one.active, one.type, place("controllers", name, "type")
+                )
+                for name, one in spec.controllers.items()
             )
         )
 
@@ -106,13 +118,10 @@ def unfollowed(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem
     if len(owners) < 2:
         return tuple(_sleeping(claims, "follower", name, loc) for name in joints if name not in followed)[:1]
     shares = " and ".join(f"'{_first(joints, claim)}' ({claim.name})" for claim in owners)
-    return (
-        Problem(
-            loc,
-            f"joints of {len(owners)} controllers cannot be moved at once: {shares}",
-            "move them one controller after the other, or give them one controller in the controllers file",
-        ),
-    )
+    hint = "move them one controller after the other, or give them one controller in the controllers file"
+    if not claims.hand:
+        hint += f"; if one of them moves a hand, give it {_THIS_TYPE}"
+    return (Problem(loc, f"joints of {len(owners)} controllers cannot be moved at once: {shares}", hint),)
 
 
 def unmoved_joints(claims: Claims, joints: Sequence[str], loc: Loc) -> tuple[Problem, ...]:
@@ -135,9 +144,17 @@ def unmoved_tool(claims: Claims, robot: RobotModel, loc: Loc) -> tuple[Problem, 
 
 def unmoved_hand(claims: Claims, robot: RobotModel, posture: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if one gripper controller moves the hand to this pose of the robot."""
-    if not set(robot.pose(posture).joints) & set(claims.hand):
-        return (Problem(loc, f"pose '{posture}' has no joint that a gripper controller moves", _GRIPPER),)
-    return _not_one_hand(claims, loc)
+    posed = set(robot.pose(posture).joints)
+    if posed & set(claims.hand):
+        return _not_one_hand(claims, loc)
+    message, hint = f"pose '{posture}' has no joint that a gripper controller moves", _GRIPPER
+    owners = [one for one in claims.controllers if one.interfaces and posed & set(one.joints)]
+    if len(owners) == 1 and not claims.hand:
+        (owner,) = owners
+        message += f": its joints are those of controller {owner.described}, of type `{owner.type}`"
+        mixed = bool(set(owner.joints) & set(arm_joints(robot, ())))
+        hint = f"take the hand's joints from '{owner.name}', and {_GRIPPER}" if mixed else f"give it {_THIS_TYPE}"
+    return (Problem(loc, message, hint),)
 
 
 def no_hand(robot: RobotModel) -> Problem:
@@ -161,8 +178,13 @@ def _sleeping(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
     if able:
         message = f"controller '{able[0]}', which {what} joint '{joint}', is not active here"
         return Problem(loc, message, f"add a step before it: `switch_controllers: {able[0]}`")
+    message = f"no controller {what} joint '{joint}'"
     hint = f"add the joint to a controller of a type that does, in the controllers file: {_FOLLOWERS}"
-    return Problem(loc, f"no controller {what} joint '{joint}'", hint)
+    owner = next((one for one in claims.controllers if one.interfaces and joint in one.joints), None)
+    if owner is not None:
+        message += f": it is one of controller {owner.described}, of type `{owner.type}`"
+        hint = f"give '{owner.name}' a type that does: {_FOLLOWERS}"
+    return Problem(loc, message, hint)
 
 
 def _first(joints: Sequence[str], claim: Claim) -> str:

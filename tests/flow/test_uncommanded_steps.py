@@ -28,7 +28,7 @@ def told(tmp_path: Path, claims: str, steps: str, *, robot: Path = ROOT / "robot
     try:
         load_task(file, allow_outside=True)
     except InvalidInput as refused:
-        return [f"{f.code} {f.place.line if f.place else 0} {f.message}" for f in refused.findings]
+        return [f"{f.code} {f.place.line if f.place else 0} {f.message} | {f.hint}" for f in refused.findings]
     return []
 
 
@@ -81,6 +81,27 @@ def test_a_hand_that_no_gripper_controller_moves_is_refused(tmp_path: Path, step
     for one in found:
         assert one.startswith("TASK232 7 ")
         assert "gripper" in one
+
+
+def test_a_hand_under_another_type_is_told_with_its_controller(tmp_path: Path) -> None:
+    claims = controllers(("joint_trajectory", ARM), ("joint_trajectory", HAND[1]))
+    of_pick = told(tmp_path, claims, "  - pick: {object: block}\n")
+    assert of_pick
+    for found in of_pick:
+        assert "controller 'c1' (" in found
+        assert "controllers.yaml:3:14), of type `joint_trajectory` | give it `type: gripper`" in found
+    (found,) = told(tmp_path, claims, "  - move: {to: home}\n")
+    assert "if one of them moves a hand, give it `type: gripper`" in found
+    mixed = told(tmp_path, HANDLESS, "  - release: {}\n")
+    assert "| take the hand's joints from 'c0', and add a controller of type `gripper`" in mixed[0]
+
+
+def test_an_arm_under_a_type_that_follows_nothing_is_told_with_its_controller(tmp_path: Path) -> None:
+    joints = ", ".join(ARM)
+    claims = f"controllers:\n  arm: {{type: forward_command, joints: [{joints}], command_interface: effort}}\n"
+    (found,) = told(tmp_path, claims, "  - lift: {object: block}\n")
+    assert "'panda_joint1': it is one of controller 'arm' (" in found
+    assert "controllers.yaml:2:15), of type `forward_command` | give 'arm' a type that does: `joint_traj" in found
 
 
 def test_a_trajectory_for_the_joint_of_a_gripper_is_refused(tmp_path: Path) -> None:
