@@ -25,6 +25,10 @@ from manipcli.flow.replay import open_playback
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.conditions.at_pose import SLIDE, AtPoseSpec
+from manipcli.model.conditions.contact_force import ContactForceSpec
+from manipcli.model.conditions.moved import UnmovedSpec
+from manipcli.model.conditions.slip import SlipSpec
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback
@@ -94,7 +98,10 @@ def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | No
         causes=_causes(verdict, places, end=end),
         steps=places[0],
         expectations=places[1],
-        limits=tuple(_limit(one.body) for one in recorded_task_file(recording, path).spec.judged),
+        limits=tuple(
+            limit_of(one.body, outcome.unit)
+            for one, outcome in zip(recorded_task_file(recording, path).spec.judged, verdict.expectations, strict=False)
+        ),
         sources=tuple(
             Source(name, recording.attachments[name].decode("utf-8", "replace"))
             for name in (TASK, ROBOT, CONTROLLERS)
@@ -212,8 +219,18 @@ def _missed(one: ExpectationOutcome) -> str:
     return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
 
 
-def _limit(spec: Model) -> float | None:
-    """What a margin is measured from: conditions and expectations call it `within` or `below`."""
+def limit_of(spec: Model, unit: str) -> float | None:
+    """What a margin in `unit` is measured from, in it; None where that is not stated.
+
+    Conditions and expectations call it `within` or `below`, those that ask for two things have one more.
+    """
+    match spec:
+        case SlipSpec() | UnmovedSpec() if unit == "rad":
+            return spec.turn
+        case AtPoseSpec() if unit == "m":
+            return spec.slide or SLIDE
+        case ContactForceSpec(above=float()):
+            return None  # either of its two may be what the margin is of
     for key in ("within", "below"):
         value = getattr(spec, key, None)
         if isinstance(value, float) and value > 0.0:

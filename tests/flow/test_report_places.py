@@ -7,9 +7,15 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from manipcli.flow.report import log_page
+from manipcli.flow.report import limit_of, log_page
+from manipcli.model.conditions.at_pose import AtPoseSpec
+from manipcli.model.conditions.contact_force import ContactForceSpec
+from manipcli.model.conditions.moved import MovedSpec, UnmovedSpec
+from manipcli.model.conditions.near import NearSpec
+from manipcli.model.conditions.slip import SlipSpec
 from manipcli.pipeline import run_task, verify_log
 from manipcli.report.html import render_page
+from manipcli.spec.base import Model
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""# The wrist waits.
@@ -75,3 +81,22 @@ def test_what_ended_before_its_first_tick_has_a_page(log: Path, tmp_path: Path) 
 
 def test_a_log_is_simulated_again_with_the_places_of_its_run(log: Path) -> None:
     assert verify_log(log).identical
+
+
+@pytest.mark.parametrize(
+    ("spec", "unit", "limit"),
+    [
+        (SlipSpec(object="cup", within=0.002, turn=0.005), "m", 0.002),
+        (SlipSpec(object="cup", within=0.002, turn=0.005), "rad", 0.005),
+        (UnmovedSpec(object="cup", within=0.002, turn=0.01), "rad", 0.01),
+        (AtPoseSpec(pose="open", within=0.02, slide=0.045), "rad", 0.02),
+        (AtPoseSpec(pose="open", within=0.02, slide=0.045), "m", 0.045),
+        (AtPoseSpec(pose="open"), "m", 0.005),
+        (NearSpec(object="cup", to=(0.0, 0.0, 0.0), within=0.003), "m", 0.003),
+        (ContactForceSpec(of="cup", below=20.0), "N", 20.0),
+        (ContactForceSpec(of="cup", below=20.0, above=1.0), "N", None),
+        (MovedSpec(object="cup", by=0.1, turn=0.5), "rad", None),
+    ],
+)
+def test_a_limit_is_that_which_the_margin_is_measured_from(spec: Model, unit: str, limit: float | None) -> None:
+    assert limit_of(spec, unit) == limit
