@@ -21,6 +21,7 @@ from manipcli.core.text import digits
 from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import too_weak
 from manipcli.flow.load import Task
+from manipcli.flow.weak import throttled
 from manipcli.model.kinematics import Kinematics
 from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.other_controllers import CartesianImpedanceSpec, ComputedTorqueSpec
@@ -70,6 +71,9 @@ def modelled_doubts(
             task.robot, one.joint, one.place, weight=weight, needed=needed if planned else 0.0,
             limit=float(load.effort[k]),
         )  # fmt: skip
+        if finding is None and planned:
+            velocity = postures.velocity[:, task.robot.joint_names.index(one.joint)]
+            finding = throttled(task.robot.joint(one.joint), one.place, load.needed[:, k], velocity)
         if finding is not None:
             yield Doubt(one.joint, finding)
 

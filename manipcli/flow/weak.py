@@ -58,7 +58,7 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, velocity: Array, 
     needed = float(np.abs(load.needed[:, k]).max()) if planned else 0.0
     finding = too_weak(robot, loop.joint, loop.place, weight=weight, needed=needed, limit=limit)
     if finding is None and planned:
-        finding = _throttled(robot.joint(loop.joint), loop, load.needed[:, k], velocity)
+        finding = throttled(robot.joint(loop.joint), loop.place, load.needed[:, k], velocity)
     if finding is not None:
         yield Doubt(loop.joint, finding)
     if loop.weightless or weight <= WEIGHTLESS:
@@ -70,7 +70,7 @@ def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, velocity: Array, 
         yield Doubt(loop.joint, Finding(code, f"{loop.joint}: {message}", loop.place, hint, "warning"))
 
 
-def _throttled(joint: Joint, loop: Held, needed: Array, velocity: Array) -> Finding | None:
+def throttled(joint: Joint, place: Place, needed: Array, velocity: Array) -> Finding | None:
     """Too little effort at the planned velocities (T,): a soft limit lets only k_velocity (v_max - v) through."""
     soft, fastest = joint.limits.soft, joint.limits.velocity
     if soft is None or soft.k_velocity == 0.0 or fastest is None:
@@ -81,10 +81,10 @@ def _throttled(joint: Joint, loop: Held, needed: Array, velocity: Array) -> Find
     if abs(needed[worst]) <= left[worst] + WEIGHTLESS:
         return None
     unit, at = joint.effort_unit, f"{abs(velocity[worst]):.3g} {joint.unit}/s"
-    message = f"{loop.joint}: at {at} the planned motions need {abs(needed[worst]):.3g} {unit}; the "
+    message = f"{joint.name}: at {at} the planned motions need {abs(needed[worst]):.3g} {unit}; the "
     message += f"soft limit of its velocity (k_velocity {digits(soft.k_velocity)}) leaves {left[worst]:.3g} {unit}"
-    hint = f"it will lag behind; a lower `speed` of the step, or limits.{loop.joint}.k_velocity: 0 in the robot file"
-    return Finding("CTRL169", message, loop.place, hint, "warning")
+    hint = f"it will lag behind; a lower `speed` of the step, or limits.{joint.name}.k_velocity: 0 in the robot file"
+    return Finding("CTRL169", message, place, hint, "warning")
 
 
 def _cut(loop: Held, gravity: Array, joint: Joint) -> tuple[str, str, str] | None:

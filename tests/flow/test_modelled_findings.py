@@ -17,7 +17,7 @@ TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTran
 <actuator name="motor"><mechanicalReduction>1</mechanicalReduction></actuator></transmission>"""
 ROBOT = """poses: {zero: {all: [0]}, up: {all: [1.2]}}
 tool: {link: arm}
-limits: {hinge: {acceleration: 30}}
+limits: {hinge: {acceleration: 30, k_velocity: THROTTLE}}
 actuators: {motor: {effort: EFFORT, LATENCY}}
 """
 Found = Callable[..., tuple[Finding, ...]]
@@ -30,9 +30,15 @@ WEIGHT = 9.81 * 0.25 * math.sin(1.2)
 @pytest.fixture
 def found(pendulum: Callable[..., Path]) -> Found:
     def of(
-        controller: str, *, effort: float = 20.0, latency: int = 0, step: str = "move: {to: up}"
+        controller: str,
+        *,
+        effort: float = 20.0,
+        latency: int = 0,
+        k_velocity: float = 0.0,
+        step: str = "move: {to: up}",
     ) -> tuple[Finding, ...]:
         robot = ROBOT.replace("EFFORT", f"{effort} N m").replace("LATENCY", f"latency: {latency}")
+        robot = robot.replace("THROTTLE", str(k_velocity))
         folder = pendulum(robot, urdf=TRANSMISSION)
         (folder / "c.yaml").write_text(f"controllers:\n  c: {{joints: [hinge], {controller}}}\n")
         (folder / "task.yaml").write_text(
@@ -84,3 +90,16 @@ def test_a_motor_too_weak_for_its_load_is_told(found: Found, controller: str) ->
     (told,) = found(controller, effort=WEIGHT + 0.01)
     assert told.message.startswith("hinge: the planned motions need up to")
     assert not found(controller)
+
+
+@pytest.mark.parametrize("controller", [COMPUTED, SOFT])
+def test_a_soft_limit_of_the_velocity_that_leaves_too_little_effort_is_told(found: Found, controller: str) -> None:
+    """At v it lets k_velocity (3 rad/s - v) through."""
+    (told,) = found(controller, k_velocity=1.0)
+    assert (told.code, told.severity) == ("CTRL169", "warning")
+    numbers = re.search(r"hinge: at (\S+) rad/s .* need (\S+) N m; .* leaves (\S+) N m", told.message)
+    assert numbers is not None
+    v, needed, left = map(float, numbers.groups())
+    assert left == pytest.approx(3.0 - v, abs=0.006), "v has three digits"
+    assert left < needed
+    assert not found(controller, k_velocity=100.0, step="move: {to: up, speed: 0.3}")
