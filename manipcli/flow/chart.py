@@ -211,7 +211,7 @@ class _Log:
             title, label, quantity = field.rpartition(".")[0], f"{label} {quantity}".strip(), parts[-2]
         elif len(quantity) == 1 and len(parts) > 1:
             quantity = f"{parts[-2]} {quantity}"
-        curve = Curve(name, label, self.name, each.times, each.values, each.held)
+        curve = Curve(name, label, self.name, each.times, each.values, each.held, self.duration)
         panels.add(number, quantity, title, unit, curve)
 
     def _topic(self, name: FieldName) -> Topic:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ class Curve:
         times: (T,) [s].
         values: (T,) in the unit of the panel; NaN where there is none.
         held: each value holds until the next, so that it is drawn as stairs.
+        end: of its log [s]: the last value holds no longer.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Curve:
     times: Array
     values: Array
     held: bool = False
+    end: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +104,12 @@ def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array
         columns: how many there are.
 
     Returns:
-        Times and values; a gap (NaN) stays one, and a value that is held stays until the end.
+        Times and values; a gap (NaN) stays one, and a value that is held stays until the end of its log.
     """
     times, values = curve.times, curve.values
-    if curve.held and len(times) and times[-1] < end:
-        times, values = np.append(times, end), np.append(values, values[-1])
+    last = min(end, curve.end)
+    if curve.held and len(times) and times[-1] < last:
+        times, values = np.append(times, last), np.append(values, values[-1])
     if len(times) <= 4 * columns or end <= start:
         return times, values
     column = np.clip(((times - start) / (end - start) * columns).astype(np.int64), -1, columns)

@@ -74,6 +74,9 @@ def test_logs_over_each_other_and_a_partial_one(log: Path, tmp_path: Path, capsy
     told = capsys.readouterr()
     assert "note: other: it was not finished" in told.err
     assert {row.partition(",")[0] for row in told.out.splitlines()} == {"log", "home", "other"}
+    (panel,) = open_chart([log, cut], ["joint_states.position[joint_4]"]).panels
+    assert [one.end for one in panel.curves] == pytest.approx([one.times[-1] for one in panel.curves], abs=0.01)
+    assert panel.curves[0].end > panel.curves[1].end
 
 
 @pytest.mark.slow

@@ -47,6 +47,13 @@ def test_a_value_that_is_held_stays_until_the_end() -> None:
     held = Curve("c", "", "", np.array([0.0, 1.0]), np.array([2.0, 3.0]), held=True)
     times, values = thinned(held, 0.0, 10.0, 100)
     assert (times.tolist(), values.tolist()) == ([0.0, 1.0, 10.0], [2.0, 3.0, 3.0])
+    shorter = replace(held, end=4.0)  # than another log beside it
+    times, values = thinned(shorter, 0.0, 10.0, 100)
+    assert (times.tolist(), values.tolist()) == ([0.0, 1.0, 4.0], [2.0, 3.0, 3.0])
+    chart = replace(CHART, panels=(Panel("c", "c", "", (shorter,)),), steps=())
+    rows = [line[10:] for line in _lines(chart, columns=90)][3:13]
+    last = max(len(row.rstrip(" ⠀")) for row in rows)
+    assert last == pytest.approx(0.4 * 80, abs=2)
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 14.55), (-3.2, 1e-3), (1e6, 1e6 + 1.0), (0.0, 0.0)])
