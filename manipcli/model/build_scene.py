@@ -8,6 +8,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput, Loc
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.text import digits
 from manipcli.model import body_files, body_shapes
 from manipcli.model.body_shapes import COLORS, BodyShape
 from manipcli.model.landing import FORMED, landing
@@ -26,6 +27,8 @@ FLOOR_SIZE = (10.0, 10.0, 0.1)
 LONGEST = 10.0
 """[m] of what can move: anything longer was meant in millimetres."""
 _SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
+EXACT = 1e-9
+"""[m] By so much rounding may move what fits exactly."""
 UPRIGHT = 1.0 - 1e-6
 """Least cosine of the tilt of what carries or contains something: none, but for rounding."""
 
@@ -280,15 +283,15 @@ class _Builder:
             self._error("TASK224", f"nothing stays inside '{other}': it is tilted", loc, "give a `pose` instead")
             return None
         lack = _too_big(shape, spec.yaw, interior)
-        if lack > 0.0:
-            self._error("TASK224", f"'{name}' is {lack * 1e3:.1f} mm too wide for the inside of '{other}'", loc)
+        if lack > EXACT:
+            self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for the inside of '{other}'", loc)
             return None
         X_WS = X_WB @ interior.X_OS
         x, y, _ = (0.0, 0.0, 0.0) if spec.at is None else X_WS.inverse().apply([*spec.at, 0.0])
         lack = _too_big(shape, spec.yaw, interior, x, y)
-        if lack > 0.0:
+        if lack > EXACT:
             hint = f"the middle of '{other}' is at [{X_WS.p[0]:g}, {X_WS.p[1]:g}] m"
-            message = f"'{name}' would stand {lack * 1e3:.1f} mm outside of the hollow of '{other}'"
+            message = f"'{name}' would stand {digits(lack * 1e3)} mm outside of the hollow of '{other}'"
             self._error("TASK224", message, ("scene", name, "at"), hint)
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]

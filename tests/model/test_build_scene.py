@@ -113,12 +113,15 @@ def test_what_would_reach_through_the_wall_is_refused_with_the_excess() -> None:
     """A hollow of 32 mm about [0.75, 0], a ball of 14 mm: 18 mm off its middle is the most, and in a tray 90 mm."""
     cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
     found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.75, 0.023]}})
-    assert found.message == "'ball' would stand 5.0 mm outside of the hollow of 'cup'"
+    assert found.message == "'ball' would stand 5 mm outside of the hollow of 'cup'"
     assert found.hint == "the middle of 'cup' is at [0.75, 0] m"
+    assert built({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.768, 0.0]}})  # touches the wall
+    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.76801, 0.0]}})
+    assert found.message == "'ball' would stand 0.01 mm outside of the hollow of 'cup'"
     tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "rests_on": "floor", "at": [0, 0], "mass": 1}
     assert built({"tray": tray, "box": CUBE | {"inside": "tray", "at": [-0.0899, 0.0399]}})
     found = only({"tray": tray, "box": CUBE | {"inside": "tray", "at": [-0.05, 0.047]}})
-    assert "7.0 mm outside of the hollow of 'tray'" in found.message
+    assert "7 mm outside of the hollow of 'tray'" in found.message
 
 
 @pytest.mark.parametrize("rpy", [[np.pi, 0, 0], [0, np.pi / 2, 0], [0.1, 0, 0]])
@@ -219,7 +222,7 @@ def test_nothing_rests_on_a_container_a_ball_or_a_slope() -> None:
 def test_what_is_wider_than_the_hollow_is_refused_with_the_excess() -> None:
     cup = CUP | {"rests_on": "floor", "at": [0.0, 0.0]}
     found = only({"cup": cup, "ball": {"sphere": {"radius": 0.034}, "mass": 0.01, "inside": "cup"}})
-    assert "2.0 mm too wide" in found.message
+    assert "2 mm too wide" in found.message
     tray = {"tray": {"size": [0.12, 0.12, 0.05], "wall": 0.005}, "rests_on": "floor", "at": [0, 0], "mass": 1.0}
     assert built({"tray": tray, "cube": CUBE | {"inside": "tray"}})
     found = only({"tray": tray, "cube": CUBE | {"inside": "tray", "yaw": np.pi / 4}})
