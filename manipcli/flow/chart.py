@@ -13,9 +13,9 @@ from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
 from manipcli.judge.steps import step_outcomes
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
-from manipcli.record.definition import Array, Message, UnknownDefinition, read_definition
+from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, ways
+from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, short, ways
 from manipcli.record.layout import Part
 from manipcli.record.namespaces import meant
 from manipcli.record.reading import open_recording
@@ -96,7 +96,7 @@ def field_lines(path: Path) -> tuple[FieldLine, ...]:
         if topic.definition and topic.count:
             message = one.message(topic)
             lines += [
-                FieldLine(f"{topic.name.strip('/')}.{_short(message, name.split('.'))}", topic.type, topic.count)
+                FieldLine(f"{topic.name.strip('/')}.{short(message, name)}", topic.type, topic.count)
                 for name in numbers(message)
             ]
     return tuple(lines)
@@ -199,7 +199,7 @@ class _Log:
 
     def _curve(self, one: Wanted, each: Series, number: int, panels: _Panels, *, several: bool, together: bool) -> None:
         parts = [part.name for part in one.way.parts]
-        field = f"{one.topic.strip('/')}.{_short(one.message, parts)}"
+        field = f"{one.topic.strip('/')}.{short(one.message, one.way.name)}"
         name = f"{field}[{each.label}]" if each.label else field
         unit = unit_of(one.way, each.label, self._known_joints())
         label = each.label.replace("+", " – ").replace("robot/", "")
@@ -285,14 +285,6 @@ def _overview(logs: Sequence[_Log]) -> list[tuple[str, ...]]:
             found[f"{CONTACTS}.force"] = None
     # Every log must have what is asked of all.
     return [(word,) for word in found if all(word.partition(".")[0] in one.topics.all for one in logs)]
-
-
-def _short(message: Message, parts: Sequence[str]) -> str:
-    """Without the first part where the message is one array: it is meant anyway."""
-    arrays = [
-        one.name for one in message.fields if isinstance(one.type, Array) and isinstance(one.type.element, Message)
-    ]
-    return ".".join(parts[1:] if len(parts) > 1 and arrays == [parts[0]] else parts)
 
 
 def _split(word: str) -> Iterator[str]:

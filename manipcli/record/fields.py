@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 
-from manipcli.core.text import any_of, did_you_mean, listed, shorten
+from manipcli.core.text import any_of, did_you_mean, listed, nearest, shorten
 from manipcli.record.definition import MAX_DEPTH, Array, Field, Message, Number, Type
 from manipcli.record.layout import Key, Part
 
@@ -111,10 +111,11 @@ def ways(message: Message, name: FieldName) -> tuple[Way, ...]:
         inner = _inside(steps[-1][1] if steps else message)
         found = _found(inner, part.name, looked)
         if not found:
-            known = numbers(inner or message)
-            raise UnknownField(
-                f"{name.text}: {name.topic} has no field '{part.name}'", did_you_mean(part.name, known, kind="fields")
-            )
+            known = [short(message, way) for way in numbers(message)] if inner is message else numbers(inner or message)
+            hint = did_you_mean(part.name, known, kind="fields")
+            if inner is message and name.key is None and len(arrays) == 1 and not nearest(part.name, known):
+                hint = f"brackets pick an element: {name.topic.strip('/')}[{part.name}].FIELD; {hint}"
+            raise UnknownField(f"{name.text}: {name.topic} has no field '{part.name}'", hint)
         if len(found) > 1:
             choices = [".".join(one.name for one in each) for _, each in found[:4]]
             raise UnknownField(f"{name.text}: several fields are called '{part.name}'", f"say {any_of(choices)}")
@@ -134,7 +135,7 @@ def ways(message: Message, name: FieldName) -> tuple[Way, ...]:
 
 
 def _hint(message: Message) -> str:
-    known = numbers(message)
+    known = [short(message, way) for way in numbers(message)]
     return f"fields: {listed(known)}" if known else "none of its fields is a number"
 
 
@@ -212,3 +213,10 @@ def _below(message: Message, parts: tuple[Part, ...], looked: _Budget) -> Iterat
 def numbers(message: Message) -> tuple[str, ...]:
     """The names of the numbers in messages of a type, without headers and times; a few hundred at most."""
     return tuple(way.name for way in islice(_below(message, (), _Budget()), 4 * MAX_WAYS))
+
+
+def short(message: Message, name: str) -> str:
+    """The name of a number without its first part where the message is one array: it is meant anyway."""
+    arrays = [one.name for one in message.fields if _is_array_of_messages(one.type)]
+    first, _, rest = name.partition(".")
+    return rest if rest and arrays == [first] else name

@@ -151,6 +151,15 @@ def test_what_cannot_be_plotted_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_a_hint_says_of_a_body_can_be_plotted(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    moves = open_chart([log], ["tf.translation.x"]).panels[0].labels[-1]
+    assert main(["plot", str(log), f"tf.{moves}.z"]) == 4
+    hint = capsys.readouterr().err
+    assert f"tf[{moves}].FIELD; fields: transform.translation.x, " in hint
+    for field in hint.split("fields: ")[1].split(", "):
+        assert open_chart([log], [f"tf[{moves}].{field.strip()}"]).panels[0].labels == (moves,)
+
+
 def test_without_a_log_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plot", "joint_states.position"]) == 4
     assert "error[USE060]: no log is given" in capsys.readouterr().err
