@@ -25,6 +25,8 @@ ENOUGH: Final = 1.01
 LIGHT: Final = 740.0
 """[N/kg] A force so large for the mass may let an object creep. Measured in carries of 2 to 5 s: two fingers by 0.2 to
 0.4 mm up to 3500 N/kg, and by 1.5 mm at 7000; three by 0.4 mm at 400 N/kg, by 2 to 3 mm from 800 on."""
+MUCH: Final = 1.1
+"""So many times the force that is asked, and a hand that cannot be told it is told of."""
 NUDGE: Final = 1e-4
 """[rad or m] by which a finger is moved to see how its parts move."""
 
@@ -66,8 +68,13 @@ def _most(task: Task, name: str) -> float:
         return math.inf
     owners = [one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec)]
     limits = [joint.limits.effort, *(one.max_effort for one in owners if name in one.joints)]
+    return min((limit for limit in limits if limit), default=math.inf) / _shared(task, name)
+
+
+def _shared(task: Task, name: str) -> float:
+    """The effort of a joint that slides for each newton with which its finger, and those that mimic it, press."""
     mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
-    return min((limit for limit in limits if limit), default=math.inf) / (1.0 + sum(abs(m.multiplier) for m in mimics))
+    return 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
 
 
 def _sensible(task: Task, end: Situation, force: float) -> float:
@@ -130,6 +137,50 @@ def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
                 hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
                 place = task.controllers_file.place("controllers", controller, "gains", name)
                 yield Finding("CTRL168", message, place, hint, "warning")
+
+
+def unheeded(task: Task, plan: Plan) -> Iterator[Finding]:
+    """Hands that are commanded by position and asked for less force than their motors press with.
+
+    Such a motor follows its reference with all the effort that it may have. The reference stops where a finger feels
+    the force, and there it is within the object already: what the finger presses with is the limit of its effort.
+    """
+    owners = {
+        joint: name
+        for name, spec in task.controllers.controllers.items()
+        if isinstance(spec, GripperSpec) and spec.command_interface == "position"
+        for joint in spec.joints
+    }
+    told: set[str] = set()
+    for step in plan.steps:
+        for grip in (motion.grip for motion in step.plan.motions):
+            if grip is None or grip.force is None:
+                continue
+            for name in grip.joints:
+                if name not in owners or name in told:
+                    continue
+                shared = _effort_each(task, plan, step.plan.end, grip.joints, name)
+                limit = task.robot.joint(name).limits.effort or math.inf
+                if not shared or limit / shared <= MUCH * grip.force:
+                    continue
+                told.add(name)
+                given = f"{limit / shared:.3g} N, its effort limit" if limit < math.inf else "no limit of its effort"
+                message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; commanded by position it presses "
+                message += f"with {given}: `force` only says at which contact force it stops"
+                least = f"limits.{name}.effort: {digits(1.05 * shared * grip.force)}"
+                hint = f"command it by effort, or limit that (robot file, {least})"
+                place = task.controllers_file.place("controllers", owners[name], "command_interface")
+                yield Finding("CTRL171", message, place, hint, "warning")
+
+
+def _effort_each(task: Task, plan: Plan, end: Situation, joints: tuple[str, ...], name: str) -> float:
+    """The effort of a joint [N m or N] for each newton of its finger; 0 where that is not known."""
+    if task.robot.joint(name).type == "prismatic":
+        return _shared(task, name)
+    if end.carried is None or (joints.index(name),) not in fingers(task.robot, joints):
+        return 0.0
+    hits = plan.planner.grasping(end, end.carried.body).every(end.position)
+    return _closing(plan.planner, end, name, {part for hit in hits for part in (hit.a, hit.b)})
 
 
 def _closing(planner: Planner, situation: Situation, name: str, touched: Collection[str]) -> float:

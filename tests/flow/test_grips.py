@@ -120,3 +120,24 @@ def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
         "TASK238": "lower `force`, or raise what limits it: the joint's effort, or `max_effort`",
         "CTRL168": "p 6000 gives a fifth more than 50 N",
     }
+
+
+@pytest.mark.slow
+def test_a_hand_on_the_position_interface_is_told_that_no_force_is_its_own(pick: Path, tmp_path: Path) -> None:
+    """Its motor has 20 N for two fingers, and presses so whatever is asked; 2.1 N let it press with 1 N each."""
+    hand = (
+        "  hand_controller: {type: gripper, joints: [panda_finger_joint1], command_interface: position, speed: 0.05}\n"
+    )
+    arm = (ROOT / "controllers" / "panda.yaml").read_text(encoding="utf-8").partition("  hand_controller:")[0]
+    (tmp_path / "c.yaml").write_text(arm + hand)
+    pick.write_text(re.sub("controllers: .*", "controllers: c.yaml", pick.read_text()))
+    force, limit = "steps.0.pick.grasp.force", "robot.limits.panda_finger_joint1.effort"
+    (found,) = gain_findings(load_task(pick, overrides=[f"{force}=1 N"]))
+    assert (found.code, found.severity) == ("CTRL171", "warning")
+    assert found.message == (
+        "panda_finger_joint1: step 'pick_1' grasps with 1 N; commanded by position it presses with 10 N, its effort "
+        "limit: `force` only says at which contact force it stops"
+    )
+    assert found.hint == ("command it by effort, or limit that (robot file, limits.panda_finger_joint1.effort: 2.1)")
+    assert gain_findings(load_task(pick, overrides=[f"{force}=1 N", f"{limit}=2.1"])) == ()
+    assert gain_findings(load_task(pick, overrides=[f"{force}=10 N"])) == ()

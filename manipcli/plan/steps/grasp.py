@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -31,7 +31,12 @@ class GraspSpec(Model):
 
     object: str | None = Field(None, description="What is grasped; carried from then on. Default: not said.")
     posture: str = Field("closed", description="The named pose that the hand closes towards.")
-    force: Annotated[Force, Field(gt=0, description="Contact force at which a finger stops [N].")] = DEFAULT_FORCE
+    force: Force = Field(
+        DEFAULT_FORCE,
+        gt=0,
+        description="Contact force at which a finger stops [N]; commanded by position it presses with its effort limit "
+        "all the same.",
+    )
     until: Literal["contact", "posture"] = Field(
         "contact", description="`contact`: fails if no finger touches; `posture`: reaching the posture is fine, too."
     )
