@@ -35,6 +35,9 @@ Area = Literal["TASK", "ROBOT", "CTRL"]
 UNCOMPUTED: Final = ("TASK203", "TASK211")
 """An expression that has no value. That its text is no name either (`MISNAMED`) needs no second telling."""
 MISNAMED: Final = "TASK23"
+TWICE: Final = "YAML106"
+"""A key that stands twice: what the second holds is left out, which may be what other lines name (`UNNAMED`)."""
+UNNAMED: Final = ("TASK225", "TASK227", "TASK230")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,13 +143,17 @@ def apart(findings: Sequence[Finding], unknown: AbstractSet[Place]) -> tuple[Fin
     """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
     places = {one.place for one in findings if one.code.startswith("YAML")}
     uncomputed = {one.place for one in findings if one.code in UNCOMPUTED}
+    halved = {one.place.file for one in findings if one.code == TWICE and one.place is not None}
     return tuple(
         one
         for one in findings
         if one.code.startswith("YAML")
         or one.place is None
         or not (
-            one.place in places or one.place in unknown or (one.place in uncomputed and one.code.startswith(MISNAMED))
+            one.place in places
+            or one.place in unknown
+            or (one.place in uncomputed and one.code.startswith(MISNAMED))
+            or (one.place.file in halved and one.code in UNNAMED)
         )
     )
 

@@ -52,6 +52,26 @@ expect:
         assert hint in text
 
 
+def test_names_are_not_missed_where_a_key_stands_twice(tmp_path: Path) -> None:
+    """The second `lower` was to be `upper`, which is no reason to tell every line that speaks of `upper`."""
+    text = """\
+scene:
+  lower: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0, 0.02]}}
+  lower: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, pose: {xyz: [0.5, 0.2, 0.02]}}
+  third: {box: {size: [4 cm, 4 cm, 4 cm]}, mass: 50 g, rests_on: upper, at: [0.5, 0.2]}
+steps:
+  - pick: {object: upper}
+  - lift: {object: upper, by: 10 m}
+expect:
+  - at_rest: {object: upper}
+  - duration: {below: -1 s}
+"""
+    found = findings(tmp_path, text)
+    assert [line for line, _, _ in found] == [6, 13]
+    names = findings(tmp_path, text.replace("  lower: ", "  uper: ", 1).replace("-1 s", "1 s"))
+    assert {line for line, _, _ in names} == {7, 9, 10, 12}
+
+
 def test_ids_that_are_taken_are_told_with_everything_else(tmp_path: Path) -> None:
     found = findings(
         tmp_path,
