@@ -20,7 +20,10 @@ Codes = list[str] | None
 
 
 def check_urdf(
-    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="URDF or xacro.", show_default=False)] = None,
+    file: Annotated[
+        str | None,
+        typer.Argument(metavar="FILE", help="URDF or xacro: a path, or package://NAME/...", show_default=False),
+    ] = None,
     arguments: XacroArguments = None,
     *,
     format_: Annotated[
@@ -70,7 +73,8 @@ def check_urdf(
     if force and not fix:
         raise InvalidInput([Finding("USE044", "--force lets --fix replace a file", hint="give --fix, too")])
     check_picture(picture)
-    check_outputs(("--picture", picture), reads=(file,))
+    path = describe.located(file, package_path=tuple(package_path or ()))
+    check_outputs(("--picture", picture), reads=(path,))
     codes = describe.wanted_codes(_words(select), _words(ignore))
     given = xacro_arguments(arguments or [])
 
@@ -83,7 +87,7 @@ def check_urdf(
             allow_env=tuple(allow_env or ()),
         )
 
-    inspection = inspect(file)
+    inspection = inspect(path)
     if fix:
         inspection = _mended(inspection, inspect, in_place=in_place, force=force)
     told = inspection.told(codes)
@@ -92,7 +96,7 @@ def check_urdf(
     console.result(_rendered(inspection, told, codes, format_, passed=passed, tree=tree))
     if picture is not None:
         if inspection.examination.errors:
-            console.talk(f"not drawn: {file} has errors")
+            console.talk(f"not drawn: {path} has errors")
         else:
             console.not_drawn(describe.draw(inspection, picture))
             console.talk(f"drawn: {picture}")

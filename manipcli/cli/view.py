@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,7 +14,14 @@ from manipcli.core.errors import ExitCode
 
 
 def view(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="URDF, xacro, robot file or task.", show_default=False)],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="URDF, xacro, robot file or task: a path, or package://NAME/...",
+            show_default=False,
+        ),
+    ],
     arguments: XacroArguments = None,
     *,
     port: PagePort = None,
@@ -29,11 +35,14 @@ def view(
     """
     with Interrupts():
         given = xacro_arguments(arguments or [])
+        from manipcli.flow.describe import located
         from manipcli.flow.look import load_sight
         from manipcli.replay.view import View
         from manipcli.report import text
 
-        sight = load_sight(file, arguments=given, package_path=tuple(package_path or ()), allow_outside=allow_outside)
+        places = tuple(package_path or ())
+        path = located(file, package_path=places)
+        sight = load_sight(path, arguments=given, package_path=places, allow_outside=allow_outside)
         for finding in sight.findings:
             console.talk(text.describe(finding))
         with View(sight.robot, sight.scene, q=sight.q, port=port) as page:

@@ -15,7 +15,7 @@ from manipcli.model.build_robot import bare_robot
 from manipcli.model.check import Check
 from manipcli.model.checks import CHECKS
 from manipcli.model.examine import Examination, examine
-from manipcli.model.packages import Packages
+from manipcli.model.packages import NotFound, Packages
 from manipcli.model.summary import Summary, summarise, tree_lines
 from manipcli.model.urdf_fix import Change, mended
 from manipcli.spec.load import sibling
@@ -39,6 +39,20 @@ class Inspection:
         if self.examination.parts is None:
             return findings
         return tuple(finding for finding in findings if finding.code in codes)
+
+
+def located(word: str, *, package_path: Sequence[Path] = ()) -> Path:
+    """The file that a user names: by its path, or `package://NAME/...`, found as from a robot file in this folder.
+
+    Raises:
+        InvalidInput: the package is not found, or the file is not in it.
+    """
+    if not word.startswith(("package://", "model://")):
+        return Path(word)
+    try:
+        return Packages(Path("robot.yaml"), package_path=package_path).resolve(word)
+    except NotFound as error:
+        raise InvalidInput([Finding("USE101", error.message, hint=error.hint)]) from error
 
 
 def inspect(

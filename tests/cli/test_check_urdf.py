@@ -179,3 +179,23 @@ class TestCheckUrdf:
         rows = capsys.readouterr().out.splitlines()
         assert [row.split()[0] for row in rows[1:]] == [check.code for check in CHECKS]
         assert all(" ".join(check.reason.split()) in row for check, row in zip(CHECKS, rows[1:], strict=True))
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_description_may_be_named_by_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "places" / "arms").mkdir(parents=True)
+    (tmp_path / "places" / "arms" / "good.urdf").write_text(GOOD)
+    named = ["check-urdf", "package://arms/good.urdf"]
+    assert main([*named, "--package-path", "places"]) == 0
+    capsys.readouterr()
+    assert main(named) == 4
+    assert "package 'arms' is not found" in capsys.readouterr().err
+    monkeypatch.chdir(tmp_path / "places")
+    assert main(named) == 0
+    monkeypatch.chdir(tmp_path)
+    capsys.readouterr()
+    assert main(["check-urdf", "package://arms/god.urdf", "--package-path", "places"]) == 4
+    told = capsys.readouterr().err
+    assert "'package://arms/god.urdf' is not found" in told and "did you mean 'good.urdf'?" in told
