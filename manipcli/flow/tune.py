@@ -26,6 +26,7 @@ from manipcli.spec import load
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
+from manipcli.spec.other_controllers import ComputedTorqueSpec
 from manipcli.spec.resolved import as_written
 
 if TYPE_CHECKING:
@@ -147,11 +148,16 @@ class _Tuner:
                     velocities += [(name, joint) for joint in spec.joints]
                 else:
                     self.notes += (f"{name}: its interface is {', '.join(spec.interfaces)}, which needs no gains",)
+            elif isinstance(spec, ComputedTorqueSpec):
+                self.notes += (
+                    f"{name}: the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` give them",
+                )
             elif spec.interfaces:
                 self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
         if not efforts and not velocities:
             message = "no controller has a loop to propose gains for"
-            raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"))])
+            hint = "; ".join(self.notes) or None
+            raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"), hint=hint)])
         return self._of_efforts(efforts) + self._of_velocities(velocities)
 
     def _of_efforts(self, loops: list[tuple[str, str, bool]]) -> tuple[Tuned, ...]:

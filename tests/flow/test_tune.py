@@ -227,8 +227,15 @@ def test_the_chart_has_a_panel_a_controller(arm: Tuning) -> None:
 def test_what_has_no_loop_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="'elbow' has no loop"):
         tune(*pendulum(tmp_path), Wish(5.0, 1.0, 1e-3), joints=["elbow"])
-    with pytest.raises(InvalidInput, match="no controller has a loop"):
+    with pytest.raises(InvalidInput, match="no controller has a loop") as refused:
         tune(*pendulum(tmp_path, control="command_interface: position"), Wish(5.0, 1.0, 1e-3))
+    assert refused.value.findings[0].hint == "c: its interface is position, which needs no gains"
+    robot, controllers = pendulum(tmp_path)
+    controllers.write_text("controllers:\n  c: {type: computed_torque, joints: [hinge], bandwidth: 5 Hz}\n")
+    with pytest.raises(InvalidInput, match="no controller has a loop") as refused:
+        tune(robot, controllers, Wish(5.0, 1.0, 1e-3))
+    needs = "c: the type computed_torque needs no gains, its `bandwidth` and `damping_ratio` give them"
+    assert refused.value.findings[0].hint == needs
     robot, controllers = pendulum(tmp_path)
     controllers.write_text(controllers.read_text().replace("hinge", "hing"))
     with pytest.raises(InvalidInput, match=r"joint 'hing' is not in robot 'one'"):
