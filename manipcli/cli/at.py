@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import Format, LogFile
-from manipcli.core.errors import ExitCode
+from manipcli.cli.options import Format, LogFile, seconds
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.text import did_you_mean, shorten
 
 
 def at(
     log: LogFile,
     time: Annotated[
-        str, typer.Argument(metavar="T", help="From the beginning of the log: 3.2, '3.2 s', 250ms.", show_default=False)
+        str,
+        typer.Argument(
+            metavar="T",
+            help="From the beginning of the log: 3.2, '3.2 s', 250ms; or a step, as it ends.",
+            show_default=False,
+        ),
     ],
     *,
     format_: Format = "text",
@@ -23,10 +30,30 @@ def at(
 
     Any ROS 2 log will do, as far as it goes.
     """
-    from manipcli.cli.options import seconds
     from manipcli.flow.moment import moment
     from manipcli.report.moment import render_json, render_text
 
-    found = moment(log, seconds(time))
+    found = moment(log, _when(log, time))
     console.result(render_json(found) if format_ == "json" else render_text(found))
     return ExitCode.PASSED
+
+
+def _when(log: Path, word: str) -> float:
+    """[s] A time, or the end of a step.
+
+    Raises:
+        InvalidInput: it is neither.
+    """
+    try:
+        return seconds(word)
+    except InvalidInput:
+        from manipcli.flow.moment import step_ends
+
+        ends = step_ends(log)
+        if word in ends:
+            return ends[word]
+        hint = did_you_mean(word, ends, kind="steps")
+        if hint is None:
+            raise
+        message = f"'{shorten(word)}' is neither a time nor a step of this log"
+        raise InvalidInput([Finding("USE050", message, hint=hint)]) from None

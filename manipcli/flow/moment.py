@@ -11,11 +11,12 @@ import numpy.typing as npt
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Transform
 from manipcli.flow.log import URDF
+from manipcli.judge.steps import step_outcomes
 from manipcli.model.moments import ROUNDING
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
-from manipcli.record.faults import LEFT_OUT, Thinned
+from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
 from manipcli.record.inventory import Inventory, inventory
 from manipcli.record.messages import WORLD
 from manipcli.record.reading import open_recording
@@ -42,6 +43,24 @@ def moment(path: Path, time: float) -> Moment:
         return _ours(path, time)
     except Thinned:
         return _others(path, found, time, why=LEFT_OUT)
+
+
+def step_ends(path: Path) -> dict[str, float]:
+    """Until when [s] each step of a log is on: one tick before the next begins, or up to the end of the log.
+
+    Raises:
+        InvalidInput: the file is no log, or is damaged.
+    """
+    end = inventory(path).duration
+    try:
+        recording = open_recording(path)
+    except BadRecording:  # manipcli did not write it: it tells of no steps
+        return {}
+    return {
+        one.id: end if one.ended is None else max(one.started, round(one.ended - recording.period, 9))
+        for one in step_outcomes(recording, interrupted=False)
+        if one.started is not None
+    }
 
 
 def _ours(path: Path, time: float) -> Moment:

@@ -129,6 +129,18 @@ def test_at_tells_joints_bodies_and_the_step(log: Path, capsys: pytest.CaptureFi
         assert main(["at", str(log), word]) == 4
 
 
+def test_at_takes_a_step_as_it_ends(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = read_recording(log)
+    ended = {one.step: one.time for one in recording.events if one.kind == "step_ended"}
+    for step in ("move_1", "wait_1"):
+        assert main(["at", str(log), step, "--format", "json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert found["step"] == step
+        assert found["time"] == pytest.approx(ended[step] - recording.period, abs=1e-6)
+    assert main(["at", str(log), "mvoe_1"]) == 4
+    assert "did you mean 'move_1'?" in capsys.readouterr().err
+
+
 def test_somebody_else_s_log_is_told_as_far_as_it_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Two publishers of joints and one frame, in wall time, by the rosbags library; a description with a slide."""
     store = get_typestore(Stores.ROS2_JAZZY)
