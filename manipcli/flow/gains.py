@@ -30,7 +30,7 @@ from manipcli.core.geometry import Array
 from manipcli.core.text import digits
 from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import RINGING, drive_doubts, driven_joints
-from manipcli.flow.grips import strained, too_light, too_soft, too_swift, unheeded
+from manipcli.flow.grips import strained, too_heavy, too_light, too_soft, too_swift, unheeded
 from manipcli.flow.hinges import hinged
 from manipcli.flow.load import Task
 from manipcli.flow.modelled import modelled_doubts, modelled_joints
@@ -79,6 +79,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
     if plan is not None:
         found += strained(task, plan)
         found += too_light(task, plan)
+        found += too_heavy(task, plan)
         found += too_soft(task, plan)
         found += unheeded(task, plan)
         found += hinged(task, plan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Iterator
 from typing import Final
@@ -27,6 +28,12 @@ LIGHT: Final = 740.0
 0.4 mm up to 3500 N/kg, and by 1.5 mm at 7000; three by 0.4 mm at 400 N/kg, by 2 to 3 mm from 800 on."""
 MUCH: Final = 1.1
 """So many times the force that is asked, and a hand that cannot be told it is told of."""
+CLEARLY: Final = 0.7
+"""Friction that carries less than this share of a weight is told: a grip may press somewhat harder than asked."""
+LEVEL: Final = 0.1
+"""A jaw whose direction climbs less than this carries by friction alone."""
+LIFTED: Final = 5e-3
+"""[m] from which on what is held no longer rests."""
 NUDGE: Final = 1e-4
 """[rad or m] by which a finger is moved to see how its parts move."""
 
@@ -100,6 +107,66 @@ def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
                 hint = f"a force below {digits(LIGHT * mass)} N, or more mass: the contact solver of the engine "
                 hint += "leaves errors that move light things between heavy ones"
                 yield Finding("TASK239", message, task.file.place("steps", k), hint, "warning")
+
+
+def too_heavy(task: Task, plan: Plan) -> Iterator[Finding]:
+    """What is lifted between two level jaws that slide, where their friction, 2 mu F, is clearly less than its weight.
+
+    Of hands of more fingers, and of jaws that close from below, nothing is said: those also hold by their form.
+    """
+    gravity = task.scene.gravity
+    g = float(np.linalg.norm(gravity))
+    if not g:
+        return
+    for k, step in enumerate(plan.steps):
+        end = step.plan.end
+        for grip in (motion.grip for motion in step.plan.motions):
+            if grip is None or grip.force is None or end.carried is None:
+                continue
+            body = task.scene.body(end.carried.body)
+            carrying = [one.plan.end for one in plan.steps[k:]]
+            carrying = list(itertools.takewhile(lambda one: one.carried is not None, carrying))
+            heights = [-float(plan.planner.body_pose(one, body.name).p @ gravity) / g for one in carrying]
+            if max(heights) < heights[0] + LIFTED or not _between_jaws(plan.planner, end, grip.joints, gravity / g):
+                continue
+            force = min(_holds(task, name, grip.force) for name in grip.joints)
+            friction = body.friction * task.robot.friction
+            carried, weight = 2.0 * friction * force, body.mass * g
+            if carried < CLEARLY * weight:
+                message = f"step '{step.id}': two fingers with {force:.3g} N and a friction of {friction:.3g} carry "
+                message += f"{carried:.3g} N; '{body.name}' of {readable(body.mass, 'kg')} weighs {weight:.3g} N"
+                takes = (
+                    f", it takes more than {0.5 * weight / friction:.3g} N a finger or more friction"
+                    if friction
+                    else ""
+                )
+                yield Finding("TASK241", message, task.file.place("steps", k), f"it will slip{takes}", "warning")
+
+
+def _holds(task: Task, name: str, force: float) -> float:
+    """[N] of a finger that slides: commanded by position it is all that it has, else no more than is asked."""
+    specs = [
+        one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec) and name in one.joints
+    ]
+    by_position = any(one.command_interface == "position" for one in specs)
+    return _most(task, name) if by_position else min(force, _most(task, name))
+
+
+def _between_jaws(planner: Planner, end: Situation, joints: tuple[str, ...], down: Array) -> bool:
+    """Whether two links that slide, level and against each other, touch what is carried, and nothing else does."""
+    robot, kinematics = planner.robot, planner.kinematics
+    if end.carried is None or any(robot.joint(name).type != "prismatic" for name in joints):
+        return False
+    hits = planner.grasping(end, end.carried.body).every(end.position)
+    links = [part.removeprefix("robot/") for hit in hits for part in (hit.a, hit.b) if part.startswith("robot/")]
+    if len(links) != 2 or not set(links) <= moved_links(robot, joints):
+        return False
+    q = np.array(end.position)
+    q[list(robot.indices(joints))] += NUDGE
+    nudged = with_mimics(robot, q)
+    ways = [kinematics.forward(nudged, link).p - kinematics.forward(end.position, link).p for link in links]
+    one, other = (way / np.linalg.norm(way) for way in ways)
+    return abs(float(one @ down)) < LEVEL and float(one @ other) < LEVEL - 1.0
 
 
 def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:

@@ -141,3 +141,22 @@ def test_a_hand_on_the_position_interface_is_told_that_no_force_is_its_own(pick:
     assert found.hint == ("command it by effort, or limit that (robot file, limits.panda_finger_joint1.effort: 2.1)")
     assert gain_findings(load_task(pick, overrides=[f"{force}=1 N", f"{limit}=2.1"])) == ()
     assert gain_findings(load_task(pick, overrides=[f"{force}=10 N"])) == ()
+
+
+@pytest.mark.slow
+def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
+    """Two fingers with 7 N and 0.9 carry 12.6 N: 1.28 kg; told is what weighs more than that by 1 / 0.7, 1.83 kg."""
+    mass = "scene.block.mass"
+    assert gain_findings(load_task(pick, overrides=[f"{mass}=5 kg"])) == (), "it is not lifted"
+    pick.write_text(pick.read_text(encoding="utf-8") + "  - lift: {object: block, by: 10 cm}\n", encoding="utf-8")
+    assert gain_findings(load_task(pick, overrides=[f"{mass}=1.8 kg"])) == ()
+    (found,) = gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
+    assert (found.code, found.severity) == ("TASK241", "warning")
+    assert found.message == (
+        "step 'pick_1': two fingers with 7 N and a friction of 0.9 carry 12.6 N; 'block' of 1.9 kg weighs 18.6 N"
+    )
+    assert found.hint == "it will slip, it takes more than 10.4 N a finger or more friction"
+    run = run_task(pick, overrides=[f"{mass}=1.9 kg"], log=pick.with_suffix(".mcap"), force=True)
+    assert "it slipped" in str(run.verdict)
+    assert gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "scene.block.friction=1.4"])) == ()
+    assert gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "simulation.gravity=[0, 0, -1.62]"])) == ()
