@@ -6,11 +6,14 @@ inside the root of a package that was asked for by name. Links are followed befo
 
 from __future__ import annotations
 
+import difflib
 import importlib.util
 import os
+import pkgutil
 import re
 import stat
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -20,6 +23,8 @@ from manipcli.model.package_xml import package_name, packages_below
 
 LEVELS_ABOVE = 5
 """How many folders above a description are looked at for a folder of a package's name."""
+ALIKE = 0.85
+"""Likeness from which on a package was meant: among all that is installed, less finds any name."""
 SUBFOLDERS = frozenset({"urdf", "xacro", "robots", "robot", "description", "cfg"})
 """A description in such a folder belongs to the folder above it."""
 
@@ -123,9 +128,11 @@ class Packages:
             self._found[name] = found.resolve()
             return self._found[name]
         places = ", ".join(shown_path(place) for place in searched)
+        near = difflib.get_close_matches(name, [*(self._below or ()), *_installed_names()], n=1, cutoff=ALIKE)
+        meant = f"did you mean {any_of(near)}? else " if near else ""
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
-            hint=f"add the folder that holds '{name}' with --package-path DIR",
+            hint=f"{meant}add the folder that holds '{name}' with --package-path DIR",
         )
 
     def _candidates(self, name: str) -> list[Path]:
@@ -290,6 +297,12 @@ def _of_another_part(name: str, other: str) -> bool:
         others.pop()
     numbered = (re.sub(r"\D", "", each) for each in (name, other))
     return len(set(numbered)) > 1 or not nearest("_".join(mine), ["_".join(others)])
+
+
+@cache
+def _installed_names() -> tuple[str, ...]:
+    """Of all Python packages, without importing them."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules() if module.ispkg))
 
 
 def _installed_package(name: str) -> Path | None:

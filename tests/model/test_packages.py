@@ -182,6 +182,25 @@ def test_an_installed_python_package_is_found_without_importing_it(tmp_path: Pat
     assert Packages(path).portable(path) == "package://pybullet_data/franka_panda/panda.urdf"
 
 
+def test_the_package_that_was_meant_is_named(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+
+    def hint(name: str) -> str | None:
+        with pytest.raises(NotFound) as refused:
+            packages.resolve(f"package://{name}/meshes/a.stl")
+        return refused.value.hint
+
+    assert hint("pybulet_data") == (
+        "did you mean 'pybullet_data'? else add the folder that holds 'pybulet_data' with --package-path DIR"
+    )
+    assert hint("my_robot") == "add the folder that holds 'my_robot' with --package-path DIR"
+    (tree / "other").mkdir()
+    (tree / "other" / "package.xml").write_text("<package><name>my_robots</name></package>")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tree))
+    packages = Packages(tree / "arm" / "urdf" / "arm.urdf")
+    assert (hint("my_robot") or "").startswith("did you mean 'my_robots'?")
+
+
 def test_an_unknown_package_tells_where_it_was_looked_for(tree: Path) -> None:
     with pytest.raises(NotFound) as caught:
         Packages(tree / "arm" / "urdf" / "arm.urdf").root("gripper")
