@@ -217,7 +217,8 @@ def _told(
     if "message" in context:
         return str(context["message"]), str(context.get("hint", "")) or None
     if kind == "literal_error":
-        return _unknown_word(str(context.get("expected", "")), node)
+        what, hint = _unknown_word(str(context.get("expected", "")), node)
+        return what, hint or _described(_field(first, model), path)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _unknown_type(context, node)
     if kind in ("too_short", "too_long"):

@@ -33,7 +33,7 @@ class Move(Model):
 
     to: str | dict[str, JointValue] | None = None
     pose: PoseSpec | None = None
-    path: Literal["free", "linear"] = "free"
+    path: Literal["free", "linear"] = Field("free", description="`linear`: straight. Default `free`.")
     speed: Annotated[float, Field(gt=0, le=1)] = 1.0
 
 
@@ -268,6 +268,12 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
             "path: liner",
             "t.yaml:9:18: error[TASK203]: steps[0].move.path: expected one of 'free' or 'linear', not 'liner'",
             "did you mean 'linear'?",
+        ),
+        (
+            "to: home",
+            "path: arc",
+            "t.yaml:9:18: error[TASK203]: steps[0].move.path: expected one of 'free' or 'linear', not 'arc'",
+            "path: `linear`: straight. Default `free`.",
         ),
         (
             "to: start",
