@@ -1,13 +1,17 @@
-"""Whether the tool frame lies in the hand as steps take it to: +z out of the hand, y the way in which it closes."""
+"""Whether the tool frame lies in the hand as steps take it to: +z out of the hand, y the way in which it closes; and
+whether a body fits between the open fingers."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.model.posture import with_mimics
 from manipcli.plan.hand import moved_links
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import ROBOT, Planner
 from manipcli.plan.step import Situation
 
 ALONG = 0.5
@@ -19,6 +23,41 @@ BEHIND = 0.03
 LEAST = 2e-3
 """[m] Shorter ways have no direction."""
 _WRITE = "`tool: {link: ..., pose: {xyz: ..., rpy: ...}}` in the robot file"
+
+
+def too_wide(planner: Planner, situation: Situation, body: str, opened: str, poses: Sequence[Transform]) -> str | None:
+    """A hint where fingers on both sides of the hand, in its pose `opened`, are in the body wherever the tool is to be.
+
+    Args:
+        planner, situation: whose robot, and where everything is.
+        body: what is to be taken.
+        opened: the pose of the hand.
+        poses: `X_WT` that are tried.
+    """
+    robot, q = planner.robot, _posed(planner, situation, opened)
+    X_WT = planner.solver.forward(q)
+    side = {
+        ROBOT + link: bool((X_WT.inverse() @ planner.kinematics.forward(q, link)).p[1] > 0.0)
+        for link in moved_links(robot, planner.gripper_joints)
+    }
+    k = [one.name for one in planner.scene.movable].index(body)
+    for goal in poses:
+        X_WO = X_WT @ goal.inverse() @ situation.bodies[k]  # the body brought to the hand, which needs no arm
+        there = replace(situation, bodies=(*situation.bodies[:k], X_WO, *situation.bodies[k + 1 :]))
+        hits = planner.grasping(there, body).every(q)
+        if len({side[name] for hit in hits for name in (hit.a, hit.b) if name in side}) < 2:
+            return None
+    return f"'{body}' is wider than the hand opens in its pose '{opened}'"
+
+
+def _posed(planner: Planner, situation: Situation, posture: str) -> Array:
+    """(n) The positions of all joints with the hand in a pose of the robot."""
+    robot = planner.robot
+    pose, q = robot.pose(posture), np.array(situation.position)
+    for name, value in zip(pose.joints, pose.positions, strict=True):
+        if name in planner.gripper_joints:
+            q[robot.indices((name,))] = value
+    return np.asarray(with_mimics(robot, q))
 
 
 def misplaced(planner: Planner, situation: Situation, opened: str, closed: str) -> str | None:
@@ -36,11 +75,7 @@ def misplaced(planner: Planner, situation: Situation, opened: str, closed: str) 
 
     def seen(posture: str) -> tuple[Array, Array]:
         """(k, 3) the fingers' shapes, and (3,) the last link of the arm, in the tool frame."""
-        pose, q = robot.pose(posture), np.array(situation.position)
-        for name, value in zip(pose.joints, pose.positions, strict=True):
-            if name in planner.gripper_joints:
-                q[robot.indices((name,))] = value
-        q = np.asarray(with_mimics(robot, q))
+        q = _posed(planner, situation, posture)
         X_TW = planner.solver.forward(q).inverse()
         shapes = [
             (X_TW @ planner.kinematics.forward(q, link.name) @ shape.X_LS).p

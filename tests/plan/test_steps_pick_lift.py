@@ -206,12 +206,14 @@ def test_a_ball_and_what_is_too_wide_are_not_taken_higher(bench: Make) -> None:
     refusal = bench("panda", scene=scene).refused("pick", {"object": "ball", "approach": {"from": "top"}})
     assert "36 ways tried" in refusal.cause
     assert "`open: ...`" in refusal.hint
+    assert "'ball' is wider than the hand opens in its pose 'open'; or move 'ball'" in refusal.hint
 
 
 def test_a_grasp_that_the_hand_cannot_take_asks_for_another_height(bench: Make) -> None:
     refusal = bench("panda").refused("pick", {"object": "block", "approach": {"from": "top"}, "grasp": {"height": 0}})
     assert "overlap" in refusal.cause
     assert "`grasp: {height: ...}`" in refusal.hint
+    assert "wider" not in refusal.hint
 
 
 def test_only_a_pick_speaks_of_its_height_where_closing_fingers_have_no_room(bench: Make) -> None:

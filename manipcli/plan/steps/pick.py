@@ -27,7 +27,7 @@ from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import Speed
-from manipcli.plan.tool_axes import misplaced
+from manipcli.plan.tool_axes import misplaced, too_wide
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 
@@ -124,10 +124,13 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         goals += [(bottom + share * body.size[2], R_WT) for share in HIGHER for R_WT in from_above]
     out_of_reach: dict[int, NotPlannable | None] = {}
 
+    def tool_at(k: int) -> Transform:
+        height, R_WT = goals[k]
+        return Transform.of(xyz=X_WO.apply([body.centre[0], body.centre[1], height]), R=R_WT)
+
     def attempt(candidate: tuple[int, float, float]) -> StepPlan:
         k, distance, slope = candidate
-        height, R_WT = goals[k]
-        X_WG = Transform.of(xyz=X_WO.apply([body.centre[0], body.centre[1], height]), R=R_WT)
+        X_WG = tool_at(k)
         draft = Draft(planner, situation)
         if k not in out_of_reach:  # said once for all distances and slopes, which it does not depend on
             out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
@@ -160,7 +163,8 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
     except NotPlannable as refusal:
         amiss = misplaced(planner, situation, spec.open, spec.grasp.posture)
-        hints = [hint for hint in (amiss, refusal.hint) if hint is not None]
+        wide = too_wide(planner, situation, spec.object, spec.open, [tool_at(k) for k in range(len(turns))])
+        hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
         raise NotPlannable(refusal.cause, hint="; or ".join(hints) or None) from refusal
 
 
