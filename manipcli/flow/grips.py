@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from manipcli.model.posture import with_mimics
 from manipcli.plan.hand import fingers, moved_links
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation
-from manipcli.spec.controllers import GainsSpec, GripperSpec
+from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface
 
 ENOUGH: Final = 1.01
 """A force that is asked beyond this share of what there is is not met."""
@@ -31,11 +32,31 @@ MUCH: Final = 1.1
 CLEARLY: Final = 0.7
 """Friction that carries less than this share of a weight is told: a grip may press somewhat harder than asked."""
 LEVEL: Final = 0.1
-"""A jaw whose direction climbs less than this carries by friction alone."""
+"""A finger whose way climbs less than this carries by friction alone."""
 LIFTED: Final = 5e-3
 """[m] from which on what is held no longer rests."""
 NUDGE: Final = 1e-4
 """[rad or m] by which a finger is moved to see how its parts move."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Grasp:
+    """The hand is to close with `force` [N] in a step, number `index`, which ends in `end`; `target`: of its joints."""
+
+    index: int
+    step: str
+    end: Situation
+    force: float
+    joints: tuple[str, ...]
+    target: Array
+
+
+def _grasps(plan: Plan) -> Iterator[_Grasp]:
+    """Every one for which a force is known."""
+    for k, step in enumerate(plan.steps):
+        for grip in (motion.grip for motion in step.plan.motions):
+            if grip is not None and grip.force is not None:
+                yield _Grasp(k, step.id, step.plan.end, grip.force, grip.joints, grip.target)
 
 
 def too_swift(task: Task) -> Iterator[Finding]:
@@ -55,14 +76,13 @@ def too_swift(task: Task) -> Iterator[Finding]:
 
 def strained(task: Task, plan: Plan) -> Iterator[Finding]:
     """Grasps with more force than a finger that slides can press with, also once it is as weak as `too_light` asks."""
-    for k, step in enumerate(plan.steps):
-        grips = [motion.grip for motion in step.plan.motions if motion.grip is not None]
-        for force, name in ((grip.force, name) for grip in grips if grip.force is not None for name in grip.joints):
+    for one in _grasps(plan):
+        for name in one.joints:
             most = _most(task, name)
-            if _sensible(task, step.plan.end, force) > most:
-                message = f"step '{step.id}': a grasp with {force:.3g} N; {name} presses with {most:.3g} N at most"
+            if _sensible(task, one.end, one.force) > most:
+                message = f"step '{one.step}': a grasp with {one.force:.3g} N; {name} presses with {most:.3g} N at most"
                 hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
-                yield Finding("TASK238", message, task.file.place("steps", k), hint, "warning")
+                yield Finding("TASK238", message, task.file.place("steps", one.index), hint, "warning")
 
 
 def _most(task: Task, name: str) -> float:
@@ -95,70 +115,61 @@ def too_light(task: Task, plan: Plan) -> Iterator[Finding]:
     Its solver stops after a number of iterations, each of which carries an impulse from one finger through the object
     to the other: of two that are heavy beside what is between them, an error of their forces is left, and moves it.
     """
-    for k, step in enumerate(plan.steps):
-        carried = step.plan.end.carried
-        for grip in (motion.grip for motion in step.plan.motions):
-            if carried is None or grip is None or grip.force is None:
-                continue
-            mass = task.scene.body(carried.body).mass
-            if grip.force > LIGHT * mass:
-                message = f"step '{step.id}': {grip.force:.3g} N are much for '{carried.body}' of "
-                message += f"{readable(mass, 'kg')}: it may creep in the hand by millimetres"
-                hint = f"a force below {digits(LIGHT * mass)} N, or more mass: the contact solver of the engine "
-                hint += "leaves errors that move light things between heavy ones"
-                yield Finding("TASK239", message, task.file.place("steps", k), hint, "warning")
+    for one in _grasps(plan):
+        if one.end.carried is None:
+            continue
+        body = task.scene.body(one.end.carried.body)
+        if one.force > LIGHT * body.mass:
+            message = f"step '{one.step}': {one.force:.3g} N are much for '{body.name}' of "
+            message += f"{readable(body.mass, 'kg')}: it may creep in the hand by millimetres"
+            hint = f"a force below {digits(LIGHT * body.mass)} N, or more mass: the contact solver of the engine "
+            hint += "leaves errors that move light things between heavy ones"
+            yield Finding("TASK239", message, task.file.place("steps", one.index), hint, "warning")
 
 
 def too_heavy(task: Task, plan: Plan) -> Iterator[Finding]:
-    """What is lifted between two level jaws that slide, where their friction, 2 mu F, is clearly less than its weight.
+    """What is lifted between two level fingers that slide, where their friction, 2 mu F, is clearly less than its
+    weight.
 
-    Of hands of more fingers, and of jaws that close from below, nothing is said: those also hold by their form.
+    Of hands of more fingers, and of fingers that close from below, nothing is said: those also hold by their form.
     """
     gravity = task.scene.gravity
     g = float(np.linalg.norm(gravity))
     if not g:
         return
-    for k, step in enumerate(plan.steps):
-        end = step.plan.end
-        for grip in (motion.grip for motion in step.plan.motions):
-            if grip is None or grip.force is None or end.carried is None:
-                continue
-            body = task.scene.body(end.carried.body)
-            carrying = [one.plan.end for one in plan.steps[k:]]
-            carrying = list(itertools.takewhile(lambda one: one.carried is not None, carrying))
-            heights = [-float(plan.planner.body_pose(one, body.name).p @ gravity) / g for one in carrying]
-            if max(heights) < heights[0] + LIFTED or not _between_jaws(plan.planner, end, grip.joints, gravity / g):
-                continue
-            force = min(_holds(task, name, grip.force) for name in grip.joints)
-            friction = body.friction * task.robot.friction
-            carried, weight = 2.0 * friction * force, body.mass * g
-            if carried < CLEARLY * weight:
-                message = f"step '{step.id}': two fingers with {force:.3g} N and a friction of {friction:.3g} carry "
-                message += f"{carried:.3g} N; '{body.name}' of {readable(body.mass, 'kg')} weighs {weight:.3g} N"
-                takes = (
-                    f", it takes more than {0.5 * weight / friction:.3g} N a finger or more friction"
-                    if friction
-                    else ""
-                )
-                yield Finding("TASK241", message, task.file.place("steps", k), f"it will slip{takes}", "warning")
+    for one in _grasps(plan):
+        if one.end.carried is None:
+            continue
+        body = task.scene.body(one.end.carried.body)
+        ends = [step.plan.end for step in plan.steps[one.index :]]
+        carrying = itertools.takewhile(lambda end: end.carried is not None, ends)
+        heights = [-float(plan.planner.body_pose(end, body.name).p @ gravity) / g for end in carrying]
+        if max(heights) < heights[0] + LIFTED or not _between_two(plan.planner, one.end, one.joints, gravity / g):
+            continue
+        force = min(_holds(task, name, one.force) for name in one.joints)
+        friction = body.friction * task.robot.friction
+        carried, weight = 2.0 * friction * force, body.mass * g
+        if carried < CLEARLY * weight:
+            message = f"step '{one.step}': two fingers with {force:.3g} N and a friction of {friction:.3g} carry "
+            message += f"{carried:.3g} N; '{body.name}' of {readable(body.mass, 'kg')} weighs {weight:.3g} N"
+            hint = "it will slip"
+            if friction:
+                hint += f", it takes more than {0.5 * weight / friction:.3g} N a finger or more friction"
+            yield Finding("TASK241", message, task.file.place("steps", one.index), hint, "warning")
 
 
 def _holds(task: Task, name: str, force: float) -> float:
     """[N] of a finger that slides: commanded by position it is all that it has, else no more than is asked."""
-    specs = [
-        one for one in task.controllers.controllers.values() if isinstance(one, GripperSpec) and name in one.joints
-    ]
-    by_position = any(one.command_interface == "position" for one in specs)
-    return _most(task, name) if by_position else min(force, _most(task, name))
+    most = _most(task, name)
+    return most if name in _owners(task, "position") else min(force, most)
 
 
-def _between_jaws(planner: Planner, end: Situation, joints: tuple[str, ...], down: Array) -> bool:
+def _between_two(planner: Planner, end: Situation, joints: tuple[str, ...], down: Array) -> bool:
     """Whether two links that slide, level and against each other, touch what is carried, and nothing else does."""
     robot, kinematics = planner.robot, planner.kinematics
-    if end.carried is None or any(robot.joint(name).type != "prismatic" for name in joints):
+    if any(robot.joint(name).type != "prismatic" for name in joints):
         return False
-    hits = planner.grasping(end, end.carried.body).every(end.position)
-    links = [part.removeprefix("robot/") for hit in hits for part in (hit.a, hit.b) if part.startswith("robot/")]
+    links = sorted(part.removeprefix("robot/") for part in _touched(planner, end) if part.startswith("robot/"))
     if len(links) != 2 or not set(links) <= moved_links(robot, joints):
         return False
     q = np.array(end.position)
@@ -175,35 +186,27 @@ def too_soft(task: Task, plan: Plan) -> Iterator[Finding]:
     A finger of one joint, alone or with others that mimic it, gives p |q_posture - q_object| of effort, and by virtual
     work that over `_closing` of force. It is asked for what `too_light` and `strained` leave of the force.
     """
-    owners = {
-        joint: (name, spec)
-        for name, spec in task.controllers.controllers.items()
-        if isinstance(spec, GripperSpec) and spec.command_interface == "effort"
-        for joint in spec.joints
-    }
-    for step in plan.steps:
-        end = step.plan.end
-        for grip in (motion.grip for motion in step.plan.motions):
-            if grip is None or grip.force is None or end.carried is None:
+    owners = _owners(task, "effort")
+    for one in _grasps(plan):
+        if one.end.carried is None:
+            continue
+        touched = _touched(plan.planner, one.end)
+        for name, target in zip(one.joints, one.target, strict=True):
+            if name not in owners or (one.joints.index(name),) not in fingers(task.robot, one.joints):
                 continue
-            hits = plan.planner.grasping(end, end.carried.body).every(end.position)
-            touched = {part for hit in hits for part in (hit.a, hit.b)}
-            for name, target in zip(grip.joints, grip.target, strict=True):
-                if name not in owners or (grip.joints.index(name),) not in fingers(task.robot, grip.joints):
-                    continue
-                controller, spec = owners[name]
-                gains = spec.gains.get(name, GainsSpec())
-                closing = _closing(plan.planner, end, name, touched)
-                way = abs(float(target) - float(end.position[task.robot.joint_names.index(name)]))
-                asked = min(_sensible(task, end, grip.force), _most(task, name))
-                if not closing or not way or gains.i or asked <= ENOUGH * gains.p * way / closing:
-                    continue
-                given = f"p {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
-                message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; {given}"
-                than = "that" if asked == grip.force else f"{asked:.3g} N"
-                hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
-                place = task.controllers_file.place("controllers", controller, "gains", name)
-                yield Finding("CTRL168", message, place, hint, "warning")
+            controller, spec = owners[name]
+            gains = spec.gains.get(name, GainsSpec())
+            closing = _closing(plan.planner, one.end, name, touched)
+            way = abs(float(target) - float(one.end.position[task.robot.joint_names.index(name)]))
+            asked = min(_sensible(task, one.end, one.force), _most(task, name))
+            if not closing or not way or gains.i or asked <= ENOUGH * gains.p * way / closing:
+                continue
+            given = f"p {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
+            message = f"{name}: step '{one.step}' grasps with {one.force:.3g} N; {given}"
+            than = "that" if asked == one.force else f"{asked:.3g} N"
+            hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
+            place = task.controllers_file.place("controllers", controller, "gains", name)
+            yield Finding("CTRL168", message, place, hint, "warning")
 
 
 def unheeded(task: Task, plan: Plan) -> Iterator[Finding]:
@@ -212,42 +215,50 @@ def unheeded(task: Task, plan: Plan) -> Iterator[Finding]:
     Such a motor follows its reference with all the effort that it may have. The reference stops where a finger feels
     the force, and there it is within the object already: what the finger presses with is the limit of its effort.
     """
-    owners = {
-        joint: name
-        for name, spec in task.controllers.controllers.items()
-        if isinstance(spec, GripperSpec) and spec.command_interface == "position"
-        for joint in spec.joints
-    }
+    owners = _owners(task, "position")
     told: set[str] = set()
-    for step in plan.steps:
-        for grip in (motion.grip for motion in step.plan.motions):
-            if grip is None or grip.force is None:
+    for one in _grasps(plan):
+        for name in one.joints:
+            if name not in owners or name in told:
                 continue
-            for name in grip.joints:
-                if name not in owners or name in told:
-                    continue
-                shared = _effort_each(task, plan, step.plan.end, grip.joints, name)
-                limit = task.robot.joint(name).limits.effort or math.inf
-                if not shared or limit / shared <= MUCH * grip.force:
-                    continue
-                told.add(name)
-                given = f"{limit / shared:.3g} N, its effort limit" if limit < math.inf else "no limit of its effort"
-                message = f"{name}: step '{step.id}' grasps with {grip.force:.3g} N; commanded by position it presses "
-                message += f"with {given}: `force` only says at which contact force it stops"
-                least = f"limits.{name}.effort: {digits(1.05 * shared * grip.force)}"
-                hint = f"command it by effort, or limit that (robot file, {least})"
-                place = task.controllers_file.place("controllers", owners[name], "command_interface")
-                yield Finding("CTRL171", message, place, hint, "warning")
+            shared = _effort_each(task, plan, one, name)
+            limit = task.robot.joint(name).limits.effort or math.inf
+            if not shared or limit / shared <= MUCH * one.force:
+                continue
+            told.add(name)
+            given = f"{limit / shared:.3g} N, its effort limit" if limit < math.inf else "no limit of its effort"
+            message = f"{name}: step '{one.step}' grasps with {one.force:.3g} N; commanded by position it presses "
+            message += f"with {given}: `force` only says at which contact force it stops"
+            least = f"limits.{name}.effort: {digits(1.05 * shared * one.force)}"
+            hint = f"command it by effort, or limit that (robot file, {least})"
+            place = task.controllers_file.place("controllers", owners[name][0], "command_interface")
+            yield Finding("CTRL171", message, place, hint, "warning")
 
 
-def _effort_each(task: Task, plan: Plan, end: Situation, joints: tuple[str, ...], name: str) -> float:
+def _effort_each(task: Task, plan: Plan, grasp: _Grasp, name: str) -> float:
     """The effort of a joint [N m or N] for each newton of its finger; 0 where that is not known."""
     if task.robot.joint(name).type == "prismatic":
         return _shared(task, name)
-    if end.carried is None or (joints.index(name),) not in fingers(task.robot, joints):
+    if grasp.end.carried is None or (grasp.joints.index(name),) not in fingers(task.robot, grasp.joints):
         return 0.0
-    hits = plan.planner.grasping(end, end.carried.body).every(end.position)
-    return _closing(plan.planner, end, name, {part for hit in hits for part in (hit.a, hit.b)})
+    return _closing(plan.planner, grasp.end, name, _touched(plan.planner, grasp.end))
+
+
+def _owners(task: Task, interface: Interface) -> dict[str, tuple[str, GripperSpec]]:
+    """By joint: the gripper controller that commands it so, and its name."""
+    return {
+        joint: (name, spec)
+        for name, spec in task.controllers.controllers.items()
+        if isinstance(spec, GripperSpec) and spec.command_interface == interface
+        for joint in spec.joints
+    }
+
+
+def _touched(planner: Planner, end: Situation) -> set[str]:
+    """The parts that touch what is carried, and itself; empty where nothing is."""
+    if end.carried is None:
+        return set()
+    return {part for hit in planner.grasping(end, end.carried.body).every(end.position) for part in (hit.a, hit.b)}
 
 
 def _closing(planner: Planner, situation: Situation, name: str, touched: Collection[str]) -> float:
