@@ -9,7 +9,7 @@ from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
-from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
+from manipcli.core.units import NUMBER, TIME, UnitError, to_si
 from manipcli.judge.steps import step_outcomes
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
@@ -307,15 +307,12 @@ def _time(text: str | None, logs: Sequence[_Log], *, begin: bool) -> float:
             if step.name == text:
                 return step.start if begin else step.end
     try:
-        quantity = parse_quantity(text)
+        return to_si(text, NUMBER, TIME)
     except UnitError:
-        quantity = None
-    if quantity is not None and quantity.dimension in (NUMBER, TIME):
-        return quantity.value
-    steps = [step.name for one in logs for step in one.steps]
-    hint = did_you_mean(text, steps, kind="steps") or "these logs have no steps"
-    message = f"{'--from' if begin else '--to'}: '{shorten(text)}' is neither a time nor a step"
-    raise InvalidInput([Finding("PLOT003", message, hint=hint)])
+        steps = [step.name for one in logs for step in one.steps]
+        hint = did_you_mean(text, steps, kind="steps") or "these logs have no steps"
+        message = f"{'--from' if begin else '--to'}: '{shorten(text)}' is neither a time nor a step"
+        raise InvalidInput([Finding("PLOT003", message, hint=hint)]) from None
 
 
 def _short_names(logs: Sequence[Path]) -> list[str]:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean, shorten
-from manipcli.core.units import NUMBER, TIME, UnitError, parse_quantity
+from manipcli.core.units import NUMBER, TIME, UnitError, to_si
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
 from manipcli.replay.drawing import draw
@@ -108,18 +108,17 @@ def moment(playback: Playback, text: str) -> float:
     if text in ("start", "end"):
         return playback.start if text == "start" else playback.end
     try:
-        quantity = parse_quantity(text)
+        time = to_si(text, NUMBER, TIME)
     except UnitError:
-        quantity = None
-    if quantity is None or quantity.dimension not in (NUMBER, TIME):
         hint = did_you_mean(text, [*(step.id for step in playback.steps), "start", "end"], kind="steps")
-        raise InvalidArgument("REPLAY011", f"'{shorten(text)}' is neither a time nor a step of this run", hint=hint)
+        message = f"'{shorten(text)}' is neither a time nor a step of this run"
+        raise InvalidArgument("REPLAY011", message, hint=hint) from None
     # To the centisecond, as the run's end is shown.
-    if not playback.start - 0.005 <= quantity.value <= playback.end + 0.005:
+    if not playback.start - 0.005 <= time <= playback.end + 0.005:
         raise InvalidArgument(
-            "REPLAY012", f"{quantity.value:g} s lies outside of the run: {playback.start:g} to {playback.end:g} s"
+            "REPLAY012", f"{time:g} s lies outside of the run: {playback.start:g} to {playback.end:g} s"
         )
-    return quantity.value
+    return time
 
 
 def telling(playback: Playback, step: PlaybackStep) -> float:
