@@ -8,8 +8,8 @@ from typing import Annotated, Final
 import typer
 
 from manipcli.cli import console
-from manipcli.cli.options import AllowOutside, Format, PackagePath
-from manipcli.core.errors import ExitCode
+from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed
+from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
 """Findings that say that a file is not there, or cannot be read."""
@@ -20,27 +20,42 @@ def check(
         list[Path], typer.Argument(metavar="FILE...", help="Task, robot and controllers files.", show_default=False)
     ],
     *,
+    seed: Seed = None,
+    sample: Sample = None,
+    overrides: Overrides = None,
     format_: Format = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
     """Check files: all findings, nothing simulated.
 
-    The kind (task, robot, controllers) is read from each file. A task with controllers on efforts is planned, and their
-    gains are looked at over the plan; a step that cannot be planned is an error. A controllers file alone names no
-    robot: its joints and gains are compared with one where a task names both.
+    The kind (task, robot, controllers) is read from each file; --set, --seed and --sample are of the tasks among
+    them. A task with controllers on efforts is planned, and their gains are looked at over the plan; a step that cannot
+    be planned is an error. A controllers file alone names no robot: its joints and gains are compared with one where a
+    task names both.
     """
     from manipcli import pipeline
     from manipcli.report import json, text
 
-    findings = pipeline.check_files(tuple(files), package_path=tuple(package_path or ()), allow_outside=allow_outside)
+    findings = pipeline.check_files(
+        tuple(files),
+        overrides=tuple(overrides or ()),
+        seed=seed,
+        sample=sample,
+        package_path=tuple(package_path or ()),
+        allow_outside=allow_outside,
+    )
+    failed = any(finding.severity == "error" for finding in findings)
+    kinds = () if failed else [pipeline.kind_of(file) for file in files]
+    if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:
+        raise InvalidInput(
+            [Finding("USE052", "--set, --seed and --sample are of a task; there is none among the files")]
+        )
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings
     console.result(render(findings, names))
     if any(finding.code in UNREADABLE for finding in findings):
         return ExitCode.USAGE
-    failed = any(finding.severity == "error" for finding in findings)
-    kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if "controllers" in kinds and "task" not in kinds:
         console.talk("joints and gains of controllers were not compared with a robot: check a task that names both")
     return ExitCode.FAILED if failed else ExitCode.PASSED

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.describe import DESCRIPTIONS, inspect
 from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
+from manipcli.flow.load import Task
 from manipcli.flow.postures import posture_findings
 from manipcli.flow.robot_file import read_robot
+from manipcli.flow.sample import load_task
 from manipcli.flow.vocabulary import task_spec
 from manipcli.model.build_scene import SHAPES
 from manipcli.model.checks import CHECKS
@@ -25,24 +26,41 @@ from manipcli.spec.tree import Plain
 
 
 def check_files(
-    paths: Sequence[Path], *, package_path: Sequence[Path] = (), allow_outside: bool = False
+    paths: Sequence[Path],
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    sample: int | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
 ) -> tuple[Finding, ...]:
     """Every finding of every file, once; a task is checked with the robot and controllers files that it names.
 
     Args:
         paths: task, robot and controllers files, URDF and xacro.
+        overrides, seed, sample: of the tasks among them, as of `load_task`.
         package_path, allow_outside: where packages are, and whether a file may lie outside of them.
     """
-    return tuple(dict.fromkeys(finding for path in paths for finding in _findings(path, package_path, allow_outside)))
+
+    def of_task(path: Path) -> Task:
+        return load_task(
+            path, overrides=overrides, seed=seed, sample=sample, package_path=package_path, allow_outside=allow_outside
+        )
+
+    return tuple(
+        dict.fromkeys(finding for path in paths for finding in _findings(path, of_task, package_path, allow_outside))
+    )
 
 
-def _findings(path: Path, package_path: Sequence[Path], allow_outside: bool) -> tuple[Finding, ...]:
+def _findings(
+    path: Path, of_task: Callable[[Path], Task], package_path: Sequence[Path], allow_outside: bool
+) -> tuple[Finding, ...]:
     try:
         if path.suffix.lower() in DESCRIPTIONS:
             return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings
         kind = load.kind_of(path)
         if kind == "task":
-            task = load_task(path, package_path=package_path, allow_outside=allow_outside)
+            task = of_task(path)
             return (*task.findings, *gain_findings(task))
         if kind == "controllers":
             return load.load_controllers(path).findings
