@@ -81,11 +81,19 @@ class _Builder:
                     "TASK226",
                     f"'{a}' and '{b}' start {depth * 1e3:.1f} mm inside each other",
                     self._blamed([name for name in reversed(self.spec.scene) if name in (a, b)]),
-                    "move one of them; things that only touch are fine",
+                    self._apart(a, b),
                 )
         if self.findings:
             raise InvalidInput(self.findings)
         return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
+
+    def _apart(self, a: str, b: str) -> str:
+        """What keeps two bodies from starting inside each other."""
+        specs = [self.spec.scene[name] for name in (a, b) if name in self.spec.scene]
+        containers = {spec.inside for spec in specs}
+        if len(specs) == 2 and len(containers) == 1 and None not in containers:
+            return f"say where in '{specs[0].inside}', as `at: [1 cm, 0]`: it counts from the middle"
+        return "move one of them; things that only touch are fine"
 
     def _blamed(self, bodies: Sequence[str]) -> Loc:
         """Where an argument (`--set`) gave one of these a place or a shape; else the first of them."""
@@ -271,7 +279,7 @@ class _Builder:
         return Transform.of(xyz=(0.0, 0.0, -fall)) @ X_WO
 
     def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """On the floor of the other's hollow, in its middle or `at` a place, axes along the other's (turned by yaw)."""
+        """On the floor of the other's hollow, `at` and `yaw` as seen from its middle."""
         loc: Loc = ("scene", name, "inside")
         interior, shape = self.shapes[other].interior, self.shapes[name]
         if interior is None:
@@ -286,16 +294,15 @@ class _Builder:
         if lack > EXACT:
             self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for the inside of '{other}'", loc)
             return None
-        X_WS = X_WB @ interior.X_OS
-        x, y, _ = (0.0, 0.0, 0.0) if spec.at is None else X_WS.inverse().apply([*spec.at, 0.0])
+        x, y = spec.at or (0.0, 0.0)
         lack = _too_big(shape, spec.yaw, interior, x, y)
         if lack > EXACT:
-            hint = f"the middle of '{other}' is at [{X_WS.p[0]:g}, {X_WS.p[1]:g}] m"
+            hint = f"`at` counts from the middle of '{other}', along its axes"
             message = f"'{name}' would stand {digits(lack * 1e3)} mm outside of the hollow of '{other}'"
             self._error("TASK224", message, ("scene", name, "at"), hint)
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
-        return X_WS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        return X_WB @ interior.X_OS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
 
     # -- frames
 

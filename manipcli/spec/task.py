@@ -115,7 +115,7 @@ class BodySpec(Model):
     """One thing in the scene: exactly one shape key, one way to place it, and how it behaves in contact.
 
     Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
-    its middle or `at: [x, y]`.
+    its middle or `at: [x, y]` from there.
     """
 
     box: BoxSpec | None = Field(None, description="Shape: a solid box.")
@@ -128,9 +128,11 @@ class BodySpec(Model):
     pose: PoseSpec | None = Field(None, description="Where its frame starts, in the world.")
     rests_on: str | None = Field(None, description="The body that it stands on, which is not tilted; `at` says where.")
     at: tuple[Length, Length] | None = Field(
-        None, description="x, y in the world [m]: needed with `rests_on`, and with `inside` where not in its middle."
+        None,
+        description="x, y [m]: of `rests_on`, which needs it, in the world; of `inside` from its middle, "
+        "along its axes.",
     )
-    yaw: Turn = Field(0.0, description="About the world's z axis [rad]. Default 0.")
+    yaw: Turn = Field(0.0, description="About the world's z axis [rad]; with `inside` from the container's. Default 0.")
     inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
     fixed: bool = Field(False, description="Never moves; what can is 10 m long at most. Default false.")
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(

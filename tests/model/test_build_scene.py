@@ -99,24 +99,33 @@ def test_what_is_inside_a_turned_tray_lies_on_its_floor() -> None:
     np.testing.assert_allclose(scene.body("box").X_WO.R, Transform.of(rpy=(0, 0, 0.75)).R, atol=1e-12)
 
 
-def test_several_lie_inside_where_the_world_says() -> None:
+@pytest.mark.parametrize(("place", "yaw"), [((0.75, 0.0), 0.0), ((0.7, 0.2), 0.5)])
+def test_several_lie_inside_and_go_along_with_it(place: tuple[float, float], yaw: float) -> None:
+    cup = CUP | {"rests_on": "desk", "at": place, "yaw": yaw}
+    balls = {f"ball_{k}": BALL | {"inside": "cup", "at": [x, 0.0]} for k, x in enumerate((-0.016, 0.016))}
+    scene = built({"desk": DESK, "cup": cup} | balls)
+    off = 0.016 * np.array([np.cos(yaw), np.sin(yaw)])
+    np.testing.assert_allclose(scene.body("ball_0").X_WO.p, [*(place - off), 0.4 + 0.004 + 0.014], atol=1e-12)
+    np.testing.assert_allclose(scene.body("ball_1").X_WO.p, [*(place + off), 0.4 + 0.004 + 0.014], atol=1e-12)
+
+
+def test_two_in_the_middle_are_refused_and_told_the_way() -> None:
     cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
-    tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "pose": {"xyz": [1, 2, 3], "rpy": [0, 0, 0.5]}, "mass": 1}
-    balls = {f"ball_{k}": BALL | {"inside": "cup", "at": [0.75 + x, 0.0]} for k, x in enumerate((-0.016, 0.016))}
-    scene = built({"desk": DESK, "cup": cup, "tray": tray, "box": CUBE | {"inside": "tray", "at": [1.04, 2.0]}} | balls)
-    np.testing.assert_allclose(scene.body("ball_1").X_WO.p, [0.766, 0.0, 0.4 + 0.004 + 0.014], atol=1e-12)
-    np.testing.assert_allclose(scene.body("box").X_WO.p, [1.04, 2.0, 3 + 0.01 + 0.05], atol=1e-12)
-    np.testing.assert_allclose(scene.body("box").X_WO.R, Transform.of(rpy=(0, 0, 0.5)).R, atol=1e-12)
+    two = {name: BALL | {"inside": "cup"} for name in ("a", "b")}
+    assert (
+        only({"desk": DESK, "cup": cup} | two).hint
+        == "say where in 'cup', as `at: [1 cm, 0]`: it counts from the middle"
+    )
 
 
 def test_what_would_reach_through_the_wall_is_refused_with_the_excess() -> None:
-    """A hollow of 32 mm about [0.75, 0], a ball of 14 mm: 18 mm off its middle is the most, and in a tray 90 mm."""
+    """A hollow of 32 mm, a ball of 14 mm: 18 mm off its middle is the most, and in a tray 90 mm."""
     cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
-    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.75, 0.023]}})
+    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.023, 0.0]}})
     assert found.message == "'ball' would stand 5 mm outside of the hollow of 'cup'"
-    assert found.hint == "the middle of 'cup' is at [0.75, 0] m"
-    assert built({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.768, 0.0]}})  # touches the wall
-    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.76801, 0.0]}})
+    assert found.hint == "`at` counts from the middle of 'cup', along its axes"
+    assert built({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.018, 0.0]}})  # touches the wall
+    found = only({"desk": DESK, "cup": cup, "ball": BALL | {"inside": "cup", "at": [0.01801, 0.0]}})
     assert found.message == "'ball' would stand 0.01 mm outside of the hollow of 'cup'"
     tray = {"tray": {"size": [0.3, 0.2, 0.05], "wall": 0.01}, "rests_on": "floor", "at": [0, 0], "mass": 1}
     assert built({"tray": tray, "box": CUBE | {"inside": "tray", "at": [-0.0899, 0.0399]}})
