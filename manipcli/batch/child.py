@@ -97,7 +97,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; its log, picture and page are written where they are wanted."""
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
-    from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_page
+    from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_invalid_page, write_page
     from manipcli.record.faults import RecordingFailed
 
     beats.doing("loading")
@@ -116,7 +116,8 @@ def _end_of(job: Job, beats: _Beats) -> End:
             progress=beats,
         )
     except InvalidInput as invalid:
-        return End(None, invalid.findings)
+        unusable = invalid.findings
+        return End(None, unusable, notes=_noted("no page", lambda: write_invalid_page(job, unusable)))
     except RecordingFailed as failure:  # said to the parent: its words have no room on that disk either
         return End(None, troubles=(Trouble(str(failure), at=failure.time),), warnings=beats.warnings)
     beats.judged()
@@ -151,10 +152,10 @@ def _end_of(job: Job, beats: _Beats) -> End:
     return End(report, findings, found, beats.warnings, told, tuple(notes))
 
 
-def _noted(what: str, make: Callable[[], None]) -> list[str]:
+def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:
     """Makes something without which the verdict stands; a note where that is refused."""
     try:
         make()
     except (ManipcliError, OSError) as error:
-        return [f"{what}: {error}"]
-    return []
+        return (f"{what}: {error}",)
+    return ()

@@ -82,7 +82,14 @@ def _no_process(job: Job, why: str) -> CaseReport:
 
 
 def _unreadable(job: Job) -> CaseReport:
+    from manipcli.batch.telling import write_invalid_page
+
     findings = job.case.findings
+    notes: tuple[str, ...] = ()
+    try:
+        write_invalid_page(job, findings)
+    except OSError as error:
+        notes = (f"no page: {error}",)
     return CaseReport(
         case=job.case,
         outcome="invalid",
@@ -92,4 +99,6 @@ def _unreadable(job: Job) -> CaseReport:
         findings=findings,
         troubles=troubles_of(findings),
         warnings=doubts_of(findings),
+        page=None if job.page is None or notes else str(job.page),
+        notes=notes,
     )

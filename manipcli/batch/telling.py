@@ -8,8 +8,9 @@ from pathlib import Path
 
 from manipcli.batch.baseline import Key, compared, kept_baseline, measured, read_baseline
 from manipcli.batch.job import Job
-from manipcli.core.errors import Loc, Place
+from manipcli.core.errors import Finding, Loc, Place
 from manipcli.core.whole_file import write_whole
+from manipcli.flow.invalid import invalid_page, invalid_verdict
 from manipcli.flow.replay import open_playback
 from manipcli.flow.report import file_places, log_page, refused_page
 from manipcli.flow.vocabulary import task_spec
@@ -126,9 +127,23 @@ def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
         )
     if report.verdict.verdict == "passed" and found:
         page = replace(page, verdict=replace(page.verdict, verdict="failed"), causes=_causes(page, found))
-    page = replace(page, warnings=report.warnings, index=job.index)
+    _write(job, replace(page, warnings=report.warnings))
+
+
+def write_invalid_page(job: Job, findings: Sequence[Finding]) -> None:
+    """The page about a task that cannot be used, as `manipcli run --report` makes it, where pages are wanted.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    if job.page is not None:
+        _write(job, invalid_page(invalid_verdict(job.path, findings), findings))
+
+
+def _write(job: Job, page: RunPage) -> None:
+    assert job.page is not None, "a page is wanted"
     job.page.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(job.page, render_page(page).encode())
+    write_whole(job.page, render_page(replace(page, index=job.index)).encode())
 
 
 def _causes(page: RunPage, found: Sequence[Trouble]) -> tuple[Cause, ...]:
