@@ -28,7 +28,7 @@ def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Fi
         for hit in query.every(posture(robot, pose.name, rest=rest)):
             a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
             yield Finding(
-                code="ROBOT340",
+                code="ROBOT347",
                 message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {hit.amount}",
                 place=file.place("poses", pose.name),
                 hint="change the pose; or list the pair under `collision_ignore` if the links may touch",

@@ -24,7 +24,7 @@ def test_an_arm_folded_into_itself_is_told_where_the_pose_stands(tmp_path: Path)
     text = text.replace("  wrap:", "  folded: {arm: [0, -2.0, 0, -2.05, 0, 2.05, 0]}\n  wrap:")
     file = tmp_path / "robot.yaml"
     file.write_text(text)
-    found = [finding for finding in check_files([file]) if finding.code == "ROBOT340"]
+    found = [finding for finding in check_files([file]) if finding.code == "ROBOT347"]
     assert found
     assert all("'folded'" in finding.message for finding in found)
     line = text.splitlines().index("  folded: {arm: [0, -2.0, 0, -2.05, 0, 2.05, 0]}") + 1

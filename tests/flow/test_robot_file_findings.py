@@ -78,3 +78,16 @@ def test_a_mistake_in_a_robot_file_hides_no_name_of_the_task(tmp_path: Path) -> 
     with pytest.raises(InvalidInput) as refused:
         load_task(task)
     assert [f.code for f in refused.value.findings] == ["ROBOT201", "TASK230"]
+
+
+def test_a_robot_that_cannot_move_is_refused_where_its_description_is_named(tmp_path: Path) -> None:
+    urdf = tmp_path / "stick.urdf"
+    urdf.write_text('<robot name="s"><link name="stick"/><link name="end"/><joint name="weld" type="fixed">'
+                    '<parent link="stick"/><child link="end"/></joint></robot>')  # fmt: skip
+    file = tmp_path / "robot.yaml"
+    file.write_text("robot: r\ndescription: stick.urdf\n")
+    with pytest.raises(InvalidInput) as refused:
+        read_robot(file)
+    (found,) = refused.value.findings
+    assert (found.code, found.place and (found.place.line, found.place.column)) == ("ROBOT346", (2, 14))
+    assert "no joint that moves" in found.message and "body of the scene" in (found.hint or "")

@@ -41,8 +41,9 @@ def test_every_robot_is_rebuilt_bit_for_bit(file: Path) -> None:
 
 def test_attached_at_a_quaternion_it_is_rebuilt_too(tmp_path: Path) -> None:
     """A rotation that no three angles say exactly is that of the angles which are written."""
-    for name in ("arm", "hand"):
-        (tmp_path / f"{name}.urdf").write_text(f"<robot name='{name}'><link name='{name}'/></robot>")
+    (tmp_path / "hand.urdf").write_text("<robot name='hand'><link name='hand'/></robot>")
+    turning = "<joint name='turn' type='continuous'><parent link='arm'/><child link='upper'/></joint>"
+    (tmp_path / "arm.urdf").write_text(f"<robot name='arm'><link name='arm'/><link name='upper'/>{turning}</robot>")
     quat = np.array([0.1, 0.7, -0.3, 0.2])
     quat /= np.linalg.norm(quat)
     text = (
