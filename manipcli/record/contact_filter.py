@@ -1,5 +1,5 @@
-"""Which contacts are worth a message: a set of pairs that changed and a knock at once, other forces at most 100 times a
-simulated second, small changes at most ten times, so that a force that stays is known closely soon."""
+"""Which contacts are worth a message: a set of pairs that changed, a knock and its end at once, other forces at most
+100 times a simulated second, small changes at most ten times, so that a force that stays is known closely soon."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ STEADY_SHARE, STEADY_LEAST = 0.01, 0.005
 """more than a hundredth of what was recorded and more than 0.005 N."""
 
 KNOCK_SHARE, KNOCK_LEAST = 0.5, 1.0
-"""A force that grew by more than half of what was recorded and 1 N besides is written at once."""
+"""Of two forces, recorded and now, the larger is a knock if it is more than the lesser by half of that and 1 N besides:
+that it began, or ended, is written at once."""
 
 DEPTH_LEAST = 2e-4
 """[m] A pair that is deeper by more than this than what was recorded is written at once."""
@@ -51,7 +52,7 @@ class ContactFilter:
         for old, new in zip(self._last, found, strict=True):
             if new.distance < old.distance - DEPTH_LEAST:
                 return True
-            if new.force - old.force > KNOCK_LEAST + KNOCK_SHARE * old.force:
+            if abs(new.force - old.force) > KNOCK_LEAST + KNOCK_SHARE * min(old.force, new.force):
                 return True
             if due and abs(new.force - old.force) > least + share * old.force:
                 return True

@@ -56,6 +56,7 @@ expect:
   - always: {{grasped: {{object: cup}}}}
   - always: {{slip: {{object: cup, within: 5 mm, turn: 5 deg}}}}
   - always: {{contact_force: {{pair: [robot, cup], below: 60 N, above: 1 N}}}}
+  - always: {{contact_force: {{of: robot, below: 60 N, mean_over: 30 ms}}}}
   - always: {{collision: [robot, cup]}}
   - always: {{no_collision: {{pairs: [[robot, desk], [ball, cup]]}}}}
   - always: {{at_pose: {{pose: home}}}}

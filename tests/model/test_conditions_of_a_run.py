@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -169,6 +170,26 @@ def test_contact_force_sums_up_and_is_bounded_on_both_sides() -> None:
     assert read("contact_force", moments, of="robot", above=9).margins[0] == pytest.approx(-1)
     text = read("contact_force", moments, pair=["robot/thumb", "cube"], above=4).found(0).text
     assert text == "the force between 'robot/thumb' and 'cube' is 3 N; above 4 N"
+
+
+def test_a_mean_force_is_that_of_its_window_however_the_ticks_come() -> None:
+    """Against the mean of the ticks of each window; all ticks at once and a few at a time give the same numbers."""
+    rng = np.random.default_rng(4)
+    forces = rng.uniform(0.0, 100.0, T)
+    moments = touching(
+        *((float(time), [("cube", "robot/one", force)]) for time, force in zip(TIMES, forces, strict=True))
+    )
+    step = TIMES[1] - TIMES[0]
+    for ticks in (1, 7, 2 * T):
+        window = {"of": "cube", "above": 1.0, "mean_over": float(ticks * step)}
+        expected = [forces[max(0, k + 1 - ticks) : k + 1].mean() - 1.0 for k in range(T)]
+        found = read("contact_force", moments, **window).margins
+        assert found == pytest.approx(expected)
+        condition: Condition[Any] = CONDITIONS["contact_force"]
+        gauge = condition.open(condition.spec.model_validate(window), WORLD)
+        cuts = [0, 1, 4, 30, 31, T]
+        parts = [gauge(moments.part(first, last)).margins for first, last in pairwise(cuts)]
+        assert np.array_equal(np.concatenate(parts), found)
 
 
 def test_collision_and_its_absence_name_the_hardest_touch() -> None:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.model.moments import Moments
+from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import Reading, least, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair, is_part, unknown_part
 from manipcli.spec.base import Model, problem
-from manipcli.spec.quantity import Force
+from manipcli.spec.quantity import Force, Time
 
 
 class ContactForceSpec(Model):
@@ -23,6 +26,10 @@ class ContactForceSpec(Model):
     of: str | None = Field(default=None, description="Instead of `pair`: a body, `robot` or `robot/LINK`.")
     below: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Largest force [N].")
     above: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Least force [N].")
+    mean_over: Annotated[Time, Field(gt=0, le=60)] | None = Field(
+        default=None,
+        description="Of the force its mean over the last so long [s] counts, at most 60 s. Default: each tick's.",
+    )
 
     @model_validator(mode="after")
     def _whole(self) -> ContactForceSpec:
@@ -43,6 +50,7 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
 
     Bodies are rigid: where they meet, a force of one physics step brings them to rest, mass times speed over that step.
     It grows with the speed: a hand that comes down on something with a few cm/s presses for a tick with 100 N and more.
+    `mean_over: 50 ms` looks past such knocks, as a filtered sensor does; at first it is the mean of what was seen.
     """
 
     def counts(contact: Contact) -> bool:
@@ -51,10 +59,13 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
         part = spec.of or ""
         return is_part(part, contact.a) != is_part(part, contact.b)
 
+    average = None if spec.mean_over is None else _Mean(spec.mean_over)
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
     def look(moments: Moments) -> Reading:
         force = moments.of_contacts(lambda contacts: sum(c.force for c in contacts if counts(c)))
+        if average is not None:
+            force = average.of(moments.times, force)
 
         def say(k: int) -> str:
             limits = [("below", spec.below), ("above", spec.above)]
@@ -69,6 +80,26 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
         return least(readings)
 
     return look
+
+
+class _Mean:
+    """The mean over the last `window` [s] of what it is told tick by tick, however many ticks come at once."""
+
+    def __init__(self, window: float) -> None:
+        self._window = window
+        self._times, self._values = np.zeros((2, 0))
+
+    def of(self, times: Array, values: Array) -> Array:
+        """(T,) at each of the next ticks."""
+        seen = len(self._times)
+        times, values = np.concatenate([self._times, times]), np.concatenate([self._values, values])
+        firsts = np.searchsorted(times, times[seen:] - self._window + ROUNDING, side="right")
+        # Summed without rounding: the same however the ticks are dealt out.
+        sums = [math.fsum(values[first:last]) for last, first in enumerate(firsts, start=seen + 1)]
+        counts = np.arange(seen + 1, len(times) + 1) - firsts
+        self._times, self._values = times[firsts[-1] :], values[firsts[-1] :]
+        means: Array = np.array(sums) / counts
+        return means
 
 
 def check(spec: ContactForceSpec, setting: Setting) -> tuple[Problem, ...]:
