@@ -25,11 +25,12 @@ from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.retry import retried
 from manipcli.spec.salvage import intended_ids
-from manipcli.spec.task import TaskSpec
+from manipcli.spec.task import StepSpec, TaskSpec
 
 ABSENT: Final = 230
 UNCOMMANDED: Final = 232
 NOT_SWITCHED: Final = 233
+GUARDED: Final = 242
 """Numbers of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
 """Findings about a controllers file that speak of joints which are not there, or not its own."""
@@ -97,6 +98,18 @@ def _of_steps(spec: TaskSpec, setting: Setting, claims: Claims | None) -> Iterat
         if step.until is not None:
             for p in until_problems(step.until, step.id, setting, CONDITIONS):
                 yield ABSENT, ("steps", k, "until"), p
+        if member.guarded(step.body):
+            yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
+
+
+def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:
+    """What a guarded step lacks."""
+    if step.until is None:
+        hint = "beside the verb: `until: {contact_force: {pair: [robot, BODY], above: 5 N, mean_over: 50 ms}}`"
+        yield Problem(("guarded",), "nothing says where it stops: the step has no `until`", hint)
+    if spec.replan is False:
+        message = "where it stops is not known beforehand, and `replan: false` forbids to plan what follows from there"
+        yield Problem(("guarded",), message, "leave `replan` out")
 
 
 def _of_expectations(spec: TaskSpec, setting: Setting) -> Iterator[tuple[int, Loc, Problem]]:

@@ -241,6 +241,7 @@ class StepsRun:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
         texts = []
+        stopped = False
         with self._asked(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
@@ -260,6 +261,7 @@ class StepsRun:
                 if end.weak:
                     self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
+                stopped = stopped or end.stopped
                 texts += [end.text] if end.text else []
             self._believed = planned.plan.end
             if awaited and until is not None:
@@ -271,7 +273,8 @@ class StepsRun:
         held = self._still_held(before) if planned.plan.end.carried is None else ""
         if held:
             return MotionEnd("failed", held)
-        return self._left_behind(planned) or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+        left = self._lost(planned) if stopped else self._left_behind(planned)
+        return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
     def _asked(self, step: StepSpec) -> Iterator[Probe | None]:
@@ -299,6 +302,13 @@ class StepsRun:
         where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
         grasp = self._holding.told(carried.body)
         return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
+
+    def _lost(self, planned: PlannedStep) -> MotionEnd | None:
+        """The same for a step that was stopped on its way: where its end is, only the hand can tell."""
+        carried = planned.plan.end.carried
+        if carried is None or self._measured.situation(planned.plan.end).carried is not None:
+            return None
+        return MotionEnd("failed", f"'{carried.body}' is no longer in the hand")
 
     def _still_held(self, before: Situation) -> str:
         """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""

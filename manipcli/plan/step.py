@@ -87,6 +87,7 @@ class Motion:
         grip: of the hand, or None where it holds.
         duration: planned [s].
         awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
+        guarded: it stops where that comes to hold on the way.
         switch: of controllers, before anything else; None where they stay.
     """
 
@@ -95,6 +96,7 @@ class Motion:
     grip: Grip | None
     duration: float
     awaits: bool = False
+    guarded: bool = False
     switch: Switch | None = None
 
 
@@ -115,6 +117,10 @@ def _switches_nothing(_: object) -> None:
     return None
 
 
+def _goes_on(_: object) -> bool:
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class StepMember(Generic[S]):
     """A member of the seam: the verb in YAML.
@@ -128,6 +134,7 @@ class StepMember(Generic[S]):
             asked when `check` finds nothing.
         request: (spec) -> the switch of controllers that it asks for, so that the steps after it are checked against
             who is active then.
+        guarded: (spec) -> whether it stops where the step's `until` comes to hold.
     """
 
     name: str
@@ -136,3 +143,4 @@ class StepMember(Generic[S]):
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = _switches_nothing
+    guarded: Callable[[S], bool] = _goes_on

@@ -37,13 +37,14 @@ class MotionEnd:
     """How a motion or a wait ended.
 
     `awaited`: its time was over because the condition under `until` did not hold; `weak`: it is done, and a finger did
-    not press as hard as it was asked to.
+    not press as hard as it was asked to; `stopped`: it is done, before its end.
     """
 
     outcome: Literal["done", "failed", "timeout"]
     text: str = ""
     awaited: bool = False
     weak: bool = False
+    stopped: bool = False
 
 
 DONE: Final = MotionEnd("done")
@@ -76,14 +77,14 @@ class Executor:
         self._tell = told
         self._alarm = alarm
         self._handles: tuple[GoalHandle, ...] = ()
-        self._joints: tuple[tuple[str, ...], ...] = ()
+        self._serving: tuple[Follower | Hand, ...] = ()
 
     def run(self, motion: Motion, *, until: Until | None, deadline: float | None) -> MotionEnd:
         """Send the motion's goals and tick until all are reached and its duration is over.
 
         Args:
             motion: what to do.
-            until: waited for in addition, where the motion awaits it.
+            until: waited for in addition, where the motion awaits it; a guarded one stops where it holds.
             deadline: simulated time [s] at which the step's time is over; None: `PATIENCE` after the planned end.
 
         What does not end well ends with all goals canceled: the controllers bring the joints to rest.
@@ -111,7 +112,12 @@ class Executor:
             busy = session.ticks < last_tick or any(handle.active for handle in handles)
             over = session.time >= latest
             looks = over or session.ticks % UNTIL_TICKS == 0
-            if not busy and (awaited is None or (looks and awaited(state))):
+            holds = awaited is not None and looks and (motion.guarded or not busy) and awaited(state)
+            if holds and busy:
+                left = max(0, last_tick - session.ticks) * session.period
+                self._come_to_rest()
+                return replace(DONE, text=f"stopped {left:.2f} s before its end: `until` held", stopped=True)
+            if not busy and (awaited is None or holds):
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if over and deadline is not None:
                 late = "this motion was" if busy else "the condition under `until` held"
@@ -147,6 +153,13 @@ class Executor:
         for _ in range(self._ticks(REST)):
             self._session.tick()
 
+    def _come_to_rest(self) -> None:
+        """Cancel what is on, and tick until nothing is told to move any more."""
+        self._cancel()
+        self._tick()
+        while any(controller.output.velocity.any() for controller in self._serving):
+            self._tick()
+
     def _ticks(self, duration: float) -> int:
         """In how many ticks `duration` [s] is over."""
         return math.ceil(duration / self._session.period - 1e-6)
@@ -165,20 +178,20 @@ class Executor:
     def _send(self, motion: Motion) -> tuple[GoalHandle, ...]:
         handles = []
         manager = self._session.manager
-        self._joints = ()
+        self._serving = ()
         if motion.trajectory is not None:
             follower = manager.serving(motion.trajectory.names)
             if not is_follower(follower):
                 raise InvalidArgument("CTRL152", f"controller '{follower.name}' does not follow trajectories")
             handle = follower.send_goal(self._completed(motion.trajectory, follower))
             handles.append(self._announced(follower.name, handle))
-            self._joints += (follower.joints,)
+            self._serving += (follower,)
         if motion.grip is not None:
             gripper = manager.serving(motion.grip.joints)
             if not is_hand(gripper):
                 raise InvalidArgument("CTRL151", f"controller '{gripper.name}' is no gripper")
             handles.append(self._announced(gripper.name, gripper.send_goal(_gripper_goal(gripper, motion.grip))))
-            self._joints += (gripper.joints,)
+            self._serving += (gripper,)
         return tuple(handles)
 
     def _announced(self, controller: str, handle: GoalHandle) -> GoalHandle:
@@ -211,9 +224,9 @@ class Executor:
         """Of the joints whose goals are still active, the one that is furthest from its reference."""
         active = [
             (abs(error), name)
-            for joints, handle in zip(self._joints, self._handles, strict=True)
+            for controller, handle in zip(self._serving, self._handles, strict=True)
             if handle.active
-            for name, error in zip(joints, handle.feedback().error.tolist(), strict=True)
+            for name, error in zip(controller.joints, handle.feedback().error.tolist(), strict=True)
         ]
         far, name = max(active)
         unit = self._session.robot.joint(name).unit

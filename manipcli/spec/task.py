@@ -232,7 +232,8 @@ class StepSpec(KeyedSpec):
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
     until: ConditionSpec | None = Field(
         None,
-        description="What the step waits for when it has moved (`pour`: in its dwell), 30 s or until its `timeout`.",
+        description="What the step waits for when it has moved (`pour`: in its dwell; a `guarded` `move`: on its way, "
+        "too), 30 s or until its `timeout`.",
     )
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
         None, description="Fails the step after this [s], above 0 to 1 h."

@@ -70,6 +70,42 @@ def test_a_motion_that_does_not_await_is_not_asked_until(session_of: SessionOf) 
     assert Executor(session_of()).run(wait(0.1, awaits=False), until=until, deadline=None).outcome == "done"
 
 
+def test_a_guarded_motion_stops_within_its_limits_where_until_holds(session_of: SessionOf) -> None:
+    session = session_of()
+    way: list[float] = []
+
+    def until(state: Any) -> bool:
+        return float(state.position[0]) >= 0.25
+
+    executor = Executor(session, alarm=lambda state: way.append(float(state.position[0])) or "")  # type: ignore[func-returns-value]
+    end = executor.run(move(awaits=True, guarded=True), until=until, deadline=None)
+    assert (end.outcome, end.stopped) == ("done", True)
+    assert end.text == "stopped 0.24 s before its end: `until` held"
+    speed = np.diff(way) / session.period
+    assert speed.max() == pytest.approx(1.5, rel=0.01)  # of a cubic over 0.5 m in 0.5 s, at its middle, where it stops
+    assert np.diff(speed).min() / session.period >= -100.0 * 1.001  # the limit
+    rest = float(session.engine.read().position[0])
+    assert rest == pytest.approx(0.25 + 1.5 * UNTIL_TICKS * session.period + 1.5**2 / (2 * 100.0), abs=0.016)
+    executor.hold(0.1)
+    assert float(session.engine.read().position[0]) == rest
+
+
+def test_a_guarded_motion_waits_at_its_end_for_what_did_not_hold_on_its_way(session_of: SessionOf) -> None:
+    session = session_of()
+    end = Executor(session).run(move(awaits=True, guarded=True), until=lambda _: session.ticks >= 700, deadline=2.0)
+    assert (end.outcome, end.stopped, session.ticks) == ("done", False, 700)
+    end = Executor(session).run(move(0.0, awaits=True, guarded=True), until=lambda _: False, deadline=2.0)
+    assert (end.outcome, end.awaited, session.ticks) == ("timeout", True, 2000)
+
+
+def test_a_guarded_motion_that_need_not_begin_stays(session_of: SessionOf) -> None:
+    session = session_of()
+    end = Executor(session).run(move(awaits=True, guarded=True), until=lambda _: True, deadline=None)
+    assert end.stopped
+    assert session.time < 0.1
+    assert float(session.engine.read().position[0]) < 0.005
+
+
 def test_the_timeout_comes_at_its_time_and_says_what_was_on(session_of: SessionOf) -> None:
     session = session_of()
     end = Executor(session).run(wait(0.1), until=lambda _: False, deadline=0.3)

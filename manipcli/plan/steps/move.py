@@ -4,6 +4,8 @@
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 - move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
+- move: {pose: {xyz: [0, 0, 5 cm]}, frame: tool, path: linear, speed: 0.02, touch: [button], guarded: true}
+  until: {contact_force: {pair: [robot, button], above: 5 N, mean_over: 50 ms}}
 """
 
 from __future__ import annotations
@@ -39,6 +41,10 @@ class MoveSpec(Model):
 
     What `touch` names is no obstacle to the hand: it is pushed, or pressed on. Name it in the move that leaves it, too.
     The plan takes it to slide with the tool; where it does not, later steps are planned again.
+
+    A `guarded` move is planned to its end and stops on its way there, slowing down within its limits, where the step's
+    `until` comes to hold; later steps are planned again from where it is told to be then. At its end it waits for
+    `until` as other steps do.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
@@ -51,6 +57,7 @@ class MoveSpec(Model):
     )
     speed: Speed = 1.0
     touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
+    guarded: bool = Field(False, description="Stop as soon as the step's `until` holds. Default false.")
 
     @field_validator("to", mode="before")
     @classmethod
@@ -100,6 +107,9 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
     for motion in planned.motions:
         if spec.touch and motion.trajectory is not None:
             planned = replace(planned, end=pushed(planner, situation, planned.end, motion.trajectory, spec.touch))
+    if spec.guarded:
+        motions = tuple(replace(motion, awaits=True, guarded=True) for motion in planned.motions)
+        planned = replace(planned, motions=motions)
     return planned
 
 
@@ -122,4 +132,9 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("pose",))
 
 
-MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded)
+def guarded(spec: MoveSpec) -> bool:
+    """As it is written."""
+    return spec.guarded
+
+
+MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=guarded)

@@ -1,0 +1,105 @@
+"""Guarded moves: what they lack is told, and where they stop the task goes on from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import InvalidInput
+from manipcli.flow.load import load_task
+from manipcli.model.kinematics import Kinematics
+from manipcli.pipeline import run_task
+from manipcli.record.reading import open_recording
+
+ROOT = Path(__file__).parents[2]
+ARM = f"robot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: {ROOT}/controllers/arm7_hand3.yaml\n"
+PANDA = f"robot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"
+TABLE = "scene:\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
+
+
+def task_file(folder: Path, text: str) -> Path:
+    file = folder / "task.yaml"
+    file.write_text("task: t\n" + text)
+    return file
+
+
+def told(file: Path) -> list[str]:
+    try:
+        load_task(file, allow_outside=True)
+    except InvalidInput as refused:
+        return [f"{f.code} {f.place.line if f.place else 0} {f.message}" for f in refused.findings]
+    return []
+
+
+def test_a_guarded_move_needs_a_condition_and_leave_to_plan_again(tmp_path: Path) -> None:
+    until = "    until: {at_pose: {pose: home, within: 10 deg}}\n"
+    guarded = "steps:\n  - move: {to: home, guarded: true}\n"
+    assert told(task_file(tmp_path, f"{ARM}{guarded}{until}")) == []
+    (missing,) = told(task_file(tmp_path, f"{ARM}{guarded}"))
+    assert missing == "TASK242 5 steps[0].move.guarded: nothing says where it stops: the step has no `until`"
+    (fixed,) = told(task_file(tmp_path, f"{ARM}replan: false\n{guarded}{until}"))
+    assert fixed.startswith("TASK242 6 steps[0].move.guarded: where it stops is not known beforehand")
+    assert told(task_file(tmp_path, f"{ARM}replan: false\nsteps:\n  - move: {{to: home}}\n{until}")) == []
+
+
+def test_the_next_step_begins_where_a_guarded_one_stopped(tmp_path: Path) -> None:
+    """Within 10 deg of a pose it stops; from there, on to another: no joint makes a step."""
+    file = task_file(
+        tmp_path,
+        f"""{ARM}simulation: {{engine: kinematic}}
+steps:
+  - move: {{to: {{joint_1: 1.0}}}}
+  - move: {{to: home, guarded: true}}
+    until: {{at_pose: {{pose: home, within: 10 deg}}}}
+  - move: {{to: {{joint_2: 0.2}}}}
+""",
+    )
+    report = run_task(file, log=tmp_path / "log.mcap", allow_outside=True)
+    assert report.verdict.verdict == "passed"
+    stopped, last = report.verdict.steps[1:]
+    assert "`until` held" in stopped.text
+    recording = open_recording(tmp_path / "log.mcap")
+    states = recording.states
+    at = {name: k for k, name in enumerate(load_task(file, allow_outside=True).robot.joint_names)}
+    turned = states.position[:, at["joint_1"]]
+    end = turned[np.searchsorted(states.time, stopped.ended)]
+    assert 0.0 < end < np.radians(10.0)
+    assert turned[-1] == pytest.approx(end)
+    assert states.position[-1, at["joint_2"]] == pytest.approx(0.2)
+    assert np.abs(np.diff(states.position, axis=0)).max() < 0.01
+    assert last.outcome == "done"
+
+
+@pytest.mark.slow
+def test_a_hand_presses_as_hard_as_asked_and_goes_on_from_there(tmp_path: Path) -> None:
+    """It comes down on a table, through which the plan goes on for 5 cm, stays, and rises from where it is."""
+    file = task_file(
+        tmp_path,
+        f"""{PANDA}{TABLE}steps:
+  - move: {{pose: {{xyz: [0.5, 0, 0.25], rpy: [180 deg, 0, 0]}}}}
+  - move: {{pose: {{xyz: [0, 0, 7 cm]}}, frame: tool, path: linear, speed: 0.02, touch: [table], guarded: true}}
+    until: {{contact_force: {{pair: [robot, table], above: 20 N, mean_over: 50 ms}}}}
+  - wait: 0.3 s
+  - move: {{pose: {{xyz: [0, 0, -5 cm]}}, frame: tool, path: linear, touch: [table]}}
+""",
+    )
+    report = run_task(file, log=tmp_path / "log.mcap", allow_outside=True)
+    assert report.verdict.verdict == "passed"
+    _, press, stay, _ = report.verdict.steps
+    recording = open_recording(tmp_path / "log.mcap")
+    states, times = recording.states, recording.states.time
+    forces = np.array(
+        [sum(one.force for one in snapshot.contacts if "table" in one) for snapshot in recording.contacts]
+    )
+    holds = np.searchsorted([snapshot.time for snapshot in recording.contacts], times, side="right") - 1
+    pressed = forces[holds]
+    before, during = (times > press.ended - 0.1) & (times < press.ended), (times > press.ended) & (times < stay.ended)
+    assert pressed[before].mean() == pytest.approx(20.0, abs=3.0)
+    assert 10.0 < pressed[during].mean() < 25.0
+    assert pressed[-100:].max() == 0.0
+    kinematics = Kinematics(load_task(file, allow_outside=True).robot)
+    tool = np.array([kinematics.forward(q, "panda_hand").p for q in states.position[:: len(times) // 400]])
+    # From where it was commanded to be, as deep in the table as 20 N push it away from there.
+    assert 0.035 < tool[-1, 2] - tool[:, 2].min() < 0.05
