@@ -169,7 +169,7 @@ class _Expansion:
             elif isinstance(cause, Mistyped):
                 place, own_hint = cause.place, f"it is read at {self._place()}"
             cause = getattr(cause, "exc", None) or cause.__cause__
-        lines = str(error).replace(" (<unknown>, line 1)", "").splitlines()
+        lines = re.sub(r" \(<unknown>, line \d+\)", "", str(error)).splitlines()
         message = "; ".join(line.strip() for line in lines if line.strip()) or repr(error)
         if self._calls and message.startswith(_ABOUT_A_CALL):
             place = place_of(self._calls[-1])
@@ -191,8 +191,14 @@ class _Expansion:
     # --- the doors, in the library's signatures ---
 
     def _door_parse(self, inp: object, filename: str | None = None) -> Document:
-        if len(self._module.filestack) > self._bounds.include_depth:
-            most = self._bounds.include_depth
+        *around, own = [Path(str(each)) for each in self._module.filestack]
+        most = self._bounds.include_depth
+        if len(around) >= most:
+            if own in around:  # no bound helps
+                circle = around[len(around) - 1 - around[::-1].index(own) :]
+                names = " -> ".join(each.name for each in [*circle, own])
+                message, hint = f"files include each other without end: {names}", "take one of these includes out"
+                raise invalid("XACRO004", message, self._place(), hint)
             raise Beyond(f"files include each other more than {most} deep", "include_depth")
         return read_document(Path(str(filename)))
 

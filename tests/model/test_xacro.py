@@ -286,6 +286,18 @@ def test_the_working_folder_is_refused_with_what_to_write_instead(tmp_path: Path
     assert "$(dirname)" in (refused(tmp_path, '<link name="$(cwd)"/>').findings[0].hint or "")
 
 
+def test_files_that_include_each_other_are_named_and_no_bound_is_said_to_help(tmp_path: Path) -> None:
+    (tmp_path / "hand.xacro").write_text(HEAD + '<xacro:include filename="r.urdf.xacro"/></robot>')
+    (finding,) = refused(tmp_path, '<xacro:include filename="hand.xacro"/>').findings
+    assert finding.message.endswith("r.urdf.xacro -> hand.xacro -> r.urdf.xacro"), finding.message
+    assert "MANIPCLI_BOUNDS" not in (finding.hint or "")
+
+
+def test_an_empty_expression_is_told_without_a_word_of_python(tmp_path: Path) -> None:
+    (finding,) = refused(tmp_path, '<link name="${}"/>').findings
+    assert "<unknown>" not in finding.message and "''" in finding.message
+
+
 def test_a_pipe_cannot_be_included(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.xacro")
     refused(tmp_path, '<xacro:include filename="pipe.xacro"/>')

@@ -91,7 +91,7 @@ def _roles(subject: Subject) -> Iterator[Finding]:
                 message = f"transmission '{found.name}': its {tag}s have the roles {shown}; expected {expected}"
                 yield Finding("URDF312", message, elements[0].place, how.format(tag))
             elif not pairs and not found.ros1 and "" in roles:
-                message = f"transmission '{found.name}': a {tag} has no role"
+                message = f"transmission '{found.name}': {'an' if tag == 'actuator' else 'a'} {tag} has no role"
                 yield Finding("URDF312", message, elements[roles.index("")].place, how.format(tag))
             names = [element.attributes.get("name", "").strip() for element in elements]
             if pairs and len(names) == 2 and names[0] and names[0] == names[1]:
