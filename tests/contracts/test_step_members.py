@@ -37,13 +37,17 @@ def test_the_page_of_steps_is_that_of_the_registry() -> None:
 
 
 def test_every_field_has_a_type_and_a_meaning() -> None:
-    rows = [line.split(" | ") for line in WRITTEN["page"]().splitlines() if line.startswith("| `")]
-    told = {row[0].strip("| `"): row[1:] for row in rows}
+    told = {}
+    for section in WRITTEN["page"]().split("\n### "):
+        verb = section.splitlines()[0]
+        rows = [line.split(" | ") for line in section.splitlines() if line.startswith("| `")]
+        told |= {(verb, row[0].strip("| `")): row[1:] for row in rows}
     assert [name for name, (kind, _, meaning) in told.items() if not kind or not meaning.strip(" |")] == []
     # Written down by hand once, from what the program does.
-    assert told["grasp.height"][:2] == ["length", "-"]
-    assert told["by"][:2] == ["length, or [length, length]", "`[80 mm, 200 mm]`"]
-    assert told["tilt"][:2] == ["angle, above 0, at most 180 deg", "`120 deg`"]
-    assert told["points[].time_from_start"][:2] == ["time, or mapping", "needed"]
-    assert told["timeout"][:2] == ["time, at most 3600 s, above 0", "-"]
-    assert {"id", "until", "on_fail.retry", "approach.from", "retreat", "to"} <= told.keys()
+    assert told["pick", "grasp.height"][:2] == ["length", "-"]
+    assert told["lift", "by"][:2] == ["length, or [length, length]", "`[80 mm, 200 mm]`"]
+    assert told["pour", "tilt"][:2] == ["angle, above 0, at most 180 deg", "`120 deg`"]
+    assert told["follow", "points[].time_from_start"][:2] == ["time, or mapping", "needed"]
+    assert told["# Steps", "timeout"][:2] == ["time, at most 3600 s, above 0", "-"]
+    assert {("# Steps", "id"), ("# Steps", "until"), ("# Steps", "on_fail.retry")} <= told.keys()
+    assert {("pick", "approach.from"), ("place", "retreat"), ("move", "to")} <= told.keys()
