@@ -81,6 +81,12 @@ def engine_urdf(robot: RobotModel, folder: Path) -> str:
     return _text(lines)
 
 
+def body_urdf(shapes: Sequence[Geometry], inertial: Inertial, folder: Path) -> str:
+    """What a physics engine reads of one rigid body: its shapes and its inertia; `folder` as in `engine_urdf`."""
+    link = Link(name="body", inertial=inertial, visuals=(), collisions=tuple(shapes))
+    return _text([*_head("body"), *_link(link, lambda mesh: str(clean_mesh(mesh, folder)))])
+
+
 MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)))
 
 

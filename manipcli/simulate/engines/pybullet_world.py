@@ -9,18 +9,41 @@ from typing import Final, cast
 
 import numpy as np
 
+from manipcli.core.geometry import Transform
 from manipcli.model.mesh_files import clean_mesh
-from manipcli.model.robot import Box, Cylinder, Mesh, Mimic, RobotModel, Sphere
+from manipcli.model.normalise import MASSLESS, body_urdf
+from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Mesh, Mimic, RobotModel, Sphere
 from manipcli.model.scene import Body
 from manipcli.simulate.engines.pybullet_contacts import Vector
 
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
 """What a mimic coupling may carry [N m or N]."""
+MAX_SHAPES: Final = 16
+"""Of an array of shapes: Bullet leaves out those beyond without a word."""
 
 
 def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
-    """Adds a body of the scene; its index. `folder` takes what Bullet reads meshes from."""
+    """Adds a body of the scene; its index. `folder` takes what Bullet reads meshes and descriptions from."""
+    make = _from_shapes if len(body.geometries) <= MAX_SHAPES else _from_description
+    k = make(p, client, body, folder)
+    p.changeDynamics(
+        k,
+        -1,
+        lateralFriction=body.friction,
+        rollingFriction=body.rolling_friction,
+        spinningFriction=body.spinning_friction,
+        restitution=body.restitution,
+        linearDamping=0.0,
+        angularDamping=0.0,
+        physicsClientId=client,
+    )
+    if not body.fixed:
+        p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
+    return k
+
+
+def _from_shapes(p: ModuleType, client: int, body: Body, folder: Path) -> int:
     kinds, half, radii, lengths, positions, quats = [], [], [], [], [], []
     files, scales = [], []
     for geometry in body.geometries:
@@ -46,27 +69,35 @@ def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
         physicsClientId=client,
     )
     X_WI = body.X_WO @ body.X_OI
-    k = p.createMultiBody(
+    made = p.createMultiBody(
         baseMass=0.0 if body.fixed else body.mass,
         baseCollisionShapeIndex=collision,
         basePosition=list(X_WI.p),
         baseOrientation=list(X_WI.quat_xyzw),
         physicsClientId=client,
     )
-    p.changeDynamics(
-        k,
-        -1,
-        lateralFriction=body.friction,
-        rollingFriction=body.rolling_friction,
-        spinningFriction=body.spinning_friction,
-        restitution=body.restitution,
-        linearDamping=0.0,
-        angularDamping=0.0,
+    return cast(int, made)
+
+
+def _from_description(p: ModuleType, client: int, body: Body, folder: Path) -> int:
+    """The same body, by the file of one link, which may have any number of shapes."""
+    X_IO = body.X_OI.inverse()
+    shapes = [Geometry(X_LS=X_IO @ geometry.X_LS, shape=geometry.shape) for geometry in body.geometries]
+    inertial = MASSLESS
+    if not body.fixed:  # a ball's: of another Bullet would turn the frame; `add_body` says the true one
+        inertial = Inertial(mass=body.mass, X_LI=Transform.identity(), inertia=np.eye(3))
+    file = folder / f"body_{p.getNumBodies(physicsClientId=client)}.urdf"
+    file.write_text(body_urdf(shapes, inertial, folder), encoding="utf-8")
+    X_WI = body.X_WO @ body.X_OI
+    made = p.loadURDF(
+        str(file),
+        basePosition=list(X_WI.p),
+        baseOrientation=list(X_WI.quat_xyzw),
+        useFixedBase=body.fixed,
+        flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_IMPLICIT_CYLINDER | p.URDF_IGNORE_VISUAL_SHAPES,
         physicsClientId=client,
     )
-    if not body.fixed:
-        p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
-    return cast(int, k)
+    return cast(int, made)
 
 
 def _geometry_kind(p: ModuleType, shape: Box | Sphere | Cylinder | Mesh) -> int:
