@@ -17,7 +17,8 @@ UNREADABLE: Final = {"USE101", "USE102", "USE103"}
 
 def check(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Task, robot and controllers files.", show_default=False)
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Tasks, robots, controllers, URDF and xacro.", show_default=False),
     ],
     *,
     seed: Seed = None,
@@ -30,9 +31,9 @@ def check(
     """Check files: all findings, nothing simulated.
 
     The kind (task, robot, controllers) is read from each file; --set, --seed and --sample are of the tasks among
-    them. A task with controllers on efforts is planned, and their gains are looked at over the plan; a step that cannot
-    be planned is an error. A controllers file alone names no robot: its joints and gains are compared with one where a
-    task names both.
+    them. A task is planned, and gains, motors and grasps are looked at over the plan; a step that cannot be planned is
+    an error. A controllers file alone names no robot: its joints and gains are compared with one where a task names
+    both.
     """
     from manipcli import pipeline
     from manipcli.report import json, text

@@ -29,7 +29,7 @@ Overrides = Annotated[
 ]
 Seed = Annotated[
     int | None,
-    typer.Option("--seed", metavar="N", min=0, help="Seed of planner and noise; the task's when absent."),
+    typer.Option("--seed", metavar="N", min=0, help="Seed of the planner and of samples; the task's when absent."),
 ]
 Sample = Annotated[
     int | None,

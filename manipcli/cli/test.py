@@ -71,9 +71,10 @@ def test(
 ) -> ExitCode:
     """Run tasks as tests, several at a time, each in a process of its own.
 
-    Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, `runs`,
-    virtual environments and node_modules are not entered. Logs and pictures of what failed go to runs/test. Tasks that
-    are run as they are written, without --set, --seed and --samples, are compared with their baselines, see `bless`.
+    Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, virtual
+    environments, runs, build, dist and node_modules are not entered. Logs and pictures of what failed go to
+    runs/test. Tasks that are run as they are written, without --set, --seed and --samples, are compared with their
+    baselines, see `bless`.
     """
     from manipcli.cli.interrupts import Interrupts
 

@@ -40,7 +40,7 @@ class SimulationSpec(Model):
     control_period: Annotated[
         Time, Field(gt=0, le=0.05, description="Control tick, a whole multiple of `step`, to 50 ms. Default 1 ms.")
     ] = 0.001
-    seed: Annotated[int, Field(ge=0, description="Of the planner and of noise, 0 or more. Default 0.")] = 0
+    seed: Annotated[int, Field(ge=0, description="Of the planner and of samples, 0 or more. Default 0.")] = 0
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
         EARTH_GRAVITY, description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
     )

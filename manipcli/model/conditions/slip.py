@@ -90,7 +90,8 @@ def hand(spec: SlipSpec, robot: RobotModel) -> str:
 def gauge(spec: SlipSpec, world: World) -> Gauge:
     """`within` minus the motion of the object's centre in the hand [m]; `turn` minus its turn there [rad]; the lesser.
 
-    It counts from the first tick that is looked at on which the object is held, and says nothing while it is not.
+    It counts from the first tick that is looked at on which the object is held, and says nothing while it is not. A
+    hand that still closes moves the object: for what slips from then on, say `during:` with the steps after the grasp.
     """
     hold = _Hold(spec, world)
 
