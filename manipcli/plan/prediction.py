@@ -1,5 +1,5 @@
 """Where bodies will be: what is held goes with the hand, what lies in that goes with it, or falls into a container;
-what is pushed slides."""
+what is pushed slides; and where a hand that feels its way will stop."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.model.robot import Cylinder
-from manipcli.plan.planner import Planner
+from manipcli.plan.planner import Pairs, Planner
 from manipcli.plan.step import Situation
 from manipcli.plan.trajectory import JointTrajectory
 
 PRESSED: Final = 1e-3
 """[m] Deeper in it than at the start by this the hand pushes a body: what it only leaves stays where it is."""
-_LOOKS: Final = 60  # at the way of a hand that pushes: each takes a fraction of a millisecond
+_LOOKS: Final = 60  # at the way of a hand that touches: each takes a fraction of a millisecond
 
 
 def put(planner: Planner, situation: Situation, where: Mapping[str, Transform]) -> Situation:
@@ -55,14 +55,34 @@ def spilled(planner: Planner, situation: Situation, into: str) -> Situation:
     return put(planner, situation, landed)
 
 
+def met(planner: Planner, before: Situation, motion: JointTrajectory, touching: Pairs) -> Situation:
+    """Where on its way one of the pairs that may touch is about to, or to press deeper than at the start; else at the
+    end."""
+    query, pairs = planner.query(before), set(map(frozenset, touching))
+
+    def depth(q: Array) -> float:
+        return min((hit.distance for hit in query.every(q) if {hit.a, hit.b} in pairs), default=np.inf)
+
+    way = _looks(planner, before, motion)
+    deep = min(0.0, depth(way[0])) - PRESSED
+    free = next((k for k, q in enumerate(way) if depth(q) < deep), len(way)) - 1
+    return carried_along(planner, before, before.moved(frozen(way[free])))
+
+
+def _looks(planner: Planner, before: Situation, motion: JointTrajectory) -> Array:
+    """(_LOOKS, n) joint positions on the way, the first and the last among them."""
+    way = np.tile(before.position, (_LOOKS, 1))
+    columns = planner.robot.indices(motion.names)
+    way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
+    return way
+
+
 def pushed(
     planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, bodies: Iterable[str]
 ) -> Situation:
     """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it, and
     what lies in it, too."""
-    columns = planner.robot.indices(motion.names)
-    way = np.tile(before.position, (_LOOKS, 1))
-    way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
+    way = _looks(planner, before, motion)
     end = planner.tool_pose(now).p
     held = () if before.carried is None else (before.carried.body,)
     slid: dict[str, Transform] = {}

@@ -137,6 +137,30 @@ def test_what_a_move_touches_is_pushed_and_else_an_obstacle(bench: Make) -> None
     arm.do("move", {"to": "home"})
 
 
+def test_a_guarded_move_is_predicted_to_stop_where_it_meets_what_it_may_touch(bench: Make) -> None:
+    """What is held above a table comes to stand on it, within the step of the looks, though the way leads into it; the
+    trajectory goes all the way. Away from there it meets nothing, and ends at its end."""
+    arm = bench("panda")
+    arm.do("pick", {"object": "block", "approach": {"from": "top"}})
+    arm.do("lift", {"object": "block", "by": "10 cm"})
+    held = arm.now
+    into = {"pose": {"xyz": [0, 0, "15 cm"]}, "frame": "tool", "path": "linear", "touch": ["table"], "guarded": True}
+    plan = arm.do("move", into)
+    (motion,) = plan.motions
+    assert (motion.guarded, motion.awaits) == (True, True)
+    assert motion.trajectory is not None
+    columns = arm.robot.indices(motion.trajectory.names)
+    end = np.array(held.position)
+    end[columns] = motion.trajectory.positions[-1]
+    assert arm.tool(held.position)[2, 3] - arm.tool(end)[2, 3] == pytest.approx(0.15, abs=1e-4)
+    gap = arm.body("block").p[2] - 0.025 - 0.2  # its middle, half its height, the table's top
+    assert -0.001 <= gap < 0.005
+    assert arm.now.carried == held.carried
+    np.testing.assert_array_equal(arm.now.position[~np.isin(np.arange(len(end)), columns)], np.delete(end, columns))
+    up = arm.do("move", {**into, "pose": {"xyz": [0, 0, "-10 cm"]}})
+    np.testing.assert_allclose(up.end.position[columns], up.motions[0].trajectory.positions[-1], atol=1e-12)
+
+
 def test_what_lies_in_a_pushed_container_goes_with_it(bench: Make) -> None:
     scene = "\n  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}\n"
     scene += "  tray: {tray: {size: [8 cm, 8 cm, 8 cm]}, mass: 0.2, rests_on: table, at: [0.5, -0.1]}\n"

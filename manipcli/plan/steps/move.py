@@ -23,7 +23,7 @@ from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import NOTHING, Planner
-from manipcli.plan.prediction import pushed
+from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
 from manipcli.spec.base import Model, problem
@@ -43,8 +43,8 @@ class MoveSpec(Model):
     The plan takes it to slide with the tool; where it does not, later steps are planned again.
 
     A `guarded` move is planned to its end and stops on its way there, slowing down within its limits, where the step's
-    `until` comes to hold; later steps are planned again from where it is told to be then. At its end it waits for
-    `until` as other steps do.
+    `until` comes to hold; later steps are planned again from where it is told to be then. Until it runs it is taken to
+    stop where it meets what it may `touch`. At its end it waits for `until` as other steps do.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
@@ -104,13 +104,14 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         else:
             draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free")
     planned = draft.plan()
-    for motion in planned.motions:
-        if spec.touch and motion.trajectory is not None:
-            planned = replace(planned, end=pushed(planner, situation, planned.end, motion.trajectory, spec.touch))
-    if spec.guarded:
-        motions = tuple(replace(motion, awaits=True, guarded=True) for motion in planned.motions)
-        planned = replace(planned, motions=motions)
-    return planned
+    (motion,) = planned.motions
+    end = planned.end
+    if spec.touch and motion.trajectory is not None:
+        if spec.guarded:
+            end = met(planner, situation, motion.trajectory, allowed)
+        else:
+            end = pushed(planner, situation, end, motion.trajectory, spec.touch)
+    return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
 
 
 def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
