@@ -16,7 +16,7 @@ from manipcli.flow import chart
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
-from manipcli.report.json import render_run
+from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Suite, Trouble
 from manipcli.report.suite_json import render_suite
@@ -36,6 +36,7 @@ CASE = CaseReport(
 OBJECTS = {
     "sample", "timing", "steps", "steps.attempts", "saturated", "expectations", "errors",
     "cases", "cases.tightest", "cases.troubles", "logs", "logs.fields",
+    "findings", "motions", "motions.limited_by",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
 BY_NAME = {"values", "joints", "actuators"}
@@ -82,3 +83,13 @@ def test_keys_of_what_can_be_plotted(monkeypatch: pytest.MonkeyPatch, capsys: py
     monkeypatch.setattr(chart, "field_lines", lambda _: (line,))
     assert main(["plot", "a.mcap", "--fields", "--format", "json"]) == 0
     assert set(_documented(list(_rows())[2])) == set(_written(json.loads(capsys.readouterr().out)))
+
+
+def test_keys_of_what_is_checked() -> None:
+    assert set(_documented(list(_rows())[3])) == set(_written(json.loads(render_findings([WRONG], ["a.yaml"]))))
+
+
+@pytest.mark.slow
+def test_keys_of_what_is_planned(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(DOCS.parents[1] / "examples" / "04_own_robot" / "task.yaml"), "--format", "json"]) == 0
+    assert set(_documented(list(_rows())[4])) == set(_written(json.loads(capsys.readouterr().out)))
