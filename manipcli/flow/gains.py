@@ -28,6 +28,7 @@ from manipcli.control.stability import (
 from manipcli.core.errors import Finding, NotPlannable, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
+from manipcli.flow.deadlines import too_short
 from manipcli.flow.doubt import Doubt
 from manipcli.flow.drives import RINGING, drive_doubts, driven_joints
 from manipcli.flow.grips import strained, too_heavy, too_light, too_soft, too_swift, unheeded
@@ -53,7 +54,7 @@ SWINGING: Final = 0.1
 
 
 def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
-    """Warnings about gains and efforts, with the number that would do, each at its place in controllers file or task.
+    """Warnings about gains, efforts and timeouts, with the number that would do, each at its place in its file.
 
     On an engine without physics gains, efforts and forces are not doubted: it makes references come true anyhow.
 
@@ -74,6 +75,8 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         except NotPlannable as refusal:
             found += refusal.findings
     found += too_swift(task)
+    if plan is not None:
+        found += too_short(task, plan)
     if ENGINES[task.spec.simulation.engine].physics != "full":
         return tuple(found)
     if plan is not None:
