@@ -29,7 +29,7 @@ def _told(tmp_path: Path, timeout: float, wait: float) -> list[tuple[str, int | 
     task = load_task(file)
     findings = [found for found in gain_findings(task, plan_task(task)) if found.code == "TASK243"]
     assert all(found.severity == "warning" for found in findings)
-    return [(found.message, found.place and found.place.line) for found in findings]
+    return [(found.message, found.place.line if found.place else None) for found in findings]
 
 
 def test_a_timeout_shorter_than_the_plan_is_told(tmp_path: Path) -> None:
