@@ -85,6 +85,18 @@ def test_a_pick_from_above_comes_down_on_the_block(bench: Make) -> None:
     assert 0.015 < fingers[0] <= 0.021
 
 
+@pytest.mark.parametrize("joint_7", ["45 deg", "-135 deg"])
+def test_of_two_fingers_that_may_change_places_the_hand_takes_the_shorter_turn(bench: Make, joint_7: str) -> None:
+    panda = bench("panda")
+    if joint_7 != "45 deg":  # home
+        panda.do("move", {"to": {"panda_joint7": joint_7}})
+    before = panda.now
+    x_before = panda.planner.tool_pose(before).R[:, 0]
+    plan = panda.do("pick", {"object": "block", "approach": {"from": "top"}})
+    x = panda.tools(before, plan, "approach")[-1, :3, 0]
+    assert x @ x_before > 0.9
+
+
 def test_what_cannot_be_taken_from_the_side_is_taken_from_above_unless_the_side_was_asked_for(bench: Make) -> None:
     """Between a low block and the table there is no room for the Panda's broad hand."""
     panda = bench("panda")

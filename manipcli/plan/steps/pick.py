@@ -117,7 +117,7 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
-    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB)
+    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(situation).R)
     goals = [(height, R_WT) for R_WT in turns]
     if spec.grasp.height is None and body.kind != "sphere" and X_WO.R[2, 2] > UPRIGHT:
         from_above = [R_WT for R_WT in turns if R_WT[2, 2] < -UPRIGHT]
@@ -195,8 +195,12 @@ def slopes() -> tuple[float, ...]:
     return tuple(math.radians(slope) for slope in SLOPES_DEG)
 
 
-def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[Array]:
-    """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z)."""
+def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform, R_WT: Array) -> list[Array]:
+    """Candidate R_WT (3, 3), the preferred first; each also with the hand turned over (half a turn about z).
+
+    Of these two that one comes first which is nearer to what the hand has now, `R_WT`: it leaves more of the wrist's
+    turn to what comes after.
+    """
     found = []
     if spec.direction != "top":
         away = X_WO.p - X_WB.p
@@ -206,13 +210,22 @@ def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform) -> list[
             yaw = nominal + math.radians(turn)
             z = np.array([math.cos(yaw), math.sin(yaw), 0.0])
             x = np.array([0.0, 0.0, -1.0])
-            found += [_frame(x, z), _frame(-x, z)]
+            found += _nearer_first(_frame(x, z), _frame(-x, z), R_WT)
     if spec.direction != "side":
         nominal = float(X_WO.rpy[2]) if spec.yaw is None else spec.yaw
-        for turn in (0.0, 90.0, 180.0, -90.0) if spec.yaw is None else (0.0, 180.0):
+        z = np.array([0.0, 0.0, -1.0])
+        both = []
+        for turn in (0.0, 90.0) if spec.yaw is None else (0.0,):
             yaw = nominal + math.radians(turn)
-            found.append(_frame(np.array([math.cos(yaw), math.sin(yaw), 0.0]), np.array([0.0, 0.0, -1.0])))
+            x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+            both.append(_nearer_first(_frame(x, z), _frame(-x, z), R_WT))
+        found += [pair[k] for k in (0, 1) for pair in both]
     return found
+
+
+def _nearer_first(one: Array, other: Array, R: Array) -> list[Array]:
+    """Both rotations (3, 3), the first as it is unless `R` is clearly nearer to the other."""
+    return [other, one] if np.sum(other * R) > np.sum(one * R) + 1e-3 else [one, other]
 
 
 def _frame(x: Array, z: Array) -> Array:
