@@ -132,7 +132,8 @@ def _rows(fields: Mapping[str, FieldInfo], before: str = "") -> Iterator[str]:
         default = "needed" if field.is_required() else _default(field.default, _unit(kind))
         meaning = field.description or ""
         if default != "-":
-            meaning = meaning.partition(" Default ")[0]
+            meaning, _, again = meaning.partition(" Default ")
+            meaning += f" {again}" if ": " in again else ""  # what the default means is not in its column
         yield f"| `{name}` | {_type(kind)} | {default} | {meaning} |"
         for block, within in _blocks(kind):
             yield from _rows(block.model_fields, f"{name}{within}.")
@@ -183,6 +184,7 @@ def _type(kind: object) -> str:
         said = [one for part in parts[1:] for one in (part.metadata if isinstance(part, FieldInfo) else [part])]
         named = [re.sub(r"\ban? ", "", one.name) for one in said if isinstance(one, Unit)]
         named = ["number or percentage" if name == "plain number" else name for name in named]
+        named = [name.replace("torque or energy or force", "torque or force") for name in named]
         short = [_type(one.json_schema_input_type) for one in said if isinstance(one, BeforeValidator)]
         return ", ".join([*(named or short or [_type(parts[0])]), *_bounds(said, _unit(kind))])
     if origin in (Union, UnionType):

@@ -34,7 +34,8 @@ AnyController = Annotated[
 
 
 class ControllersSpec(Model):
-    """The file as a whole, after ROS's own forms have been rewritten to this one."""
+    """Controllers: who moves which joints, and by what law."""
 
+    # The file as a whole, after ROS's own forms have been rewritten to this one.
     version: Version = None
     controllers: dict[str, AnyController] = Field(description="The controllers, by name.")

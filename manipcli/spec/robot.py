@@ -235,7 +235,7 @@ class ToolSpec(Model):
 
 
 class RobotSpec(Model):
-    """One robot."""
+    """A robot: its description, and what URDF cannot say."""
 
     robot: str = Field(description="The name of the robot.", min_length=1)
     version: Version = None

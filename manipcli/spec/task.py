@@ -278,8 +278,9 @@ ParamName = Annotated[str, AfterValidator(_usable)]
 
 
 class TaskSpec(Model):
-    """The task. The loader replaces `steps` and `expect` by the unions that the registry offers."""
+    """A task: with which robot, where things stand, what to do, and what must come of it."""
 
+    # The loader replaces `steps` and `expect` by the unions that the registries offer.
     task: str = Field(description="The name of the task; names its log.", min_length=1)
     version: Version = None
     robot: str = Field(description="Path of the robot file, relative to this file.", min_length=1)
