@@ -226,12 +226,15 @@ def parse_quantity(text: str) -> Quantity:
     return Quantity(value=value, dimension=unit.dimension)
 
 
+_HOW = "write a number, a space and a unit: '45 deg', '5 mm', '2 N m'"
+
+
 def _syntax_hint(text: str) -> str:
     if re.fullmatch(r"\s*[-+]?\d+,\d+.*", text):
         return "write the decimals after a point: 0.5, not 0,5"
     if re.fullmatch(r"\s*[-+]?\.?(nan|inf(inity)?)\b.*", text, re.IGNORECASE):
         return "numbers must be finite"
-    return "write a number, a space and a unit: '45 deg', '5 mm', '2 N m'"
+    return _HOW
 
 
 def to_si(text: str, *wanted: Dimension, read: Callable[[str], Quantity] = parse_quantity) -> float:
@@ -243,7 +246,8 @@ def to_si(text: str, *wanted: Dimension, read: Callable[[str], Quantity] = parse
     try:
         quantity = read(text)
     except UnitError as error:
-        raise UnitError(f"{error.cause}; expected {describe(*wanted)}", hint=error.hint) from None
+        hint = None if error.hint == _HOW and wanted == (NUMBER,) else error.hint
+        raise UnitError(f"{error.cause}; expected {describe(*wanted)}", hint=hint) from None
     if quantity.dimension in wanted:
         return quantity.value
     if quantity.dimension == NUMBER and "%" not in text:

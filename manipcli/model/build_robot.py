@@ -220,8 +220,8 @@ class _Body:
         joint_name = f"{prefix}{parts.root}_attach"
         for what in (*added, f"joint '{joint_name}'"):
             if what in taken:
-                message = f"{what} is already there"
-                reporter.error("ROBOT303", message, ("attach", k), hint="give this attachment a prefix")
+                hint = f"give this attachment {'another' if prefix else 'a'} prefix"
+                reporter.error("ROBOT303", f"{what} is already there", ("attach", k), hint=hint)
         self.links += [dataclasses.replace(link, name=prefix + link.name) for link in parts.links]
         self.joints.append(
             Joint(

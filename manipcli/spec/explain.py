@@ -222,7 +222,9 @@ def _told(
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _unknown_type(context, node)
     if kind in ("too_short", "too_long"):
-        return _wrong_count(context, node), None
+        return _wrong_count(
+            context, node, exact=shape.is_of_fixed_length(shape.at(model, path, dict(first.tags)))
+        ), None
     if kind in _RANGES:
         field = _field(first, model)
         optional = field is not None and field.default is None
@@ -237,7 +239,7 @@ def _told(
     kinds = shape.at(model, path, dict(first.tags))
     hint = hints.of_type(kind, node, kinds)
     if hint is None and kind in ("model_type", "model_attributes_type"):
-        hint = hints.to_write(shape.keys_of(kinds))
+        hint = hints.to_write(kinds)
     hint = hint or _described(_field(first, model), path)
     return f"expected {expected}, not {shown(node)}" if expected else first.error["msg"], hint
 
@@ -314,13 +316,13 @@ def _unknown_type(context: dict[str, object], node: Node) -> tuple[str, str | No
     return f"unknown {key} '{dotted((given,))}', expected one of {listed(tags)}", hint
 
 
-def _wrong_count(context: dict[str, object], node: Node) -> str:
+def _wrong_count(context: dict[str, object], node: Node, *, exact: bool) -> str:
     items = node.items if isinstance(node, SequenceNode) else node.entries if isinstance(node, MappingNode) else ()
     given = len(items)
     if "min_length" in context:
-        exactly = "" if context.get("exact") else "at least "
+        exactly = "" if exact or context.get("exact") else "at least "
         return f"expected {exactly}{_items(context['min_length'])}, got {given}"
-    return f"expected at most {_items(context.get('max_length'))}, got {given}"
+    return f"expected {'' if exact else 'at most '}{_items(context.get('max_length'))}, got {given}"
 
 
 def _items(number: object) -> str:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import get_args
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean, nearest
@@ -43,14 +42,21 @@ def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> s
         if key in shape.keys_of(shape.at(model, path[:k], tags)):
             return f"`{key}` stands beside `{path[k]}`, not below it"
     known = shape.keys_of(shape.at(model, path[:-1], tags))
+    inside = [name for name in known if key in shape.keys_of(shape.at(model, (*path[:-1], name), tags))]
+    if 0 < len(inside) <= 3:
+        return f"`{key}` stands below {' or '.join(f'`{name}`' for name in inside)}"
     close = nearest(key, known)
     hint = did_you_mean(key, known, kind="known keys")
     return f"{hint} ({close[0]}: {known[close[0]].description})" if close and known[close[0]].description else hint
 
 
-def to_write(known: dict[str, FieldInfo]) -> str | None:
-    """How a mapping with these keys is written: `{to: ...}`."""
-    needed = [key for key, field in known.items() if field.is_required()] or list(known)[:1]
+def to_write(kinds: Sequence[object]) -> str | None:
+    """How a mapping of these types is written: `{to: ...}`; of several, what all of them need."""
+    known = shape.keys_of(kinds)
+    each = [keys for kind in kinds if (keys := shape.keys_of([kind]))]
+    needed = [key for key in known if all(key in keys and keys[key].is_required() for keys in each)]
+    if not needed and len(each) == 1:
+        needed = list(known)[:1]
     items = (f"{key}: {1 if known[key].annotation is int else '...'}" for key in needed)
     return f"write {{{', '.join(items)}}}" if needed else None
 
@@ -58,7 +64,7 @@ def to_write(known: dict[str, FieldInfo]) -> str | None:
 def its_key(node: Node, kinds: Sequence[object]) -> str | None:
     """Where a word stands alone that is a key of the mapping that may stand there: how that is written."""
     known = shape.keys_of(kinds)
-    return to_write(known) if isinstance(node, ScalarNode) and node.value in known else None
+    return to_write(kinds) if isinstance(node, ScalarNode) and node.value in known else None
 
 
 def of_type(kind: str, node: Node, kinds: Sequence[object]) -> str | None:
@@ -72,6 +78,8 @@ def of_type(kind: str, node: Node, kinds: Sequence[object]) -> str | None:
         return _quoted(value)
     if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, ...) for one in kinds):
         return f"write [{value}]"
+    if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, str) for one in kinds):
+        return "a pair is a list of its own: [[A, B]]"
     if kind == "string_type" and isinstance(value, int | float):
         return "quotes make a text of it"
     return None

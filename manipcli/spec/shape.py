@@ -51,6 +51,16 @@ def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
     }
 
 
+def is_of_fixed_length(kinds: Sequence[object]) -> bool:
+    """Whether all lists among the types have a length, and the same."""
+    lengths = {
+        None if get_args(kind)[-1:] == (Ellipsis,) else len(get_args(kind))
+        for kind in kinds
+        if get_origin(kind) in (tuple, list)
+    }
+    return len(lengths) == 1 and None not in lengths
+
+
 def takes_any_key(kinds: Sequence[object]) -> bool:
     """Whether one of the types is a mapping of names that the user chooses."""
     return any(get_origin(kind) is dict for kind in kinds)

@@ -159,3 +159,44 @@ def test_positions_of_a_group_are_told_to_go_by_joint(to: str) -> None:
     written = re.search(r"\{joint: 30 deg\}", finding.hint or "")
     assert written is not None, finding.hint
     load_task_text(f"{TASK}steps: [{{move: {{to: {written.group()}}}}}]", "t.yaml", model=task_spec())
+
+
+WHOLE = "task: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: [{move: {to: home}%s}]\n%s"
+CONTROLLERS = "controllers:\n  js: %s\n"
+
+
+@pytest.mark.parametrize(
+    ("step", "rest", "hint"),
+    [
+        ("", "seed: 4\n", "`seed` stands below `simulation`"),
+        (", speed: 0.5", "", "`speed` stands below `move`"),
+        ("", "scene: {b: {sphere: {radius: 1}, mass: 1, xyz: [0, 0, 1]}}\n", "`xyz` stands below `pose`"),
+        ("", "scene: {b: {mass: 1, size: [1, 1, 1]}}\n", "`size` stands below `box` or `tray`"),
+        ("", "expect: [{no_collision: {pairs: [robot]}}]\n", "a pair is a list of its own: [[A, B]]"),
+    ],
+)
+def test_where_a_key_belongs_and_how_a_pair_is_written(step: str, rest: str, hint: str) -> None:
+    with pytest.raises(InvalidInput) as error:
+        load_task_text(WHOLE % (step, rest), "t.yaml", model=task_spec())
+    assert any((finding.hint or "").startswith(hint) for finding in error.value.findings), error.value
+
+
+def test_of_a_controller_of_any_type_only_the_type_is_asked_for() -> None:
+    with pytest.raises(InvalidInput) as error:
+        load_controllers_text(CONTROLLERS % "[]", "c.yaml")
+    (finding,) = error.value.findings
+    assert finding.hint == "write {type: ...}"
+    load_controllers_text(CONTROLLERS % "{type: joint_state_broadcaster}", "c.yaml")
+
+
+def test_a_list_of_one_length_is_asked_for_with_that_length() -> None:
+    for xyz in ("[0, 0]", "[0, 0, 0, 1]"):
+        assert "expected 3 items, got" in refused(f"{ROBOT}mount: {{xyz: {xyz}}}\n").message
+
+
+def test_where_a_plain_number_is_wanted_no_unit_is_proposed() -> None:
+    with pytest.raises(InvalidInput) as error:
+        load_task_text(WHOLE.replace("home", "home, speed: fast") % ("", ""), "t.yaml", model=task_spec())
+    (finding,) = error.value.findings
+    assert "expected a plain number (0.5, 50 %)" in finding.message
+    assert finding.hint is None or "deg" not in finding.hint
