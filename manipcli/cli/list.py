@@ -29,8 +29,8 @@ def list_(
 ) -> ExitCode:
     """List files and the words they may use.
 
-    Robots, tasks and controllers are files below this folder; the rest are words of task files. `list controllers TASK`
-    shows who claims what at the start of a task.
+    Robots, tasks and controllers are files below this folder, checks the codes of `check-urdf`; the rest are words of
+    task files. `list controllers TASK` shows who claims what at the start of a task.
     """
     from manipcli import pipeline
     from manipcli.report.json import dumps
