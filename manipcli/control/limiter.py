@@ -8,7 +8,6 @@ command or a measurement that is no finite number is an error, and names the joi
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -17,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
+from manipcli.control.cut import ACCELERATION, EFFORT, KINDS, POSITION, VELOCITY, Cut, Rows, Window, rows_of
 from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
@@ -24,8 +24,8 @@ from manipcli.model.robot import JointLimits, SoftLimits
 
 SLACK = 1e-3
 """Relative, on velocity and acceleration limits of positions: what is planned to a limit goes through as it is."""
-_MOST = sys.float_info.max  # infinity is beyond it, so that it is found
 _NO_SOFT = SoftLimits()
+_EFFORTS: Rows = slice(POSITION, EFFORT + 1), slice(None)
 
 
 class NotFinite(ManipcliError):
@@ -84,27 +84,6 @@ class _Limits:
         )  # fmt: skip
 
 
-class _Window:
-    """Rows of numbers, and whether each lies strictly between its bounds: in two comparisons, not two a row."""
-
-    __slots__ = ("_above", "_all", "_below", "_flags", "_least", "_most", "_values", "rows")
-
-    def __init__(self, least: Sequence[Array], most: Sequence[Array]) -> None:
-        self._least = np.maximum(np.concatenate(least), -_MOST)
-        self._most = np.minimum(np.concatenate(most), _MOST)
-        size = len(self._least)
-        self._values = np.zeros(size)
-        self.rows = tuple(self._values.reshape(len(least), -1))
-        self._flags = np.zeros(2 * size, dtype=np.bool_)
-        self._above, self._below = self._flags[:size], self._flags[size:]
-        self._all = b"\x01" * (2 * size)
-
-    def holds(self) -> bool:
-        np.greater(self._values, self._least, self._above)
-        np.less(self._values, self._most, self._below)
-        return self._flags.tobytes() == self._all  # faster than asking numpy whether all are true
-
-
 class _Efforts:
     """Joints that obey an effort, or are told one to add; arrays are those of all joints.
 
@@ -141,7 +120,7 @@ class _Efforts:
                 fastest = np.where(at, kv * own.velocity, math.inf)
                 least += [-fastest, np.where(near, self._kv_kp * own.soft_lower, -math.inf)]
                 most += [fastest, np.where(near, self._kv_kp * own.soft_upper, math.inf)]
-        self._window = _Window(least, most)
+        self._window = Window(least, most)
         self._rows = self._window.rows
 
     def inside(self, command: JointCommand, position: Array, velocity: Array) -> bool:
@@ -162,11 +141,10 @@ class _Efforts:
         command: JointCommand,
         position: Array,
         velocity: Array,
-        saturated: npt.NDArray[np.bool_],
-        by_effort: npt.NDArray[np.int64],
+        told: Cut,
     ) -> None:
+        """After `inside` has said that something may have to be."""
         own = self._limits
-        by_effort += np.abs(command.effort) > own.effort
         limited = limit_effort(
             command.effort,
             effort=own.effort,
@@ -180,8 +158,12 @@ class _Efforts:
             k_position=own.k_position,
             k_velocity=own.k_velocity if self._soft else None,
         )
-        saturated |= limited != command.effort
-        command.effort[:] = limited
+        cut = limited != command.effort
+        if cut.any():
+            broken = self._window.broken()[:3]
+            broken[:2] &= limited == 0.0  # where a joint is too far or too fast, efforts that lead back go through
+            told.add(_EFFORTS, cut, broken)
+            command.effort[:] = limited
 
 
 class _Positions:
@@ -194,12 +176,14 @@ class _Positions:
         reach, gain = self._velocity * dt, self._acceleration * dt * dt
         # A position, its step since the one before, and by how much that has grown.
         least = [np.nextafter(own.lower, -math.inf), -reach, np.full(len(where), -math.inf)]
-        self._window = _Window(least, [np.nextafter(own.upper, math.inf), reach, gain])
+        self._window = Window(least, [np.nextafter(own.upper, math.inf), reach, gain])
         self._soft = bool(own.k_position.any())
         self._before, self._step, self._size = np.zeros((3, len(where)))
+        self._kinds = rows_of((POSITION, VELOCITY, ACCELERATION), where)
+        self._by_velocity, self._by_acceleration = rows_of((VELOCITY,), where), rows_of((ACCELERATION,), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, told: Cut) -> None:
         where, (wanted, step, growth) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -210,21 +194,25 @@ class _Positions:
         np.abs(self._step, self._size)
         np.subtract(growth, self._size, growth)
         if self._soft or not self._window.holds():
-            self._cut(command, wanted, saturated)
+            self._cut(command, wanted, told)
         else:
             self._before[:], self._step[:] = wanted, step
         if command.velocity.any():
-            told = command.velocity[where]
-            limited = limit_velocity(told, velocity=self._velocity, dt=self._dt)
-            saturated[where] |= limited != told
-            command.velocity[where] = limited
+            asked = command.velocity[where]
+            limited = limit_velocity(asked, velocity=self._velocity, dt=self._dt)
+            cut = limited != asked
+            if cut.any():
+                told.add(self._by_velocity, cut, cut[np.newaxis])
+                command.velocity[where] = limited
         if command.acceleration.any():
-            told = command.acceleration[where]
-            limited = limit_acceleration(told, acceleration=self._acceleration)
-            saturated[where] |= limited != told
-            command.acceleration[where] = limited
+            asked = command.acceleration[where]
+            limited = limit_acceleration(asked, acceleration=self._acceleration)
+            cut = limited != asked
+            if cut.any():
+                told.add(self._by_acceleration, cut, cut[np.newaxis])
+                command.acceleration[where] = limited
 
-    def _cut(self, command: JointCommand, wanted: Array, saturated: npt.NDArray[np.bool_]) -> None:
+    def _cut(self, command: JointCommand, wanted: Array, told: Cut) -> None:
         own, dt = self._own, self._dt
         limited = limit_position(
             wanted,
@@ -239,7 +227,10 @@ class _Positions:
             k_position=own.k_position,
             dt=dt,
         )
-        saturated[self._where] |= limited != wanted
+        cut = limited != wanted
+        if cut.any():
+            self._window.holds()
+            told.add(self._kinds, cut, self._window.broken())
         np.subtract(limited, self._before, self._step)
         self._before[:] = limited
         command.position[self._where] = limited
@@ -254,12 +245,13 @@ class _Velocities:
         # A velocity, by how much it has changed, and where it leads.
         least = [-own.velocity, -own.acceleration * dt, own.lower]
         most = [own.velocity, own.acceleration * dt, own.upper]
-        self._window = _Window([np.nextafter(a, -math.inf) for a in least], [np.nextafter(b, math.inf) for b in most])
+        self._window = Window([np.nextafter(a, -math.inf) for a in least], [np.nextafter(b, math.inf) for b in most])
         self._soft = bool(own.k_position.any())
         self._before = np.zeros(len(where))
+        self._kinds = rows_of((VELOCITY, ACCELERATION, POSITION), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, saturated: npt.NDArray[np.bool_]) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, told: Cut) -> None:
         where, (wanted, change, ahead) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -286,7 +278,10 @@ class _Velocities:
             k_position=own.k_position,
             beyond="return",
         )
-        saturated[where] |= limited != wanted
+        cut = limited != wanted
+        if cut.any():
+            self._window.holds()
+            told.add(self._kinds, cut, self._window.broken())
         self._before[:] = limited
         command.velocity[where] = limited
 
@@ -301,8 +296,7 @@ class JointLimiter:
 
     Attributes:
         saturations: (n) int, in how many ticks each joint's command was cut.
-        by_effort: (n) int, in how many of them it asked for more effort than the joint may give.
-        saturated: (n) bool, in the last tick.
+        reasons: (k, n) int, in how many of them by each of the `KINDS` of limits.
 
     Args:
         limits: (n) of the joints.
@@ -320,19 +314,22 @@ class JointLimiter:
         brake: Mode = "brake"
         self._efforts = _Efforts((brake,) * n, self._limits)
         self._others: list[_Positions | _Velocities] = []
-        self._cut = False
+        self._cut = Cut(n)
         self.saturations = np.zeros(n, dtype=np.int64)
-        self.by_effort = np.zeros(n, dtype=np.int64)
-        self.saturated = np.zeros(n, dtype=np.bool_)
+        self.reasons = np.zeros((len(KINDS), n), dtype=np.int64)
+
+    @property
+    def saturated(self) -> npt.NDArray[np.bool_]:
+        """(n) whose command was cut in the last tick."""
+        return self._cut.joints
 
     def reset(self) -> None:
         """Forgets the commands before and the counts."""
         for group in self._others:
             group.fresh = True
         self.saturations[:] = 0
-        self.by_effort[:] = 0
-        self.saturated[:] = False
-        self._cut = False
+        self.reasons[:] = 0
+        self._cut.clear()
 
     def _obey(self, modes: Sequence[Mode], dt: float) -> None:
         self._efforts = _Efforts(modes, self._limits)
@@ -358,9 +355,9 @@ class JointLimiter:
         if command.version != self._version or dt != self._dt:
             self._version, self._dt = command.version, dt
             self._obey(command.modes, dt)
-        if self._cut:
-            self._cut = False
-            self.saturated.fill(False)
+        cut = self._cut
+        if cut.any:
+            cut.clear()
         others = self._others
         if self._efforts.inside(command, position, velocity):
             if not others:
@@ -368,11 +365,12 @@ class JointLimiter:
             self._refuse_not_finite(command, position, velocity)
         else:
             self._refuse_not_finite(command, position, velocity)
-            self._efforts.cut(command, position, velocity, self.saturated, self.by_effort)
+            self._efforts.cut(command, position, velocity, cut)
         for group in others:
-            group.apply(command, position, velocity, self.saturated)
-        self._cut = True
-        self.saturations += self.saturated
+            group.apply(command, position, velocity, cut)
+        if cut.any:
+            self.saturations += cut.joints
+            self.reasons += cut.kinds
 
     def _refuse_not_finite(self, command: JointCommand, position: Array, velocity: Array) -> None:
         # Products tell it quickly, for infinity times 0 is NaN; where they overflow, that only costs the closer look.

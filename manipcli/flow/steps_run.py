@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.action import GoalHandle
+from manipcli.control.cut import KINDS
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.holding import Holding
@@ -43,12 +44,15 @@ HELD: Final = 0.1
 
 
 def cuts_of(session: Session) -> Cuts:
-    """In how many ticks each joint's command was cut at its limits, and each actuator had no more to give."""
+    """In how many ticks each joint's command was cut, at which limits, and each actuator had no more to give."""
     names = session.robot.joint_names
     joints = dict(zip(names, map(int, session.saturations), strict=True))
-    efforts = dict(zip(names, map(int, session.saturated_efforts), strict=True))
+    kinds = {
+        kind: dict(zip(names, map(int, counts), strict=True))
+        for kind, counts in zip(KINDS, session.saturated_by, strict=True)
+    }
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return Cuts(joints, actuators, session.ticks, efforts)
+    return Cuts(joints, actuators, session.ticks, kinds)
 
 
 class StepsRun:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.judge.cuts import ACTUATORS, EFFORTS, JOINTS
+from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
 from manipcli.judge.steps import RunStatus
 from manipcli.record.compare import compare_logs, compared_with_itself
 from manipcli.record.compare_entries import compare_entries
@@ -17,7 +17,7 @@ from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.verification import Verification
 
-UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, EFFORTS, "repair")
+UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
 """Metadata that a run writes at its end; one that did not come to its end lacks it, or says something else."""
 
 

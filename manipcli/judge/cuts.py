@@ -11,8 +11,8 @@ from manipcli.core.text import escape
 
 JOINTS, ACTUATORS = "saturated joints", "saturated actuators"
 """Metadata of the log: count by name, of those that were cut."""
-EFFORTS: Final = "saturated efforts"
-"""Of the same joints, in how many of these ticks it was at the limit of effort."""
+LIMITS: Final = "saturated limits"
+"""Of the same joints, `KIND, JOINT`: in how many of these ticks it was that kind of limit, or that one, too."""
 MOST_CUT: Final = 3
 """Joints and actuators that are named."""
 
@@ -21,31 +21,35 @@ MOST_CUT: Final = 3
 class Cuts:
     """Ticks, of `ticks` in all, in which joints' commands were cut at their limits, and actuators had no more to give.
 
-    Names of which the count is 0 count as absent. `efforts`: of those of a joint, in how many its limit of effort was
-    one, where that is known; in the others it was that of position, velocity or acceleration.
+    Names of which the count is 0 count as absent. `kinds`: by kind of limit (position, velocity, ...) and joint, in how
+    many of the joint's ticks it was that one.
     """
 
     joints: Mapping[str, int] = field(default_factory=dict)
     actuators: Mapping[str, int] = field(default_factory=dict)
     ticks: int = 0
-    efforts: Mapping[str, int] = field(default_factory=dict)
+    kinds: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, Mapping[str, str]], *, end: float, period: float) -> Cuts:
         """What a log says whose last tick is at `end` [s]; what is no number in it is left out."""
         ticks = round(end / period) + 1 if period > 0.0 else 0
-        joints, actuators, efforts = (
-            {name: int(text) for name, text in metadata.get(kind, {}).items() if text.isdecimal()}
-            for kind in (JOINTS, ACTUATORS, EFFORTS)
+        joints, actuators, limits = (
+            {name: int(text) for name, text in metadata.get(what, {}).items() if text.isdecimal()}
+            for what in (JOINTS, ACTUATORS, LIMITS)
         )
-        return cls(joints, actuators, ticks, efforts)
+        kinds: dict[str, dict[str, int]] = {}
+        for told, count in limits.items():
+            kind, _, name = told.partition(", ")
+            kinds.setdefault(kind, {})[name] = count
+        return cls(joints, actuators, ticks, kinds)
 
     def to_metadata(self) -> Mapping[str, Mapping[str, str]]:
         """The same; nothing of what was never cut."""
-        kinds = ((JOINTS, self.joints), (ACTUATORS, self.actuators))
-        found = {kind: {name: str(count) for name, count in counts.items() if count} for kind, counts in kinds}
-        found[EFFORTS] = {name: str(self.efforts[name]) for name in found[JOINTS] if name in self.efforts}
-        return {kind: counts for kind, counts in found.items() if counts}
+        limits = {f"{kind}, {name}": count for kind, of in self.kinds.items() for name, count in of.items()}
+        told = {JOINTS: self.joints, ACTUATORS: self.actuators, LIMITS: limits}
+        found = {what: {name: str(count) for name, count in counts.items() if count} for what, counts in told.items()}
+        return {what: counts for what, counts in found.items() if counts}
 
     def since(self, before: Cuts) -> Cuts:
         """What was added since then."""
@@ -53,11 +57,14 @@ class Cuts:
             {name: count - before.joints.get(name, 0) for name, count in self.joints.items()},
             {name: count - before.actuators.get(name, 0) for name, count in self.actuators.items()},
             self.ticks - before.ticks,
-            {name: count - before.efforts.get(name, 0) for name, count in self.efforts.items()},
+            {
+                kind: {name: count - before.kinds.get(kind, {}).get(name, 0) for name, count in counts.items()}
+                for kind, counts in self.kinds.items()
+            },
         )
 
     def __str__(self) -> str:
-        """`cut at its limits: joint 'a' (effort) in 463 of 2000 ticks`, the worst first; nothing where nothing was."""
+        """`cut at its limits: joint 'a' (velocity) in 463 of 2000 ticks`, the worst first; "" where none was."""
         counts = {f"joint '{escape(name)}'{self._of(name)}": count for name, count in self.joints.items()}
         counts |= {f"actuator '{escape(name)}'": count for name, count in self.actuators.items()}
         worst = sorted((name for name, count in counts.items() if count), key=lambda name: -counts[name])
@@ -69,10 +76,9 @@ class Cuts:
         return f"cut at {'its' if len(worst) == 1 else 'their'} limits: {told}{all_ticks} ticks{more}"
 
     def _of(self, name: str) -> str:
-        """At which limit of a joint."""
-        count = self.efforts.get(name)
-        if count is None:
-            return ""
-        if not count:
-            return " (position, velocity or acceleration)"
-        return " (effort)" if count >= self.joints[name] else f" (effort in {count})"
+        """At which limits of a joint."""
+        counts = {kind: of[name] for kind, of in self.kinds.items() if of.get(name)}
+        if list(counts.values()) == [self.joints[name]]:
+            return f" ({next(iter(counts))})"
+        worst = sorted(counts, key=lambda kind: -counts[kind])
+        return f" ({', '.join(f'{kind} in {counts[kind]}' for kind in worst)})" if worst else ""

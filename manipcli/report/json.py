@@ -116,10 +116,14 @@ def _sample(drawn: Drawn) -> Json:
 def saturated_object(cuts: Cuts) -> dict[str, Json]:
     """Ticks by joint and by actuator, of those that were cut."""
     return {
-        "joints": {name: count for name, count in cuts.joints.items() if count},
-        "actuators": {name: count for name, count in cuts.actuators.items() if count},
-        "efforts": {name: cuts.efforts[name] for name, count in cuts.joints.items() if count and name in cuts.efforts},
+        "joints": _counted(cuts.joints),
+        "actuators": _counted(cuts.actuators),
+        "limits": {kind: dict(some) for kind, of in cuts.kinds.items() if (some := _counted(of))},
     }
+
+
+def _counted(counts: Mapping[str, int]) -> dict[str, Json]:
+    return {name: count for name, count in counts.items() if count}
 
 
 def step_object(step: StepOutcome) -> dict[str, Json]:

@@ -20,6 +20,7 @@ from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
+from manipcli.control.cut import EFFORT
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
 from manipcli.control.motors import MotorLimits
@@ -119,9 +120,9 @@ class Session:
         return np.where(self._counted, self._limiter.saturations, 0.0)
 
     @property
-    def saturated_efforts(self) -> Array:
-        """(n) in how many of these ticks it was more effort that was asked for than the joint may give."""
-        return np.where(self._counted, self._limiter.by_effort, 0.0)
+    def saturated_by(self) -> Array:
+        """(k, n) in how many of these ticks by each of the `KINDS` of limits."""
+        return np.where(self._counted, self._limiter.reasons, 0.0)
 
     @property
     def touching(self) -> tuple[Contact, ...]:
@@ -148,7 +149,7 @@ class Session:
         self._touch(state)
         if self._motors.watches:
             limiter = self._limiter
-            self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.by_effort)
+            self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.reasons[EFFORT])
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         if manager.faults:

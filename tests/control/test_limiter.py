@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from manipcli.control import JointLimiter, NotFinite, limit_effort, limit_position, limit_velocity
 from manipcli.control.command import JointCommand
+from manipcli.control.cut import EFFORT, KINDS
 from manipcli.control.limiter import SLACK
 from manipcli.core.errors import InvalidArgument
 from manipcli.model.robot import JointLimits, SoftLimits
@@ -87,9 +88,41 @@ def test_ticks_in_which_the_effort_was_too_much_are_counted_apart():
     for effort, speed, counts in ((30.0, 0.0, (1, 1)), (5.0, 3.0, (2, 1)), (-30.0, 0.0, (3, 2)), (5.0, 0.0, (3, 2))):
         command.effort[:] = effort
         limiter.apply(command, np.zeros(1), np.array([speed]), 0.001)
-        assert (limiter.saturations[0], limiter.by_effort[0]) == counts
+        assert (limiter.saturations[0], limiter.reasons[EFFORT, 0]) == counts
     limiter.reset()
-    assert not limiter.by_effort.any()
+    assert not limiter.reasons.any()
+
+
+@pytest.mark.parametrize(
+    ("mode", "wanted", "kinds"),
+    [
+        ("effort", (30.0, 0.0, 0.0), {"effort"}),
+        ("effort", (5.0, 1.0, 0.0), {"position"}),
+        ("effort", (-5.0, 1.0, 0.0), set()),
+        ("effort", (-30.0, 1.0, 3.0), {"effort"}),
+        ("effort", (5.0, 0.0, 3.0), {"velocity"}),
+        ("effort", (5.0, 0.9, 0.0), {"soft limit"}),
+        ("velocity", (2.1, 0.0, 2.08), {"velocity"}),
+        ("velocity", (1.0, 0.0, 0.0), {"acceleration"}),
+        ("velocity", (1.9, 0.999, 1.9), {"position"}),
+        ("velocity", (1.0, 0.79, 1.0), {"soft limit"}),
+        ("position", (0.021, 0.0, 0.0), {"velocity", "acceleration"}),
+        ("position", (0.015, 0.0, 0.0), {"acceleration"}),
+        ("position", (1.00001, 1.0, 0.0), {"position"}),
+    ],
+)
+def test_a_cut_names_the_limits_that_it_was(mode, wanted, kinds):
+    """Limits of 1 rad, 2 rad/s, 10 N m and 5 rad/s2, in a period of 10 ms: 20 mrad, or 0.5 mrad from rest; a soft one
+    at 0.8 rad that leaves no velocity there, where one is told."""
+    soft = SoftLimits(-0.8, 0.8, 20.0, 5.0) if "soft limit" in kinds else None
+    limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10, 5, None, soft)] * 2), JointCommand(2)
+    command.obey([mode, "free"])
+    value, q, v = wanted
+    getattr(command, mode)[0] = value
+    limiter.apply(command, np.array([q, 0.0]), np.array([v, 0.0]), DT)
+    assert {kind for kind, counts in zip(KINDS, limiter.reasons, strict=True) if counts[0]} == kinds
+    assert limiter.saturations.tolist() == [int(bool(kinds)), 0]
+    assert not limiter.reasons[:, 1].any()
 
 
 def test_what_goes_with_a_position_is_limited_too():

@@ -20,13 +20,14 @@ def test_the_worst_three_are_named_and_what_was_never_cut_is_not() -> None:
 
 
 def test_which_limit_it_was_is_told_where_it_is_known() -> None:
-    cuts = Cuts({"a": 5, "b": 6, "c": 7, "d": 0}, {}, 2000, {"a": 5, "b": 0, "d": 0})
-    told = "joint 'c' in 7, joint 'b' (position, velocity or acceleration) in 6, joint 'a' (effort) in 5 of 2000 ticks"
+    kinds = {"velocity": {"b": 4}, "effort": {"a": 5, "b": 0, "d": 0}, "acceleration": {"b": 6}, "position": {"d": 0}}
+    cuts = Cuts({"a": 5, "b": 6, "c": 7, "d": 0}, {}, 2000, kinds)
+    told = "joint 'c' in 7, joint 'b' (acceleration in 6, velocity in 4) in 6, joint 'a' (effort) in 5 of 2000 ticks"
     assert str(cuts) == f"cut at their limits: {told}"
-    assert cuts.to_metadata()["saturated efforts"] == {"a": "5", "b": "0"}
+    assert cuts.to_metadata()["saturated limits"] == {"velocity, b": "4", "effort, a": "5", "acceleration, b": "6"}
     assert str(Cuts.from_metadata(cuts.to_metadata(), end=1.999, period=1e-3)) == str(cuts)
-    assert saturated_object(cuts)["efforts"] == {"a": 5, "b": 0}
-    later = Cuts({"a": 9}, {}, 2100, {"a": 6})
+    assert saturated_object(cuts)["limits"] == {"velocity": {"b": 4}, "effort": {"a": 5}, "acceleration": {"b": 6}}
+    later = Cuts({"a": 9}, {}, 2100, {"effort": {"a": 6}})
     assert str(later.since(cuts)) == "cut at its limits: joint 'a' (effort in 1) in 4 of 100 ticks"
 
 
@@ -50,4 +51,4 @@ def test_a_verdict_tells_it_in_text_and_json() -> None:
     verdict = Verdict("t", "passed", 0, "pybullet", 1.0, (), (), cuts=CUTS)
     assert f"\n{CUTS}\n" in render_verdict(verdict, "x.mcap")
     assert "cut at" not in render_verdict(Verdict("t", "passed", 0, "pybullet", 1.0, (), ()), "x.mcap")
-    assert saturated_object(CUTS) == {"joints": {"a": 5, "c": 70}, "actuators": {"m1": 6, "m2": 300}, "efforts": {}}
+    assert saturated_object(CUTS) == {"joints": {"a": 5, "c": 70}, "actuators": {"m1": 6, "m2": 300}, "limits": {}}

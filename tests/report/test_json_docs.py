@@ -39,7 +39,7 @@ OBJECTS = {
     "findings", "motions", "motions.limited_by",
 }  # fmt: skip
 """Their rows tell of keys, those of others of values."""
-BY_NAME = {"values", "joints", "actuators"}
+BY_NAME = {"values", "joints", "actuators", "limits"}
 """Their keys are names of the task."""
 
 
