@@ -47,8 +47,8 @@ def tune(
             metavar="S",
             min=1e-6,
             max=10.0,
-            help="The step [rad] that is tried, a tenth of it [m] where a joint slides; gains are such that it asks for no "
-            "more effort than there is.",
+            help="The step [rad] that is tried, a tenth of it [m] where a joint slides; the gains ask for no more "
+            "effort in it than there is.",
         ),
     ] = 0.02,
     simulate: Annotated[
