@@ -157,6 +157,23 @@ def test_inside_a_round_hollow_is_the_depth_of_the_centre(p: tuple[float, float,
 
 
 @pytest.mark.parametrize(
+    ("of", "p", "where"),
+    [
+        ("tray", (0.5, 0.5, 0.04), "10 mm deep in 'tray', its"),
+        ("tray", (0.5, 0.5, 0.06), "10 mm outside 'tray', above its rim, its"),
+        ("tray", (0.67, 0.5, 0.09), "50 mm outside 'tray', its"),
+        ("tray", (0.5, 0.5, 0.0), "10 mm outside 'tray', its"),
+        ("cup", (1.0, 0.02, 0.52), "10 mm outside 'cup', above its rim, its"),
+        ("cup", (1.0, 0.06, 0.55), "50 mm outside 'cup', its"),
+    ],
+)
+def test_what_stands_out_of_a_hollow_is_said_to_be_above_its_rim(
+    of: str, p: tuple[float, float, float], where: str
+) -> None:
+    assert read("inside", ball_at(*p), object="ball", of=of).found(0).text.startswith(f"'ball' is {where} centre at")
+
+
+@pytest.mark.parametrize(
     ("of", "deepest"), [("tray", (0.5, 0.5, 0.03)), ("cup", (1.0, 0.0, 0.46)), ("dish", (-1.0, 0.0, 0.035))]
 )
 def test_at_the_greatest_depth_of_a_hollow_the_relative_margin_is_one(of: str, deepest: tuple[float, ...]) -> None:

@@ -13,7 +13,7 @@ from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
-from manipcli.model.robot import Cylinder
+from manipcli.model.robot import Box, Cylinder
 from manipcli.model.scene import Interior, Scene
 from manipcli.model.state import WorldState, body_pose
 from manipcli.model.where import centres, point_text
@@ -49,12 +49,16 @@ def gauge(spec: Spec, world: World, *, sign: float) -> Gauge:
     deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
 
     def look(moments: Moments) -> Reading:
-        depth = _depth_in(world.scene, moments.states, spec)
+        p_S = _in_hollow(world.scene, moments.states, spec)
+        depth = np.broadcast_to(_depth(shape, p_S), np.shape(moments.states.time))
 
         def say(k: int) -> str:
-            word = "deep in" if depth[k] >= 0.0 else "outside"
+            far = readable(abs(float(depth[k])), "m")
+            where = f"{far} deep in '{spec.of}'" if depth[k] >= 0.0 else f"{far} outside '{spec.of}'"
+            if depth[k] < 0.0 and _over(shape, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
+                where += ", above its rim"
             at = point_text(centres(world.scene, moments.states, spec.object), k)
-            return f"'{spec.object}' is {readable(abs(float(depth[k])), 'm')} {word} '{spec.of}', its centre at {at}"
+            return f"'{spec.object}' is {where}, its centre at {at}"
 
         return reading(sign * depth, moments.times, unit="m", scale=deepest, say=say)
 
@@ -68,27 +72,35 @@ def _interior(scene: Scene, name: str) -> Interior:
     return interior
 
 
-def _depth_in(scene: Scene, states: WorldState, spec: Spec) -> Array:
+def _in_hollow(scene: Scene, states: WorldState, spec: Spec) -> Array:
+    """p_SC (..., 3): the object's centre in the frame in the middle of the hollow."""
     interior = _interior(scene, spec.of)
-    X_WC = body_pose(scene, states, spec.of)
-    p_C = rotate_inverse(X_WC.quat_xyzw, centres(scene, states, spec.object) - X_WC.position)
-    p_S = (p_C - interior.X_OS.p) @ interior.X_OS.R
-    return np.broadcast_to(_depth(interior, p_S), np.shape(states.time))
+    X_WO = body_pose(scene, states, spec.of)
+    p_O = rotate_inverse(X_WO.quat_xyzw, centres(scene, states, spec.object) - X_WO.position)
+    return np.asarray((p_O - interior.X_OS.p) @ interior.X_OS.R)
 
 
-def _depth(interior: Interior, p_S: Array) -> Array:
+def _depth(shape: Cylinder | Box, p_S: Array) -> Array:
     """Minus the signed distance of points (..., 3) to a box or cylinder centred at S.
 
     With d the distances beyond each pair of faces: distance = |max(d, 0)| + min(max_i d_i, 0).
     """
-    shape = interior.shape
-    if isinstance(shape, Cylinder):
-        radial = np.hypot(p_S[..., 0], p_S[..., 1]) - shape.radius
-        d = np.stack([radial, np.abs(p_S[..., 2]) - shape.length / 2.0], axis=-1)
-    else:
-        d = np.abs(p_S) - np.array(shape.size) / 2.0
+    d = _beyond(shape, p_S)
     outside = np.linalg.norm(np.maximum(d, 0.0), axis=-1)
     return np.asarray(-(outside + np.minimum(np.max(d, axis=-1), 0.0)))
+
+
+def _beyond(shape: Cylinder | Box, p_S: Array) -> Array:
+    """How far points (..., 3) are beyond each pair of faces [m], the last of which are floor and rim."""
+    if isinstance(shape, Cylinder):
+        radial = np.hypot(p_S[..., 0], p_S[..., 1]) - shape.radius
+        return np.stack([radial, np.abs(p_S[..., 2]) - shape.length / 2.0], axis=-1)
+    return np.asarray(np.abs(p_S) - np.array(shape.size) / 2.0)
+
+
+def _over(shape: Cylinder | Box, p_S: Array) -> bool:
+    """Whether a point (3,) outside is between the walls, as one that would be inside were the container deeper."""
+    return bool(p_S[2] > 0.0 and (_beyond(shape, p_S)[:-1] <= 0.0).all())
 
 
 def check(spec: Spec, setting: Setting) -> tuple[Problem, ...]:
