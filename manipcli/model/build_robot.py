@@ -192,7 +192,8 @@ class _Descriptions:
         examination = examine(path, packages=packages, arguments=arguments, checks=grave)
         self._reporter.findings += examination.errors
         if examination.parts is not None:
-            read = [finding for finding in examination.parts.findings if finding.severity != "error"]
+            # Notes are for who writes the description; whoever uses one has not asked for them.
+            read = [finding for finding in examination.parts.findings if finding.severity == "warning"]
             self._reporter.findings += list(dict.fromkeys(read))
         return examination.parts
 

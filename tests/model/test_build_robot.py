@@ -9,7 +9,9 @@ import pytest
 
 from manipcli.core.errors import InvalidInput
 from manipcli.model.build_robot import build_robot, rebuild_robot
+from manipcli.model.examine import examine
 from manipcli.model.normalise import engine_urdf, massless_joints
+from manipcli.model.packages import Packages
 from manipcli.model.robot import RobotModel
 from manipcli.spec.load import load_robot_text
 from manipcli.spec.robot import RobotSpec
@@ -261,6 +263,19 @@ def test_errors_of_all_descriptions_are_told_at_once(file: Path) -> None:
     told = messages(file, **HANDED)
     assert "arm.urdf:2:" in told
     assert "hand.urdf:5:" in told
+
+
+def test_warnings_about_a_description_are_told_and_notes_are_left_to_who_checks_it(file: Path) -> None:
+    """A flange of mass 0 is fine; an axis of length 2 may be meant otherwise."""
+    frame = link("flange", INERTIAL.replace('mass value="1"', 'mass value="0"'))
+    doubtful = ARM.replace(link("flange", ""), frame).replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 2"/>', 1)
+    (file.parent / "arm.urdf").write_text(doubtful)
+    codes = {
+        one.code for one in examine(file.parent / "arm.urdf", packages=Packages(file.parent / "arm.urdf")).findings
+    }
+    assert {"URDF031", "URDF034"} <= codes
+    _, findings = build_robot(spec(default_acceleration=7), file=file)
+    assert {one.code for one in findings} == {"URDF034", "ROBOT330"}
 
 
 def assert_same(one: RobotModel, other: RobotModel) -> None:
