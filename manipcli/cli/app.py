@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -57,6 +58,15 @@ _EXIT_CODES = (
     "Exit codes: 0 passed, 1 failed or not plannable, 2 interrupted, 3 internal error, 4 usage or invalid file, "
     "5 nothing to run."
 )
+
+_JARGON = (
+    (": Value error, ", ": "),
+    ("Input should be a valid integer.*", "expected a whole number"),
+    ("Input should be a valid number.*", "expected a number"),
+    ("Input should be greater than or equal to ", "must be at least "),
+    ("Input should be less than or equal to ", "must be at most "),
+)
+"""What pydantic says for Typer, and what is told instead."""
 
 COMMANDS: Final[dict[str, Callable[..., object]]] = {
     "init": init.init,
@@ -200,8 +210,10 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
 
 
 def _without_jargon(message: str) -> str:
-    """Typer's message without what pydantic, which it uses, puts before its own."""
-    return message.replace(": Value error, ", ": ", 1)
+    """Typer's message without what pydantic, which it uses, puts before its own, and in our words for numbers."""
+    for theirs, ours in _JARGON:
+        message = re.sub(theirs, ours, message, count=1)
+    return message
 
 
 def _wanted_format(words: Sequence[str]) -> str:

@@ -62,9 +62,22 @@ class BadRecording(InvalidInput):
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
         self.cause = cause
         left = path.parent / f"{path.name}{PARTIAL}"  # of a folder that has no name, too
-        if hint is None and not path.exists() and left.is_file():
-            hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
+        if hint is None and not path.exists():
+            hint = _beside(path)
+            if left.is_file():
+                hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
         super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
+
+
+def _beside(path: Path) -> str | None:
+    """The log that was meant, or those that are in its folder."""
+    from manipcli.core.text import any_of, listed, nearest_file
+
+    if not path.parent.is_dir():
+        return f"the folder '{path.parent}' is not there either"
+    names = sorted(each.name for each in path.parent.glob("*.mcap"))
+    close = nearest_file(path.name, names)
+    return f"did you mean {any_of(close)}?" if close else f"logs beside it: {listed(names)}" if names else None
 
 
 LEFT_OUT = "another program left out messages of joints, bodies, controllers or contacts"

@@ -163,6 +163,33 @@ def test_wrong_usage_is_told_without_the_words_of_libraries(capsys: pytest.Captu
     assert capsys.readouterr().err.startswith("error[USE001]: Invalid value for '--format': 'xml' is not one of ")
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["plan", "t.yaml", "--seed", "x"], "'--seed': expected a whole number\n"),
+        (["plan", "t.yaml", "--seed", "-1"], "'--seed': must be at least 0\n"),
+        (["diff", "a", "b", "--tolerance", "x"], "'--tolerance': expected a number\n"),
+        (["tune", "r", "c", "--damping", "90"], "'--damping': must be at most 10\n"),
+    ],
+)
+def test_a_number_that_is_none_or_out_of_range_is_told_as_in_files(
+    capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    assert main(words) == 4
+    assert told in capsys.readouterr().err
+
+
+def test_a_log_that_is_not_there_is_looked_for_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "pour.mcap").touch()
+    for given, hint in (
+        ("por.mcap", "did you mean 'pour.mcap'?"),
+        ("zzz.mcap", "logs beside it: pour.mcap"),
+        ("no/a.mcap", f"the folder '{tmp_path / 'no'}' is not there either"),
+    ):
+        assert main(["judge", str(tmp_path / given)]) == 4
+        assert hint in capsys.readouterr().err
+
+
 def test_wrong_usage_answers_in_json_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--format=json"]) == 4
     assert json.loads(capsys.readouterr().out)["errors"][0]["code"] == "USE001"
