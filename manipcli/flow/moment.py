@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.core.geometry import Transform
-from manipcli.flow.log import URDF
+from manipcli.core.geometry import Array, Transform
+from manipcli.flow.log import URDF, recorded_robot
 from manipcli.judge.steps import step_outcomes
+from manipcli.model.kinematics import Kinematics
 from manipcli.model.moments import ROUNDING
 from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
@@ -20,7 +21,7 @@ from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
 from manipcli.record.inventory import Inventory, inventory
 from manipcli.record.messages import WORLD
 from manipcli.record.reading import open_recording
-from manipcli.record.recording import Span, TaskEvent
+from manipcli.record.recording import Recording, Span, TaskEvent
 from manipcli.record.snapshot import snapshot
 from manipcli.record.units import joint_units
 from manipcli.replay.sampling import references
@@ -108,7 +109,22 @@ def _ours(path: Path, time: float) -> Moment:
         poses=poses,
         contacts=None if recording.unknown(CONTACTS) else touched,
         missing=tuple(missing),
+        tool=_tool(recording, path, states.position[k], states.velocity[k]),
     )
+
+
+def _tool(recording: Recording, path: Path, q: Array, v: Array) -> PoseMoment | None:
+    """Where the tool frame of the robot is with its joints at `q` and `v` (n); None where the log lacks its files."""
+    try:
+        robot = recorded_robot(recording, path)
+    except InvalidInput:
+        return None
+    if robot.tool is None or not (np.isfinite(q).all() and np.isfinite(v).all()):
+        return None
+    link, X_LT = robot.tool.link, robot.tool.X_LT
+    kinematics = Kinematics(robot)
+    speed = float(np.linalg.norm(kinematics.point_velocity(q, v, link, X_LT)))
+    return PoseMoment("tool", WORLD, kinematics.forward(q, link) @ X_LT, speed)
 
 
 def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Contact, ...], float]:

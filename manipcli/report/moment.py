@@ -56,6 +56,7 @@ class Moment:
         contacts: None where the log does not tell of contacts.
         missing: what cannot be told, a sentence each.
         ours: whether manipcli wrote the log.
+        tool: of the robot; None where the log does not say what it is.
     """
 
     log: str
@@ -70,6 +71,7 @@ class Moment:
     contacts: tuple[Contact, ...] | None
     missing: tuple[str, ...]
     ours: bool = True
+    tool: PoseMoment | None = None
 
 
 def render_text(moment: Moment) -> str:
@@ -84,8 +86,10 @@ def render_text(moment: Moment) -> str:
     lines.append(when + on + phase)
     if moment.joints:
         lines += ["", _joints(moment.joints)]
+    if moment.tool is not None:
+        lines += ["", _poses((moment.tool,), "robot")]
     if moment.poses:
-        lines += ["", _poses(moment.poses)]
+        lines += ["", _poses(moment.poses, "body")]
     if moment.contacts is not None:
         lines += ["", _contacts(moment.contacts) if moment.contacts else "nothing touches"]
     return "\n".join(lines)
@@ -119,20 +123,22 @@ def render_json(moment: Moment) -> str:
                 }
                 for joint in moment.joints
             ],
-            "poses": [
-                {
-                    "name": each.name,
-                    "parent": each.parent,
-                    "xyz": [number(value) for value in each.pose.p],
-                    "quat_xyzw": [number(value) for value in each.pose.quat_xyzw],
-                    "speed": number(each.speed),
-                }
-                for each in moment.poses
-            ],
+            "tool": None if moment.tool is None else _pose_json(moment.tool),
+            "poses": [_pose_json(each) for each in moment.poses],
             "contacts": contacts,
             "missing": list(moment.missing),
         }
     )
+
+
+def _pose_json(each: PoseMoment) -> Json:
+    return {
+        "name": each.name,
+        "parent": each.parent,
+        "xyz": [number(value) for value in each.pose.p],
+        "quat_xyzw": [number(value) for value in each.pose.quat_xyzw],
+        "speed": number(each.speed),
+    }
 
 
 def _joints(joints: tuple[JointMoment, ...]) -> str:
@@ -155,13 +161,13 @@ def _joints(joints: tuple[JointMoment, ...]) -> str:
     )
 
 
-def _poses(poses: tuple[PoseMoment, ...]) -> str:
+def _poses(poses: tuple[PoseMoment, ...], what: str) -> str:
     rows = []
     for each in poses:
         xyz = ", ".join(_fixed(1000.0 * value, 2) for value in each.pose.p)
         rpy = ", ".join(_fixed(math.degrees(value), 2) for value in each.pose.rpy)
         rows.append([each.name, each.parent, f"{xyz} mm", f"{rpy} deg", _shown(each.speed, "m/s")])
-    header = ["body", "in", "x, y, z", "roll, pitch, yaw", "speed"]
+    header = [what, "in", "x, y, z", "roll, pitch, yaw", "speed"]
     used = [k for k in range(len(header)) if k == 0 or any(row[k] for row in rows)]
     return table([header[k] for k in used], [[row[k] for k in used] for row in rows], right=["speed"])
 
