@@ -7,6 +7,7 @@ from pathlib import Path
 from manipcli.flow.log import judge_recording, recorded_robot
 from manipcli.flow.other_log import is_own
 from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
+from manipcli.record.channels import EVENTS, ROSOUT
 from manipcli.record.compare import Comparison, compare_logs
 from manipcli.record.compare_entries import compare_entries
 from manipcli.record.reading import open_recording
@@ -16,6 +17,8 @@ from manipcli.report.step_measures import step_measures
 
 OUTCOME = ("verdict", JOINTS, ACTUATORS, LIMITS)
 """Metadata that says what came of a run, which is judged and measured anew."""
+PLACES = {EVENTS: ("place",), ROSOUT: ("file", "line")}
+"""Where a step was written is nothing that happened: a comment in the task moves it."""
 
 
 def diff_logs(a: Path, b: Path, *, tolerance: float) -> LogDiff:
@@ -41,7 +44,7 @@ def diff_logs(a: Path, b: Path, *, tolerance: float) -> LogDiff:
         notes.append(f"messages are not compared: {apart}")
         messages = Comparison((), 0.0)
     else:
-        messages = compare_logs(a, b, tolerance=tolerance)
+        messages = compare_logs(a, b, tolerance=tolerance, besides=PLACES)
     if sides[0].task != sides[1].task:
         notes.append(f"the tasks are others, '{sides[0].task}' and '{sides[1].task}': steps of one id are compared")
     notes += [f"{path.name}: {one.lost}" for path, one in ((a, recordings[0]), (b, recordings[1])) if one.lost]

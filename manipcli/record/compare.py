@@ -7,7 +7,7 @@ the same when its bytes are, or, with a tolerance, when nothing but numbers diff
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,7 +17,7 @@ import numpy.typing as npt
 from manipcli.record.cdr import CdrError
 from manipcli.record.columns import Int, Places
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
-from manipcli.record.distance import Near, first_difference
+from manipcli.record.distance import Near, Value, first_difference
 from manipcli.record.topics import Topic, Topics, open_topics
 
 MAX_WAITING = 1 << 28
@@ -110,7 +110,13 @@ class Comparison:
 
 
 def compare_logs(
-    a: Path, b: Path, *, tolerance: float = 0.0, exact: bool = False, open_end: bool = False
+    a: Path,
+    b: Path,
+    *,
+    tolerance: float = 0.0,
+    exact: bool = False,
+    open_end: bool = False,
+    besides: Mapping[str, Collection[str]] | None = None,
 ) -> Comparison:
     """Compare two logs.
 
@@ -119,6 +125,7 @@ def compare_logs(
         tolerance: numbers in messages that differ by no more are the same, whatever their unit.
         exact: sequence numbers and publish times count, too.
         open_end: `a` ends too early: what `b` has at its end and later is not missing in it.
+        besides: by topic, fields that may differ.
 
     Raises:
         BadRecording: one is no MCAP file, or damaged.
@@ -126,7 +133,7 @@ def compare_logs(
     logs = (open_topics(a), open_topics(b))
     found = {name: _topic(logs, name) for name in (*logs[0].all, *(n for n in logs[1].all if n not in logs[0].all))}
     comparable = {name: one for name, one in found.items() if not one.why}
-    _Merge(logs, comparable, tolerance, exact, end=logs[0].end if open_end else None).run()
+    _Merge(logs, comparable, tolerance, exact, end=logs[0].end if open_end else None, besides=besides or {}).run()
     return Comparison(tuple(found.values()), logs[0].end / 1e9)
 
 
@@ -226,12 +233,14 @@ class _Merge:
         tolerance: float,
         exact: bool,
         end: int | None,
+        besides: Mapping[str, Collection[str]],
     ) -> None:
         self._found = found
         self._sides = (_Side(logs[0], found), _Side(logs[1], found))
         self._before = HEAD if exact else 0
         self._tolerance = tolerance
         self._end = end
+        self._besides = besides
         described = {name: logs[0].all.get(name) or logs[1].all[name] for name in found}
         self._messages = {name: _definition(topic) for name, topic in described.items()}
         self._near = {name: Near(message, tolerance) for name, message in self._messages.items() if message}
@@ -296,6 +305,8 @@ class _Merge:
                     other = other[~near]
                 unlike.append(some[other])
         every = np.concatenate(unlike)
+        if name in self._besides:
+            every = every[[self._first(name, a.row(k), b.row(k)) is not None for k in every.tolist()]]
         if len(every):
             one.different += len(every)
             first = int(every.min())
@@ -306,17 +317,24 @@ class _Merge:
     def _told(self, name: str, ns: int, index: int, a: bytes, b: bytes) -> Difference:
         """What of two messages differs first; both with their heads."""
         message = self._messages[name]
-        found: tuple[str, float | int | str, float | int | str] | None = None
+        found: tuple[str, Value, Value] | None = None
         if message is not None and a[HEAD:] != b[HEAD:]:
-            try:
-                found = first_difference(message, a[HEAD:], b[HEAD:], self._tolerance)
-            except CdrError:
-                found = ("(a message that is cut)", len(a) - HEAD, len(b) - HEAD)
+            found = self._first(name, a[HEAD:], b[HEAD:])
         if found is None and self._before:
             found = _head_difference(a, b)
         nothing = "(bytes between its fields)" if message is not None else "(its bytes)"
         label, x, y = found or (nothing, "", "")
         return Difference(ns / 1e9, name, label, x, y, index)
+
+    def _first(self, name: str, a: bytes, b: bytes) -> tuple[str, Value, Value] | None:
+        """The first field of two messages that differs, and its values."""
+        message = self._messages[name]
+        if message is None:
+            return "(its bytes)", "", ""
+        try:
+            return first_difference(message, a, b, self._tolerance, self._besides.get(name, ()))
+        except CdrError:
+            return "(a message that is cut)", len(a), len(b)
 
     def _alone(self, name: str, side: int, block: _Block) -> None:
         """Messages without a partner."""

@@ -83,6 +83,20 @@ def test_a_tolerance_lets_small_numbers_be(
     assert main(["diff", a, other, "--tolerance", "-1"]) == 4
 
 
+def test_where_it_was_written_is_nothing_that_happened(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Another name of the file, and a line more; while another step at the same place, or words said of it, count."""
+    (folder / "nods.yaml").write_text("# once more\n" + TASK.format(root=ROOT))
+    run_task(folder / "nods.yaml", log=folder / "moved.mcap")
+    assert main(["diff", str(folder / "a.mcap"), str(folder / "moved.mcap")]) == 0
+    assert "✓ no difference" in capsys.readouterr().out
+    run_task(folder / "nods.yaml", overrides=["steps.0.id=bow"], log=folder / "named.mcap")
+    assert main(["diff", str(folder / "a.mcap"), str(folder / "named.mcap"), "--format", "json"]) == 1
+    topics = json.loads(capsys.readouterr().out)["topics"]
+    firsts = {topic["name"]: topic["first"]["field"] for topic in topics if topic["first"]}
+    assert firsts["/task/events"] == "step"
+    assert firsts["/rosout"] == "msg"
+
+
 def test_the_same_motion_judged_otherwise_is_different(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["diff", str(folder / "a.mcap"), str(folder / "c.mcap")]) == 1
     out = capsys.readouterr().out
