@@ -21,8 +21,8 @@ INTRODUCTION = """\
 <!-- Written by docs/write_conditions.py: change that, or the docstrings of manipcli/model/conditions/. -->
 
 A condition is a question about a run with a signed margin in a unit: positive where it holds, and by how much. The same
-conditions are waited for by steps (`until`) and expected of the recording (`expect`); both ask the same functions the
-same ticks, so that they cannot disagree.
+conditions are waited for by steps (`until`), watched (`watch`) and expected of the recording (`expect`); all ask the
+same functions the same ticks, so that they cannot disagree.
 
 ```yaml
 steps:
