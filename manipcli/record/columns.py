@@ -118,7 +118,7 @@ def every(data: bytes, code: str) -> npt.NDArray[np.uint64]:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class NamedRuns:
     """What a message holds: its names, and (offset, count) of its runs of doubles."""
 
     names: tuple[str, ...]
@@ -130,13 +130,13 @@ class Columns:
 
     Args:
         topic: what errors call it.
-        parse: a message to its layout.
+        parse: a message to what it holds.
         names: of the joints or bodies that every message must hold, in this order.
         widths: of the runs of doubles that every message must hold.
     """
 
     def __init__(
-        self, topic: str, parse: Callable[[CdrReader], Layout], names: tuple[str, ...], widths: tuple[int, ...]
+        self, topic: str, parse: Callable[[CdrReader], NamedRuns], names: tuple[str, ...], widths: tuple[int, ...]
     ) -> None:
         self._topic = topic
         self._parse = parse
@@ -160,12 +160,12 @@ class Columns:
         if len(back):
             raise CdrError(f"time runs backwards in {self._topic} after t = {times[back[0]] / 1e9:.3f} s")
         self._newest = int(times[-1])
-        for part, layout in self._alike(data, places):
-            if layout.names != self._names:
+        for part, holds in self._alike(data, places):
+            if holds.names != self._names:
                 raise CdrError(f"{self._topic} names other joints or bodies than the metadata")
-            if tuple(count for _, count in layout.runs) != self._widths:
+            if tuple(count for _, count in holds.runs) != self._widths:
                 raise CdrError(f"{self._topic} has another number of values than of names")
-            runs = [_gather(data, part.starts + offset, count) for offset, count in layout.runs]
+            runs = [_gather(data, part.starts + offset, count) for offset, count in holds.runs]
             self._parts.append((part.times, runs))
 
     def take(self, count: int) -> tuple[Int, list[Array]]:
@@ -180,7 +180,7 @@ class Columns:
             self._parts = [(times[count:], [run[count:] for run in runs])]
         return times[:count], [run[:count] for run in runs]
 
-    def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, Layout]]:
+    def _alike(self, data: bytes, places: Places) -> Iterator[tuple[Places, NamedRuns]]:
         """The messages in groups of one layout each."""
         reader = _Decided(_message(data, places, 0))
         first = self._parse(reader)
@@ -253,17 +253,17 @@ def sequences(data: bytes, places: Places) -> Int:
     return every(data, "<u4")[places.starts - PAYLOAD + 11].astype(np.int64)
 
 
-def joint_state_layout(reader: CdrReader) -> Layout:
+def joint_state_runs(reader: CdrReader) -> NamedRuns:
     """sensor_msgs/JointState: position, velocity, effort."""
     reader.header()
     names = reader.texts()
-    return Layout(names, tuple(reader.doubles() for _ in range(3)))
+    return NamedRuns(names, tuple(reader.doubles() for _ in range(3)))
 
 
-def body_layout(bodies: frozenset[str], world: str) -> Callable[[CdrReader], Layout]:
+def body_runs(bodies: frozenset[str], world: str) -> Callable[[CdrReader], NamedRuns]:
     """tf2_msgs/TFMessage: x y z and quaternion xyzw of every one of `bodies` in the world."""
 
-    def parse(reader: CdrReader) -> Layout:
+    def parse(reader: CdrReader) -> NamedRuns:
         names, runs = [], []
         for _ in range(reader.count(64)):
             parent, child = reader.header(), reader.text()
@@ -271,12 +271,12 @@ def body_layout(bodies: frozenset[str], world: str) -> Callable[[CdrReader], Lay
             if parent == world and child in bodies:
                 names.append(child)
                 runs.append((offset, 7))
-        return Layout(tuple(names), tuple(runs))
+        return NamedRuns(tuple(names), tuple(runs))
 
     return parse
 
 
-def controller_state_layout(reader: CdrReader) -> Layout:
+def controller_state_runs(reader: CdrReader) -> NamedRuns:
     """JointTrajectoryControllerState: reference position and velocity, feedback position, output."""
     reader.header()
     names = reader.texts()
@@ -286,4 +286,4 @@ def controller_state_layout(reader: CdrReader) -> Layout:
         reader.skip(8, 4)  # its time
     reference, feedback, _, output = points
     command = next((run for run in output if run[1]), output[0])
-    return Layout(names, (reference[0], reference[1], feedback[0], command))
+    return NamedRuns(names, (reference[0], reference[1], feedback[0], command))

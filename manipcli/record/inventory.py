@@ -9,7 +9,7 @@ from manipcli.record.salvage import Damage, OpenChunk, Salvage
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class TopicCount:
     """One channel.
 
     Attributes:
@@ -61,7 +61,7 @@ class Inventory:
     size: int
     profile: str
     library: str
-    topics: tuple[Topic, ...]
+    topics: tuple[TopicCount, ...]
     attachments: tuple[Attached, ...]
     metadata: dict[str, dict[str, str]]
     start: float | None
@@ -120,7 +120,7 @@ def inventory(path: Path) -> Inventory:
         name, kind, encoding = channels.get(channel, (f"(channel {channel})", "", ""))
         span = spans.get(channel)
         first_s, last_s = (None, None) if span is None else (span[0] / 1e9, span[1] / 1e9)
-        topics.append(Topic(name, kind, encoding, counts.get(channel, 0), first_s, last_s))
+        topics.append(TopicCount(name, kind, encoding, counts.get(channel, 0), first_s, last_s))
     return Inventory(
         path=path,
         size=salvage.size,

@@ -18,10 +18,10 @@ from manipcli.record.columns import (
     Columns,
     Int,
     Places,
-    body_layout,
-    controller_state_layout,
+    body_runs,
+    controller_state_runs,
     indexed,
-    joint_state_layout,
+    joint_state_runs,
     sequences,
     singly,
     walked,
@@ -114,15 +114,13 @@ class _SpanReader:
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
         self._controllers = [one for one in everyone if one.state_topic not in contents.absent]
         self._bodies = m
-        self._columns = {
-            topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_layout, contents.joints, (n,) * 3)
-        }
+        self._columns = {topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_runs, contents.joints, (n,) * 3)}
         if topics.TF not in contents.absent:
-            poses = body_layout(frozenset(contents.bodies), WORLD)
+            poses = body_runs(frozenset(contents.bodies), WORLD)
             self._columns[topics.TF] = Columns(topics.TF, poses, contents.bodies, (7,) * m)
         for controller in self._controllers:
             topic, widths = controller.state_topic, (len(controller.joints),) * 4
-            self._columns[topic] = Columns(topic, controller_state_layout, controller.joints, widths)
+            self._columns[topic] = Columns(topic, controller_state_runs, controller.joints, widths)
         strides = {topic: contents.strides.get(topic, 1) for topic in self._columns}
         self._grid_ns = common_stride(strides) * contents.period * 1e9
         self._strided = len(set(strides.values())) > 1

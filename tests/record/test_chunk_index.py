@@ -9,7 +9,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Columns, Layout, Places, indexed, joint_state_layout, walked
+from manipcli.record.columns import Columns, NamedRuns, Places, indexed, joint_state_runs, walked
 
 HEAD = struct.Struct("<BQHIQQ")
 """MCAP: opcode, length, channel, sequence, log time, publish time; the length counts what follows it."""
@@ -96,7 +96,7 @@ def test_of_one_channel_each_message_is_later_than_the_one_before(
     first: list[int], second: list[int], named: int
 ) -> None:
     data = bytes([0, 1, 0, 0, 0, 0, 0, 0])  # an empty CDR message
-    columns = Columns("/x", lambda _: Layout((), ()), (), ())
+    columns = Columns("/x", lambda _: NamedRuns((), ()), (), ())
     with pytest.raises(CdrError, match=f"time runs backwards in /x after t = {named:.3f} s"):
         for times in (first, second):
             at = np.zeros(len(times), dtype=np.int64)
@@ -114,7 +114,7 @@ def test_a_message_that_is_cut_takes_nothing_from_the_next() -> None:
     one = bytes(store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
     times, starts = np.array([1, 2, 3]) * 10**9, np.arange(3) * len(one)
     for lengths, whole in (([0, 0, 0], True), ([0, -8, 0], False), ([0, 0, -1], False), ([-8, -8, -8], False)):
-        columns = Columns("/joint_states", joint_state_layout, ("a",), (1, 1, 1))
+        columns = Columns("/joint_states", joint_state_runs, ("a",), (1, 1, 1))
         places = Places(times, starts, np.array(lengths) + len(one))
         if not whole:
             with pytest.raises(CdrError, match="ends too early"):
