@@ -26,7 +26,7 @@ def at(
     *,
     format_: Format = "text",
 ) -> ExitCode:
-    """Show a log at one moment: joints, poses of objects, contacts, the step that is on.
+    """Show a log at one moment: step, joints, poses, contacts.
 
     Any ROS 2 log will do, as far as it goes.
     """

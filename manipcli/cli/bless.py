@@ -32,7 +32,7 @@ def bless(
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Run tasks, and keep what they take and their margins as their baselines.
+    """Run tasks, and keep what they take as their baselines.
 
     TASK.baseline.json, beside each task, is what `manipcli test` compares with: it fails where something is worse by
     more than `baseline: {tolerance: ...}` of the task. A task that fails keeps the baseline that it has.

@@ -56,7 +56,9 @@ def check_urdf(
         typer.Option("--allow-env", metavar="NAME", help="Let $(env NAME) read this variable; repeatable."),
     ] = None,
 ) -> ExitCode:
-    """Check a robot description, URDF or xacro: schema, topology, physics, assets, readiness.
+    """Check a robot description, URDF or xacro.
+
+    Its schema, topology, physics, assets, and whether it is ready to be simulated.
 
     Exit code 0: no error. 1: errors (with --strict: or warnings). 4: no such file, or a wrong option.
     """

@@ -24,7 +24,7 @@ def diff(
     ] = 0.0,
     format_: Format = "text",
 ) -> ExitCode:
-    """Compare two logs: how their steps went, and from which message on they differ.
+    """Compare two logs: how steps went, where messages differ.
 
     Exit code 0: the same happened; 1: something is different. What they were made from (files, seed, versions) is told,
     but makes no difference by itself.

@@ -22,9 +22,9 @@ def graph(
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Show who feeds whom: task, planner, controllers, joint limits, drives, engine, sensors, topics.
+    """Show who feeds whom, from the task to the topics.
 
-    Of a log with how many messages each topic has.
+    Task, planner, controllers, joint limits, drives, engine, sensors, topics; of a log with how many messages each has.
     """
     from manipcli.flow.graph import log_graph, task_graph
     from manipcli.record.container import begins_as_log

@@ -22,9 +22,9 @@ def repair(
     force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
     format_: Format = "text",
 ) -> ExitCode:
-    """Make a clean MCAP file of a log that was cut, damaged or never finished, and say what is lost.
+    """Make a clean log of one that was cut or never finished.
 
-    LOG itself is never changed.
+    Of a damaged one, too; what is lost is told. LOG itself is never changed.
     """
     from manipcli.cli.interrupts import Interrupts
     from manipcli.record.repair import default_output

@@ -78,7 +78,7 @@ def replay(
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Show a recorded run: robot and scene over time, steps by name, curves.
+    """Show a recorded run: robot and scene over time, curves.
 
     Needs nothing but the log and the packages of its meshes. Ctrl-C ends it. With --verify: 0 identical, 1 not.
     """

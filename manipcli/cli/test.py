@@ -69,7 +69,7 @@ def test(
     allow_outside: AllowOutside = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Tell only what fails, and the summary.")] = False,
 ) -> ExitCode:
-    """Run tasks as tests, several at a time, each in a process of its own.
+    """Run tasks as tests, each in a process of its own.
 
     Tests are the YAML files with a name under the top-level key `task`, and the key `robot`; hidden folders, virtual
     environments, runs, build, dist and node_modules are not entered. Logs and pictures of what failed go to

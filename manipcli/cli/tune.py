@@ -66,7 +66,7 @@ def tune(
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Propose gains, and show how the joints answer a step with them.
+    """Propose gains, and show how joints answer a step with them.
 
     As much of bandwidth and damping as is stable at the control period in all postures looked at, and as efforts allow.
     """  # fmt: skip
