@@ -531,6 +531,13 @@ def test_bullet_refuses_a_joint_that_moves_no_mass(opens: Opens) -> None:
     assert ENGINES["kinematic"].refuses(model) == ()
 
 
+def test_moments_written_with_few_digits_are_held(opens: Opens) -> None:
+    """One may exceed the sum of the others by a hundredth of it; the engine gets the nearest that a body can have."""
+    rounded = Inertial(1.7, Transform.of(rpy=(0.3, 0.2, 0.1)), frozen(np.diag([0.003, 0.0236, 0.0268])))
+    model = robot([joint("a", "x")], [rounded])
+    opens(ENGINES["pybullet"], model)
+
+
 def test_what_bullet_holds_is_read_back(tmp_path: Path) -> None:
     """The comparison is silent about the robot that was loaded, and names every way in which another one differs."""
     import pybullet as p
