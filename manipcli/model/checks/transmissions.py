@@ -53,7 +53,7 @@ def _shared(subject: Subject) -> Iterator[Finding]:
                 shared_joint = tag == "joint"
                 severity: Severity = "error" if shared_joint else "warning"
                 message = f"transmission '{found.name}': {tag} '{name}' belongs to transmission '{owner.name}' already"
-                yield Finding("URDF311", message, element.place, f"a {tag} has one transmission", severity)
+                yield Finding("URDF311", message, element.place, f"each {tag} has one transmission", severity)
     yield from _unlike(subject)
 
 
