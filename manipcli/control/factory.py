@@ -87,9 +87,6 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
             yield Finding("CTRL101", f"controller '{name}' has no joints", place((*at, "joints")))
         for k, joint in enumerate(one.joints):
             where = place((*at, "joints", k))
-            if joint in one.joints[:k]:
-                yield Finding("CTRL142", f"joint '{joint}' stands twice in controller '{name}'", where)
-                continue
             yield from _joint_findings(name, one, joint, robot, where)
             if one.active:
                 before = set(owners.get(joint, {}).values())

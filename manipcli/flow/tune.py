@@ -136,11 +136,15 @@ class _Tuner:
             raise InvalidInput(missing)
 
     def proposals(self) -> tuple[Tuned, ...]:
-        """Of every loop in the file."""
+        """Of every loop in the file; of several on one joint, of that which is active at the start."""
         efforts: list[tuple[str, str, bool]] = []
         velocities: list[tuple[str, str]] = []
+        elsewhere = self._elsewhere()
         for name, spec in self._file.spec.controllers.items():
-            if isinstance(spec, JointTrajectorySpec | GripperSpec):
+            if name in elsewhere:
+                told = f"{name}: its gains stay, because joints of it are those of {elsewhere[name]}"
+                self.notes += (f"{told}; `active` says which one is tuned",)
+            elif isinstance(spec, JointTrajectorySpec | GripperSpec):
                 carried = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
                 if spec.interfaces == ("effort",):
                     efforts += [(name, joint, carried) for joint in spec.joints]
@@ -159,6 +163,19 @@ class _Tuner:
             hint = "; ".join(self.notes) or None
             raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"), hint=hint)])
         return self._of_efforts(efforts) + self._of_velocities(velocities)
+
+    def _elsewhere(self) -> dict[str, str]:
+        """The controllers of which joints have a loop in another one, and which: what is active comes first."""
+        owners: dict[str, str] = {}
+        found: dict[str, str] = {}
+        for name, spec in sorted(self._file.spec.controllers.items(), key=lambda one: not one[1].active):
+            if isinstance(spec, JointTrajectorySpec | GripperSpec) and spec.interfaces in (("effort",), ("velocity",)):
+                first = next((owners[joint] for joint in spec.joints if joint in owners), None)
+                if first is None:
+                    owners |= dict.fromkeys(spec.joints, name)
+                else:
+                    found[name] = first
+        return found
 
     def _of_efforts(self, loops: list[tuple[str, str, bool]]) -> tuple[Tuned, ...]:
         if not loops:

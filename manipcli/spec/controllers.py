@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from manipcli.spec.base import Model
+from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
     Frequency,
     JointAcceleration,
@@ -34,6 +34,13 @@ class ControllerSpec(Model):
     update_rate: Annotated[Frequency, Field(gt=0)] | None = Field(
         None, description="How often it is updated [Hz]; divides the control rate. Default: at every control tick."
     )
+
+    @model_validator(mode="after")
+    def _each_joint_once(self) -> Self:
+        for k, name in enumerate(self.joints):
+            if name in self.joints[:k]:
+                raise problem("duplicate", f"joint '{name}' stands twice", at=("joints", k))
+        return self
 
     def ticks(self, period: float) -> int:
         """Control ticks of `period` [s] from one update to the next, for a rate that divides the control rate."""

@@ -56,6 +56,20 @@ def tuned(folder: Path, wish: Wish, *, simulated: bool = False, step: float = 0.
     return one
 
 
+@pytest.mark.parametrize("simulated", [False, True])
+@pytest.mark.parametrize(("first", "second"), [("effort", "effort"), ("effort", "velocity"), ("velocity", "velocity")])
+def test_of_two_controllers_on_a_joint_the_active_one_is_tuned(
+    tmp_path: Path, first: str, second: str, simulated: bool
+) -> None:
+    robot, controllers = pendulum(tmp_path)
+    one = "{{type: joint_trajectory, active: {}, command_interface: {}, joints: [hinge], gains: {{hinge: {{p: 7}}}}}}"
+    controllers.write_text(f"controllers:\n  a: {one.format('false', first)}\n  b: {one.format('true', second)}\n")
+    found = tune(robot, controllers, Wish(4.0, 1.0, 1e-3), simulated=simulated)
+    assert [each.controller for each in found.joints] == ["b"]
+    assert any(note.startswith("a: its gains stay") and "of b;" in note for note in found.notes)
+    assert found.controllers.controllers["a"].gains["hinge"].p == 7  # type: ignore[attr-defined]
+
+
 def test_gains_are_those_of_the_formulas(tmp_path: Path) -> None:
     w = 2 * math.pi * 4.0
     one = tuned(tmp_path, Wish(4.0, 0.7, 1e-3), friction=0.1)

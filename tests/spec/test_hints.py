@@ -200,3 +200,11 @@ def test_where_a_plain_number_is_wanted_no_unit_is_proposed() -> None:
     (finding,) = error.value.findings
     assert "expected a plain number (0.5, 50 %)" in finding.message
     assert finding.hint is None or "deg" not in finding.hint
+
+
+def test_a_joint_that_stands_twice_is_told_without_a_robot() -> None:
+    with pytest.raises(InvalidInput) as error:
+        load_controllers_text(CONTROLLERS % "{type: joint_state_broadcaster, joints: [a, b, a]}", "c.yaml")
+    (finding,) = error.value.findings
+    assert (finding.code, str(finding.place)) == ("CTRL210", "c.yaml:2:54")
+    assert finding.message == "controllers.js.joints[2]: joint 'a' stands twice"
