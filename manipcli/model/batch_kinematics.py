@@ -65,6 +65,11 @@ def link_places(robot: RobotModel) -> Mapping[str, tuple[int, Transform]]:
     return _terms(robot).places
 
 
+def still_links(robot: RobotModel) -> frozenset[str]:
+    """Links that no joint moves: the root, and what is fixed to it."""
+    return frozenset(name for name, (joint, _) in link_places(robot).items() if joint < 0)
+
+
 class _Terms:
     """The constants of a robot's moving joints, each placed in its parent link and behind the joint `before` it."""
 

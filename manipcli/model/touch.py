@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
+from manipcli.model.batch_kinematics import still_links
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.state import Contact
 
@@ -64,6 +65,7 @@ def impossible_pair(setting: Setting, pair: tuple[str, str], loc: Loc) -> tuple[
     if pair[0] == pair[1]:
         return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)
     fixed = {body.name for body in setting.scene.bodies if body.fixed}
+    fixed |= {f"{ROBOT}/{link}" for link in still_links(setting.robot)}
     if fixed.issuperset(pair):
         return (Problem(loc, f"'{pair[0]}' and '{pair[1]}' are both fixed, so nothing can be said of their contact"),)
     return ()

@@ -474,6 +474,24 @@ def test_contacts_are_sorted_by_name_whatever_the_order_of_the_bodies(member: En
 
 
 @with_physics
+@pytest.mark.parametrize("fixed", [True, False])
+def test_what_cannot_move_does_not_touch_each_other(fixed: bool, member: EngineMember, opens: Opens) -> None:
+    """A base and a foot that is fixed to it stand in a table, a block on the foot, and the bob rests on a pile."""
+    cube = Geometry(Transform.identity(), Box((0.2, 0.2, 0.2)))
+    end = Geometry(Transform.of(xyz=(0.5, 0.0, 0.0)), Box((0.1, 0.1, 0.1)))
+    links = tuple(Link(name, inertial(1.0), (), (cube,)) for name in ("base", "foot"))
+    links += (Link("bob", inertial(1.0, (0.5, 0.0, 0.0)), (), (end,)),)
+    joints = (joint("swing", "bob", at=(0.0, 0.0, 0.0)), replace(joint("f", "foot", at=(0.0, 1.0, 0.0)), type="fixed"))
+    model = RobotModel("bot", "base", links, joints, (), (), (), Transform.identity(), "")
+    table = body("table", Box((4.0, 4.0, 0.2)), (0.0, 0.0, -0.19), fixed=True)
+    pile = body("pile", Box((0.2, 0.2, 0.04)), (0.5, 0.0, -0.07), mass=50.0, fixed=fixed)
+    engine = opens(member, model, scene(table, pile, body("block", Box((0.1, 0.1, 0.1)), (0.0, 1.0, 0.15))))
+    run(engine, 50)
+    found = {contact[:2] for contact in engine.contacts()}
+    assert found == {("block", "robot/foot"), ("pile", "robot/bob")} | (set() if fixed else {("pile", "table")})
+
+
+@with_physics
 def test_contacts_carry_the_weight_and_are_named(member: EngineMember, opens: Opens) -> None:
     table = body("table", Box((1.0, 1.0, 0.2)), (2.0, 0.0, 0.4), fixed=True)
     block = body("block", Box((0.2, 0.2, 0.1)), (2.0, 0.0, 0.55), mass=1.5, moments=(0.01, 0.01, 0.01))

@@ -424,6 +424,7 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
         (["robot/finger", "robot/thumb"], "the robot does not collide with itself"),
         (["cube", "cube"], "'cube' cannot touch itself"),
         (["desk", "shelf"], "'desk' and 'shelf' are both fixed"),
+        (["desk", f"robot/{ROBOT.root}"], f"'desk' and 'robot/{ROBOT.root}' are both fixed"),
     ],
 )
 @pytest.mark.parametrize("name", ["collision", "no_collision", "contact_force"])

@@ -11,6 +11,7 @@ from typing import Final
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
+from manipcli.model.batch_kinematics import still_links
 from manipcli.model.checks.too_many_joints import MAX_JOINTS
 from manipcli.model.normalise import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel
@@ -108,7 +109,11 @@ class PybulletEngine:
             )
         self._merge = ContactMerger(
             {(k, -1): body.name for body, k in zip(scene.bodies, self._bodies, strict=True)}
-            | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()}
+            | {(self._robot, link): f"robot/{name}" for link, name in link_names.items()},
+            still=[
+                *((k, -1) for body, k in zip(scene.bodies, self._bodies, strict=True) if body.fixed),
+                *((self._robot, link) for link, name in link_names.items() if name in still_links(robot)),
+            ],
         ).merged
         unlike = list(differences(p, client, self._robot, robot, link_names))
         if unlike:

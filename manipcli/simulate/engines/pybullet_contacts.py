@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import attrgetter, itemgetter
 from typing import Final
 
@@ -54,10 +54,16 @@ def _touching(points: Sequence[ContactPoint]) -> list[Pair]:
 
 
 class ContactMerger:
-    """Sums up contact points. `parts`: the name of every (body, link); a body's base is its link -1."""
+    """Sums up contact points.
 
-    def __init__(self, parts: Mapping[tuple[int, int], str]) -> None:
+    Args:
+        parts: the name of every (body, link); a body's base is its link -1.
+        still: those that nothing can move: that a robot stands on the floor is no contact.
+    """
+
+    def __init__(self, parts: Mapping[tuple[int, int], str], *, still: Collection[tuple[int, int]] = ()) -> None:
         self._parts = parts
+        self._still = frozenset((a, b, k, m) for a, k in still for b, m in still)
         self._known: dict[Pair, tuple[str, str]] = {}
 
     def merged(self, points: Sequence[ContactPoint]) -> tuple[Contact, ...]:
@@ -69,6 +75,8 @@ class ContactMerger:
             if force > 0.0 or distance <= 0.0:
                 pair = point[1:5]
                 if pair not in forces:
+                    if pair in self._still:
+                        continue
                     forces[pair], depths[pair] = force, distance
                 else:
                     forces[pair] += force
