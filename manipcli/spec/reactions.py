@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import radians
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -16,7 +17,7 @@ class ReplanSpec(Model):
     """How far things may be from where a step was planned to begin; where one is further, it is planned again."""
 
     position: Annotated[Length, Field(gt=0, description="Of a body [m], above 0. Default 5 mm.")] = 0.005
-    rotation: Annotated[AngleTolerance, Field(description="Of a body [rad], above 0 to pi. Default 2 deg.")] = 0.035
+    rotation: AngleTolerance = Field(radians(2), description="Of a body [rad], above 0 to pi. Default 2 deg.")
     slip: Annotated[Length, Field(gt=0, description="Of what is held, in the hand [m], above 0. Default 1 mm.")] = 0.001
     joints: Annotated[
         JointTolerance, Field(description="Of a joint that is commanded [rad or m], above 0 to pi. Default 0.05.")

@@ -184,7 +184,7 @@ def test_what_slipped_in_the_hand_is_put_down_where_it_belongs(world_at: WorldOf
 def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_count(
     world_at: WorldOf, monkeypatch: pytest.MonkeyPatch, turn: float
 ) -> None:
-    """As for an arm that can only plan with the object turned in the hand as it was planned to be; 0.035 rad count."""
+    """As for an arm that can only plan with the object turned in the hand as it was planned to be; 2 deg count."""
     world = world_at(PLACE)
     planner, before, step = world.plan.planner, world.before(PLACE), world.task.spec.steps[PLACE]
     world.put("block", before.bodies[0] @ Transform.of(xyz=(0.004, 0.0, 0.0), rpy=(turn, 0.0, 0.0)))
