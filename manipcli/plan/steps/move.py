@@ -43,8 +43,9 @@ class MoveSpec(Model):
     The plan takes it to slide with the tool; where it does not, later steps are planned again.
 
     A `guarded` move is planned to its end and stops on its way there, slowing down within its limits, where the step's
-    `until` comes to hold; later steps are planned again from where it is told to be then. Until it runs it is taken to
-    stop where it meets what it may `touch`. At its end it waits for `until` as other steps do.
+    `until` comes to hold; later steps are planned again from the position that it is commanded to hold then, which is a
+    little inside of what it presses on. Until it runs it is taken to stop where it meets what it may `touch`. At its end
+    it waits for `until` as other steps do.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
