@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.core.errors import ManipcliError
 from manipcli.model.build_scene import build_scene
 from manipcli.model.scene import Body
 from manipcli.simulate.engines import pybullet_world
@@ -105,3 +106,12 @@ def test_both_ways_to_make_a_body_move_alike(tmp_path: Path, monkeypatch: pytest
         return place
 
     np.testing.assert_allclose(falls(16), falls(1), atol=1e-9)
+
+
+def test_a_body_that_the_engine_cuts_is_told(
+    bullet: tuple[ModuleType, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p, client = bullet
+    monkeypatch.setattr(pybullet_world, "MAX_SHAPES", 100)
+    with pytest.raises(ManipcliError, match="another body than 'cup': it has 16 shapes instead of 25"):
+        add_body(p, client, _cup(24, fixed=True), tmp_path)

@@ -1,4 +1,4 @@
-"""What Bullet made of a robot, compared with what the robot is: Bullet drops what it does not like without a word."""
+"""What Bullet made of bodies and robot, compared with what these are: it drops what it does not like without a word."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.normalise import MASSLESS, inside_triangle
 from manipcli.model.robot import Inertial, RobotModel
+from manipcli.model.scene import Body
 
 RELATIVE: Final = 1e-4
 """Of masses, lengths and moments; these as Bullet was given them, which is inside of what can be."""
@@ -36,6 +37,16 @@ def differences(p: ModuleType, client: int, body: int, robot: RobotModel, links:
     for k in links:
         if k >= 0:
             yield from _unlike_joint(p.getJointInfo(body, k, physicsClientId=client), robot)
+
+
+def body_differences(p: ModuleType, client: int, k: int, body: Body) -> Iterator[str]:
+    """Shapes that Bullet's body `k` lacks of those of `body`, which is of the scene, and another mass."""
+    shapes = len(p.getCollisionShapeData(k, -1, physicsClientId=client))
+    if shapes < len(body.geometries):  # the parts of a mesh count, each
+        yield f"it has {shapes} shapes instead of {len(body.geometries)}"
+    mass, wanted = float(p.getDynamicsInfo(k, -1, physicsClientId=client)[0]), 0.0 if body.fixed else body.mass
+    if not abs(mass - wanted) <= ABSOLUTE + RELATIVE * wanted:
+        yield f"it has a mass of {mass:g} kg instead of {wanted:g} kg"
 
 
 # PyBullet's tuples come untyped; what stands where is said by its manual, and a wrong guess ends in an error here.

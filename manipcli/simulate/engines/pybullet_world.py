@@ -9,12 +9,14 @@ from typing import Final, cast
 
 import numpy as np
 
+from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Transform
 from manipcli.model.mesh_files import clean_mesh
 from manipcli.model.normalise import MASSLESS, body_urdf
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Mesh, Mimic, RobotModel, Sphere
 from manipcli.model.scene import Body
 from manipcli.simulate.engines.pybullet_contacts import Vector
+from manipcli.simulate.engines.pybullet_readback import body_differences
 
 MIMIC_ERP: Final = 0.2
 MIMIC_EFFORT: Final = 200.0
@@ -40,6 +42,9 @@ def add_body(p: ModuleType, client: int, body: Body, folder: Path) -> int:
     )
     if not body.fixed:
         p.changeDynamics(k, -1, localInertiaDiagonal=list(np.diag(body.inertia)), physicsClientId=client)
+    unlike = "; ".join(body_differences(p, client, k, body))
+    if unlike:
+        raise ManipcliError(f"Bullet holds another body than '{body.name}': {unlike}")
     return k
 
 
