@@ -38,6 +38,7 @@ from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model
+from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.load import load_task as load_spec
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
@@ -99,7 +100,7 @@ def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | No
         steps=places[0],
         expectations=places[1],
         limits=tuple(
-            limit_of(one.body, outcome.unit)
+            _limit(one, outcome.unit)
             for one, outcome in zip(recorded_task_file(recording, path).spec.judged, verdict.expectations, strict=False)
         ),
         sources=tuple(
@@ -217,6 +218,12 @@ def _missed(one: ExpectationOutcome) -> str:
     if one.outcome == "not_evaluated":
         return "was never evaluated"
     return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
+
+
+def _limit(asked: ExpectationSpec, unit: str) -> float | None:
+    """As `limit_of`, of an expectation; of a combination none, since one of several decides, and none of `never`."""
+    condition = asked.condition
+    return None if condition.combines or asked.quantifier == "never" else limit_of(condition.body, unit)
 
 
 def limit_of(spec: Model, unit: str) -> float | None:

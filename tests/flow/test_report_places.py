@@ -57,6 +57,25 @@ def test_expectations_and_watches_stand_where_the_user_wrote_them(log: Path) -> 
 
 
 @pytest.mark.slow
+def test_expectations_of_every_form_stand_on_the_page(tmp_path: Path) -> None:
+    expectations = (
+        ("all: [{duration: {below: 2 s}}, {energy: {below: 3 J}}]", None),
+        ("any: [{all: [{duration: {below: 2 s}}]}]", None),
+        ("not: {duration: {below: 3 s}}", None),
+        ("always: {any: [{duration: {below: 3 s}}, {tool_speed: {below: 1 m/s}}]}", None),
+        ("never: {duration: {below: 3 s}}", None),
+        ("always: {duration: {below: 3 s}}", 3.0),
+        ("eventually: {tool_speed: {below: 1 m/s}}", 1.0),
+    )
+    task = TASK[: TASK.index("watch:")].replace("steps: [{wait: 50 ms}]", "steps: [{wait: 2 ms}]")
+    (tmp_path / "mine.yaml").write_text(task + "".join(f"  - {{{text}}}\n" for text, _ in expectations))
+    run_task(tmp_path / "mine.yaml", log=tmp_path / "run.mcap")
+    page = log_page(tmp_path / "run.mcap")
+    assert page.limits == (2.0, *(limit for _, limit in expectations))
+    render_page(page)
+
+
+@pytest.mark.slow
 def test_the_page_tells_what_was_drawn(log: Path) -> None:
     page = log_page(log)
     assert page.verdict.drawn is not None
