@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.text import number_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.posture import position_limits
 
@@ -32,6 +33,7 @@ _ENOUGH = 3  # solutions among which the nearest to the seed is taken
 _AT_LIMIT = 1e-6  # rad or m
 _TURNED = math.radians(60.0)  # a pose missed by more is one to which the arm cannot turn its tool
 _FAR = 50.0  # m: a goal beyond this was hardly meant in metres
+_ALL = 6  # joints that it takes for any pose
 _UNLIMITED = math.pi  # half the interval from which restarts draw a joint without limits
 
 
@@ -172,6 +174,9 @@ class InverseKinematics:
             hint = "in millimetres? write '500 mm', not 500"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
+        if len(self.joints) < _ALL and distance <= _FAR:
+            few = number_of(len(self.joints), "joint")
+            hint += f"; an arm of {few} takes few of them at a place: `move: {{to: ...}}` names joint positions"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint=hint,

@@ -84,6 +84,19 @@ def test_a_goal_in_millimetres_is_guessed(solver: InverseKinematics, middle: Arr
     assert "millimetres" in (refused.value.hint or "")
 
 
+def test_an_arm_of_few_joints_is_told_of_joint_positions(
+    solver: InverseKinematics, make_arm7: Callable[..., RobotModel], middle: Array
+) -> None:
+    goal = Transform.of(xyz=(0.3, 0.0, 0.8), rpy=(0.5, 0.5, 0.5))
+    two = InverseKinematics(Kinematics(make_arm7()), ARM[:2], "link_7", X_LT=X_LT)
+    with pytest.raises(NotPlannable) as refused:
+        two.solve(goal, middle, np.random.default_rng(0))
+    assert "an arm of 2 joints takes few of them at a place: `move: {to: ...}`" in (refused.value.hint or "")
+    with pytest.raises(NotPlannable) as refused:
+        solver.solve(Transform.of(xyz=(3.0, 0.0, 0.8)), middle, np.random.default_rng(0))
+    assert "few" not in (refused.value.hint or "")
+
+
 def test_a_pose_that_is_barely_missed_is_told_with_what_would_have_counted(middle: Array) -> None:
     told = Solution(middle, position_error=2.4e-6, angle_error=1.5e-4, at_limit=()).explain()
     assert told.startswith("the nearest pose is 0.0024 mm and 0.0086 deg off, and up to 0.01 mm and 0.0057 deg counts")
