@@ -35,6 +35,8 @@ YAWS_DEG = (0.0, 15.0, -15.0, 35.0, -35.0)
 """Turns of the approach about the vertical that are tried, away from the straight line robot - object."""
 UPRIGHT = 0.99
 """Cosine of the angle between two axes that count as one: what stands, what points straight down."""
+ALIKE = 0.5
+"""Cosine of the angle between the ways in which two hands point that can be told to be turned by less or more."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
 HIGHER = (2 / 3, 5 / 6)
@@ -224,8 +226,9 @@ def _orientations(spec: ApproachSpec, X_WO: Transform, X_WB: Transform, R_WT: Ar
 
 
 def _nearer_first(one: Array, other: Array, R: Array) -> list[Array]:
-    """Both rotations (3, 3), the first as it is unless `R` is clearly nearer to the other."""
-    return [other, one] if np.sum(other * R) > np.sum(one * R) + 1e-3 else [one, other]
+    """Both rotations (3, 3), the other first where `R` points about the same way and is clearly nearer to that."""
+    alike = one[:, 2] @ R[:, 2] > ALIKE
+    return [other, one] if alike and np.sum(other * R) > np.sum(one * R) + 1e-3 else [one, other]
 
 
 def _frame(x: Array, z: Array) -> Array:
