@@ -31,7 +31,7 @@ MUCH: Final = 1.1
 """So many times the force that is asked, and a hand that cannot be told it is told of."""
 RESERVE: Final = 2.0
 """So many times its weight friction is to carry: it also accelerates what is carried, and keeps it from turning.
-Measured with blocks between two fingers, lifted 10 cm: up to 1.6 none stays in the hand, at 2 some do, at 2.5 all."""
+Measured with blocks between two fingers, lifted 10 cm: up to 1.6 none stays in the hand, at 2 few do, at 2.5 most."""
 LEVEL: Final = 0.1
 """A finger whose way climbs less than this carries by friction alone."""
 LIFTED: Final = 5e-3
