@@ -97,7 +97,7 @@ class TraySpec(Model):
 
 
 class MeshSpec(Model):
-    """A mesh file (STL, OBJ, Collada), used as its convex hull."""
+    """A mesh file (STL, OBJ, Collada), used as its convex hull; the engine makes one of each part of an OBJ."""
 
     file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
     scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
