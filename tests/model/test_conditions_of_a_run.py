@@ -173,23 +173,25 @@ def test_contact_force_sums_up_and_is_bounded_on_both_sides() -> None:
 
 
 def test_a_mean_force_is_that_of_its_window_however_the_ticks_come() -> None:
-    """Against the mean of the ticks of each window; all ticks at once and a few at a time give the same numbers."""
+    """Against the mean of the ticks before each; all at once, a few at a time, of a log that holds every seventh."""
     rng = np.random.default_rng(4)
     forces = rng.uniform(0.0, 100.0, T)
-    moments = touching(
-        *((float(time), [("cube", "robot/one", force)]) for time, force in zip(TIMES, forces, strict=True))
-    )
-    step = TIMES[1] - TIMES[0]
+    moments = touching(*((float(t), [("cube", "robot/one", force)]) for t, force in zip(TIMES, forces, strict=True)))
+    condition: Condition[Any] = CONDITIONS["contact_force"]
     for ticks in (1, 7, 2 * T):
-        window = {"of": "cube", "above": 1.0, "mean_over": float(ticks * step)}
-        expected = [forces[max(0, k + 1 - ticks) : k + 1].mean() - 1.0 for k in range(T)]
+        window = {"of": "cube", "above": 1.0, "mean_over": ticks * PERIOD}
+        means = [forces[0], *(forces[max(0, k - ticks) : k].mean() for k in range(1, T))]
         found = read("contact_force", moments, **window).margins
-        assert found == pytest.approx(expected)
-        condition: Condition[Any] = CONDITIONS["contact_force"]
+        assert found == pytest.approx(np.array(means) - 1.0)
+        for cuts in ([0, 1, 4, 30, 31, T], [*range(T + 1)]):
+            gauge = condition.open(condition.spec.model_validate(window), WORLD)
+            parts = [gauge(moments.part(first, last)).margins for first, last in pairwise(cuts)]
+            assert np.array_equal(np.concatenate(parts), found)
         gauge = condition.open(condition.spec.model_validate(window), WORLD)
-        cuts = [0, 1, 4, 30, 31, T]
-        parts = [gauge(moments.part(first, last)).margins for first, last in pairwise(cuts)]
-        assert np.array_equal(np.concatenate(parts), found)
+        thinned = gauge(replace(moments, states=moments.states.map(lambda a: a[::7])))
+        assert thinned.margins == pytest.approx(found[::7])
+    text = read("contact_force", moments, of="cube", above=1, mean_over="50 ms").found(0).text
+    assert text.startswith("the mean force over 50 ms on 'cube' is ")
 
 
 def test_collision_and_its_absence_name_the_hardest_touch() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.model.moments import ROUNDING, Moments
+from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, least, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair, is_part, unknown_part
@@ -26,9 +26,9 @@ class ContactForceSpec(Model):
     of: str | None = Field(default=None, description="Instead of `pair`: a body, `robot` or `robot/LINK`.")
     below: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Largest force [N].")
     above: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Least force [N].")
-    mean_over: Annotated[Time, Field(gt=0, le=60)] | None = Field(
+    mean_over: Annotated[Time, Field(ge=1e-4, le=60)] | None = Field(
         default=None,
-        description="Of the force its mean over the last so long [s] counts, at most 60 s. Default: each tick's.",
+        description="Of the force its mean over the last so long [s] counts, 0.1 ms to 60 s. Default: each tick's.",
     )
 
     @model_validator(mode="after")
@@ -59,18 +59,20 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
         part = spec.of or ""
         return is_part(part, contact.a) != is_part(part, contact.b)
 
-    average = None if spec.mean_over is None else _Mean(spec.mean_over)
+    def pressed(contacts: Sequence[Contact]) -> float:
+        return sum(c.force for c in contacts if counts(c))
+
+    mean = None if spec.mean_over is None else _Mean(spec.mean_over, pressed)
+    kind = "force" if spec.mean_over is None else f"mean force over {readable(spec.mean_over, 's')}"
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
     def look(moments: Moments) -> Reading:
-        force = moments.of_contacts(lambda contacts: sum(c.force for c in contacts if counts(c)))
-        if average is not None:
-            force = average.of(moments.times, force)
+        force = moments.of_contacts(pressed) if mean is None else mean.of(moments)
 
         def say(k: int) -> str:
             limits = [("below", spec.below), ("above", spec.above)]
             asked = " and ".join(f"{word} {readable(value, 'N')}" for word, value in limits if value is not None)
-            return f"the force {what} is {readable(float(force[k]), 'N')}; {asked}"
+            return f"the {kind} {what} is {readable(float(force[k]), 'N')}; {asked}"
 
         readings = []
         if spec.below is not None:
@@ -83,23 +85,47 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
 
 
 class _Mean:
-    """The mean over the last `window` [s] of what it is told tick by tick, however many ticks come at once."""
+    """The mean over the last `window` [s] of a force, each value of which holds until the next; at the first tick the
+    value. It is that of the force and not of the ticks: of a log that holds fewer of them it is the same.
 
-    def __init__(self, window: float) -> None:
-        self._window = window
-        self._times, self._values = np.zeros((2, 0))
+    F(t) = sum of value * how long it held, up to t; the mean is (F(t) - F(t - window)) / window.
+    """
 
-    def of(self, times: Array, values: Array) -> Array:
+    def __init__(self, window: float, force: Callable[[Sequence[Contact]], float]) -> None:
+        self._window, self._force = window, force
+        self._begin = 0.0
+        self._times: list[float] = []
+        self._values: list[float] = []
+        self._sums: list[float] = []
+
+    def of(self, moments: Moments) -> Array:
         """(T,) at each of the next ticks."""
-        seen = len(self._times)
-        times, values = np.concatenate([self._times, times]), np.concatenate([self._values, values])
-        firsts = np.searchsorted(times, times[seen:] - self._window + ROUNDING, side="right")
-        # Summed without rounding: the same however the ticks are dealt out.
-        sums = [math.fsum(values[first:last]) for last, first in enumerate(firsts, start=seen + 1)]
-        counts = np.arange(seen + 1, len(times) + 1) - firsts
-        self._times, self._values = times[firsts[-1] :], values[firsts[-1] :]
-        means: Array = np.array(sums) / counts
-        return means
+        ticks = moments.times
+        if not self._times:
+            self._begin = float(ticks[0])
+            self._append(self._begin, self._force(moments.touching(0)), 0.0)
+        for one in moments.contacts:
+            held = one.time - self._times[-1]
+            if held > 0.0:
+                self._append(one.time, self._force(one.contacts), self._sums[-1] + self._values[-1] * held)
+        times, values, sums = np.array([self._times, self._values, self._sums])
+
+        def total(at: Array) -> Array:
+            k = np.searchsorted(times, at, side="right") - 1
+            found: Array = sums[k] + values[k] * (at - times[k])
+            return found
+
+        since = np.maximum(ticks - self._window, self._begin)
+        mean = np.full(len(ticks), values[0])
+        np.divide(total(ticks) - total(since), ticks - since, out=mean, where=ticks > since)
+        old = int(np.searchsorted(times, since[-1], side="right")) - 1
+        del self._times[:old], self._values[:old], self._sums[:old]
+        return mean
+
+    def _append(self, time: float, value: float, before: float) -> None:
+        self._times.append(time)
+        self._values.append(value)
+        self._sums.append(before)
 
 
 def check(spec: ContactForceSpec, setting: Setting) -> tuple[Problem, ...]:
