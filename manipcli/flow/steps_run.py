@@ -245,7 +245,6 @@ class StepsRun:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
         texts = []
-        stopped = False
         with self._asked(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
@@ -265,7 +264,6 @@ class StepsRun:
                 if end.weak:
                     self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
-                stopped = stopped or end.stopped
                 texts += [end.text] if end.text else []
             self._believed = planned.plan.end
             if awaited and until is not None:
@@ -277,7 +275,8 @@ class StepsRun:
         held = self._still_held(before) if planned.plan.end.carried is None else ""
         if held:
             return MotionEnd("failed", held)
-        left = self._lost(planned) if stopped else self._left_behind(planned)
+        guarded = any(motion.guarded for motion in planned.plan.motions)
+        left = self._lost(planned) if guarded else self._left_behind(planned)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -308,7 +307,7 @@ class StepsRun:
         return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
 
     def _lost(self, planned: PlannedStep) -> MotionEnd | None:
-        """The same for a step that was stopped on its way: where its end is, only the hand can tell."""
+        """The same for a guarded step: where it ends only the hand can tell."""
         carried = planned.plan.end.carried
         if carried is None or self._measured.situation(planned.plan.end).carried is not None:
             return None

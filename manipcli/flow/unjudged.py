@@ -7,13 +7,14 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Finding, Severity
 from manipcli.model.condition import Seen, World
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.formula import absent
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
+from manipcli.plan.steps import STEPS
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
@@ -24,7 +25,7 @@ TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "refer
 
 def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
     """A warning for each expectation and watch that needs a topic which `record:` leaves out, and for each `until` that
-    the engine cannot answer."""
+    the engine cannot answer; an error where a move is guarded by it."""
     left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
     physics = task.spec.simulation.engine not in ENGINES.names or ENGINES[task.spec.simulation.engine].physics == "full"
     if not left_out and physics:
@@ -48,5 +49,7 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
     for k, step in enumerate(task.spec.steps):
         reason = None if step.until is None else absent(step.until, live, CONDITIONS)
         if reason is not None:
-            message = f"`until` is not waited for: {reason}"
-            yield Finding("TASK237", message, task.place("steps", k, "until"), severity="warning")
+            guarded = STEPS[step.verb].guarded(step.body)
+            message = f"`until` is not waited for{', by which this move is guarded' if guarded else ''}: {reason}"
+            severity: Severity = "error" if guarded else "warning"  # it would go all its way, which nobody planned for
+            yield Finding("TASK237", message, task.place("steps", k, "until"), severity=severity)

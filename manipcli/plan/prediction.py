@@ -55,23 +55,22 @@ def spilled(planner: Planner, situation: Situation, into: str) -> Situation:
     return put(planner, situation, landed)
 
 
-def met(planner: Planner, before: Situation, motion: JointTrajectory, touching: Pairs) -> Situation:
-    """Where on its way one of the pairs that may touch is about to, or to press deeper than at the start; else at the
-    end."""
+def met(planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, touching: Pairs) -> Situation:
+    """`now`, or where on the way there one of the pairs that may touch is about to, or to press deeper than before."""
     query, pairs = planner.query(before), set(map(frozenset, touching))
 
     def depth(q: Array) -> float:
         return min((hit.distance for hit in query.every(q) if {hit.a, hit.b} in pairs), default=np.inf)
 
-    way = _looks(planner, before, motion)
+    way = _looks(planner, now, motion)
     deep = min(0.0, depth(way[0])) - PRESSED
     free = next((k for k, q in enumerate(way) if depth(q) < deep), len(way)) - 1
-    return carried_along(planner, before, before.moved(frozen(way[free])))
+    return carried_along(planner, before, now.moved(frozen(way[free])))
 
 
-def _looks(planner: Planner, before: Situation, motion: JointTrajectory) -> Array:
-    """(_LOOKS, n) joint positions on the way, the first and the last among them."""
-    way = np.tile(before.position, (_LOOKS, 1))
+def _looks(planner: Planner, situation: Situation, motion: JointTrajectory) -> Array:
+    """(_LOOKS, n) joint positions on the way, the first and the last among them; other joints are as in `situation`."""
+    way = np.tile(situation.position, (_LOOKS, 1))
     columns = planner.robot.indices(motion.names)
     way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
     return way

@@ -37,14 +37,13 @@ class MotionEnd:
     """How a motion or a wait ended.
 
     `awaited`: its time was over because the condition under `until` did not hold; `weak`: it is done, and a finger did
-    not press as hard as it was asked to; `stopped`: it is done, before its end.
+    not press as hard as it was asked to.
     """
 
     outcome: Literal["done", "failed", "timeout"]
     text: str = ""
     awaited: bool = False
     weak: bool = False
-    stopped: bool = False
 
 
 DONE: Final = MotionEnd("done")
@@ -116,7 +115,9 @@ class Executor:
             if holds and busy:
                 left = max(0, last_tick - session.ticks) * session.period
                 self._come_to_rest()
-                return replace(DONE, text=f"stopped {left:.2f} s before its end: `until` held", stopped=True)
+                if session.manager.faults:
+                    return _fault(session)
+                return replace(DONE, text=f"stopped {left:.2f} s before its end: `until` held")
             if not busy and (awaited is None or holds):
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if over and deadline is not None:
@@ -154,11 +155,13 @@ class Executor:
             self._session.tick()
 
     def _come_to_rest(self) -> None:
-        """Cancel what is on, and tick until nothing is told to move any more."""
+        """Cancel what is on, and tick until nothing is told to move any more, or a controller fails."""
         self._cancel()
         self._tick()
-        while any(controller.output.velocity.any() for controller in self._serving):
+        faults = self._session.manager.faults
+        while not faults and any(controller.output.velocity.any() for controller in self._serving):
             self._tick()
+            faults = self._session.manager.faults
 
     def _ticks(self, duration: float) -> int:
         """In how many ticks `duration` [s] is over."""

@@ -41,6 +41,9 @@ def test_a_guarded_move_needs_a_condition_and_leave_to_plan_again(tmp_path: Path
     assert missing == "TASK242 5 steps[0].move.guarded: nothing says where it stops: the step has no `until`"
     (fixed,) = told(task_file(tmp_path, f"{ARM}replan: false\n{guarded}{until}"))
     assert fixed.startswith("TASK242 6 steps[0].move.guarded: where it stops is not known beforehand")
+    touch = guarded + "    until: {contact_force: {of: robot, above: 5 N}}\n"
+    (deaf,) = told(task_file(tmp_path, f"{ARM}simulation: {{engine: kinematic}}\n{touch}"))
+    assert deaf.startswith("TASK237 7 `until` is not waited for, by which this move is guarded: ")
     assert told(task_file(tmp_path, f"{ARM}replan: false\nsteps:\n  - move: {{to: home}}\n{until}")) == []
 
 
@@ -103,3 +106,21 @@ def test_a_hand_presses_as_hard_as_asked_and_goes_on_from_there(tmp_path: Path) 
     tool = np.array([kinematics.forward(q, "panda_hand").p for q in states.position[:: len(times) // 400]])
     # From where it was commanded to be, as deep in the table as 20 N push it away from there.
     assert 0.035 < tool[-1, 2] - tool[:, 2].min() < 0.05
+
+
+@pytest.mark.slow
+def test_what_a_guarded_move_carries_beyond_its_first_touch_is_still_held(tmp_path: Path) -> None:
+    """The block pushes a toy, which is planned to stop it; the condition holds only where all rests, at the end."""
+    file = task_file(
+        tmp_path,
+        f"""{PANDA}{TABLE}  block: {{box: {{size: [4 cm, 4 cm, 6 cm]}}, mass: 100 g, rests_on: table, at: [0.5, -0.2]}}
+  toy: {{box: {{size: [12 cm, 12 cm, 7 cm]}}, mass: 30 g, friction: 0.2, rests_on: table, at: [0.5, -0.08]}}
+steps:
+  - pick: {{object: block, approach: {{from: top}}}}
+  - lift: {{object: block, by: 4 cm}}
+  - move: {{pose: {{xyz: [0.5, 0, 0.27], rpy: [180 deg, 0, 0]}}, path: linear, speed: 0.1, touch: [toy], guarded: true}}
+    until: {{all: [{{moved: {{object: toy, by: 10 cm}}}}, {{at_rest: {{object: toy, below: 0.02 mm/s}}}}]}}
+""",
+    )
+    report = run_task(file, log=tmp_path / "log.mcap", allow_outside=True)
+    assert report.verdict.verdict == "passed", report.verdict.text

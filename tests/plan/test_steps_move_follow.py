@@ -156,6 +156,9 @@ def test_a_guarded_move_is_predicted_to_stop_where_it_meets_what_it_may_touch(be
     gap = arm.body("block").p[2] - 0.025 - 0.2  # its middle, half its height, the table's top
     assert -0.001 <= gap < 0.005
     assert arm.now.carried == held.carried
+    fingers = {"panda_joint1": 0.3, "panda_finger_joint1": 0.01}
+    there = [bench("panda").plan("move", {"to": fingers, "touch": ["block"], "guarded": one}) for one in (True, False)]
+    np.testing.assert_array_equal(there[0].end.position, there[1].end.position)
     np.testing.assert_array_equal(arm.now.position[~np.isin(np.arange(len(end)), columns)], np.delete(end, columns))
     up = arm.do("move", {**into, "pose": {"xyz": [0, 0, "-10 cm"]}})
     np.testing.assert_allclose(up.end.position[columns], up.motions[0].trajectory.positions[-1], atol=1e-12)

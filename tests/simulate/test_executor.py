@@ -79,7 +79,7 @@ def test_a_guarded_motion_stops_within_its_limits_where_until_holds(session_of: 
 
     executor = Executor(session, alarm=lambda state: way.append(float(state.position[0])) or "")  # type: ignore[func-returns-value]
     end = executor.run(move(awaits=True, guarded=True), until=until, deadline=None)
-    assert (end.outcome, end.stopped) == ("done", True)
+    assert end.outcome == "done"
     assert end.text == "stopped 0.24 s before its end: `until` held"
     speed = np.diff(way) / session.period
     assert speed.max() == pytest.approx(1.5, rel=0.01)  # of a cubic over 0.5 m in 0.5 s, at its middle, where it stops
@@ -90,10 +90,29 @@ def test_a_guarded_motion_stops_within_its_limits_where_until_holds(session_of: 
     assert float(session.engine.read().position[0]) == rest
 
 
+def test_a_controller_that_fails_while_a_guarded_motion_slows_down_ends_it(
+    session_of: SessionOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = session_of()
+    (slide, *_) = session.manager.controllers
+
+    def spoilt(*_: Any, **__: Any) -> None:
+        raise RuntimeError("spoilt")
+
+    def until(state: Any) -> bool:
+        if state.position[0] >= 0.25:
+            monkeypatch.setattr(slide, "update", spoilt)
+        return bool(state.position[0] >= 0.25)
+
+    executor = Executor(session, alarm=lambda _: "" if session.time < 1.0 else "it goes on")
+    end = executor.run(move(awaits=True, guarded=True), until=until, deadline=None)
+    assert (end.outcome, "spoilt" in end.text) == ("failed", True)
+
+
 def test_a_guarded_motion_waits_at_its_end_for_what_did_not_hold_on_its_way(session_of: SessionOf) -> None:
     session = session_of()
     end = Executor(session).run(move(awaits=True, guarded=True), until=lambda _: session.ticks >= 700, deadline=2.0)
-    assert (end.outcome, end.stopped, session.ticks) == ("done", False, 700)
+    assert (end.outcome, end.text, session.ticks) == ("done", "", 700)
     end = Executor(session).run(move(0.0, awaits=True, guarded=True), until=lambda _: False, deadline=2.0)
     assert (end.outcome, end.awaited, session.ticks) == ("timeout", True, 2000)
 
@@ -101,7 +120,7 @@ def test_a_guarded_motion_waits_at_its_end_for_what_did_not_hold_on_its_way(sess
 def test_a_guarded_motion_that_need_not_begin_stays(session_of: SessionOf) -> None:
     session = session_of()
     end = Executor(session).run(move(awaits=True, guarded=True), until=lambda _: True, deadline=None)
-    assert end.stopped
+    assert "`until` held" in end.text
     assert session.time < 0.1
     assert float(session.engine.read().position[0]) < 0.005
 

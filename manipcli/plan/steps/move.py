@@ -43,9 +43,9 @@ class MoveSpec(Model):
     The plan takes it to slide with the tool; where it does not, later steps are planned again.
 
     A `guarded` move is planned to its end and stops on its way there, slowing down within its limits, where the step's
-    `until` comes to hold; later steps are planned again from the position that it is commanded to hold then, which is a
-    little inside of what it presses on. Until it runs it is taken to stop where it meets what it may `touch`. At its end
-    it waits for `until` as other steps do.
+    `until` comes to hold; later steps are planned again from the position that it is commanded to hold then, a little
+    inside of what it presses on. Until it runs it is taken to stop where it meets what it may `touch`. At its end it
+    waits for `until` as other steps do.
     """
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
@@ -109,7 +109,7 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
     end = planned.end
     if spec.touch and motion.trajectory is not None:
         if spec.guarded:
-            end = met(planner, situation, motion.trajectory, allowed)
+            end = met(planner, situation, end, motion.trajectory, allowed)
         else:
             end = pushed(planner, situation, end, motion.trajectory, spec.touch)
     return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
