@@ -91,7 +91,7 @@ class _Builder:
         """What keeps two bodies from starting inside each other."""
         specs = [self.spec.scene[name] for name in (a, b) if name in self.spec.scene]
         containers = {spec.inside for spec in specs}
-        if len(specs) == 2 and len(containers) == 1 and None not in containers:
+        if len(specs) == 2 and len(containers) == 1 and None not in containers and None in [spec.at for spec in specs]:
             return f"say where in '{specs[0].inside}', as `at: [1 cm, 0]`: it counts from the middle"
         return "move one of them; things that only touch are fine"
 

@@ -237,7 +237,7 @@ def _told(
         return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
     kinds = shape.at(model, path, dict(first.tags))
-    hint = hints.of_type(kind, node, kinds)
+    hint = hints.of_type(kind, node, kinds, item=isinstance(path[-1], int))
     if hint is None and kind in ("model_type", "model_attributes_type"):
         hint = hints.to_write(kinds)
     hint = hint or _described(_field(first, model), path)

@@ -67,8 +67,9 @@ def its_key(node: Node, kinds: Sequence[object]) -> str | None:
     return to_write(kinds) if isinstance(node, ScalarNode) and node.value in known else None
 
 
-def of_type(kind: str, node: Node, kinds: Sequence[object]) -> str | None:
-    """Where a value is of none of the `kinds` that may stand there: the YAML that was meant."""
+def of_type(kind: str, node: Node, kinds: Sequence[object], *, item: bool) -> str | None:
+    """Where a value, maybe an `item` of a list, is of none of the `kinds` that may stand there: the YAML that was
+    meant."""
     value = node.value if isinstance(node, ScalarNode) else None
     if isinstance(node, ScalarNode) and value is None:
         return "the key has no value"
@@ -79,7 +80,7 @@ def of_type(kind: str, node: Node, kinds: Sequence[object]) -> str | None:
     if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, ...) for one in kinds):
         return f"write [{value}]"
     if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, str) for one in kinds):
-        return "a pair is a list of its own: [[A, B]]"
+        return "a pair is a list of its own: [[A, B]]" if item else "a pair is a list: [A, B]"
     if kind == "string_type" and isinstance(value, int | float):
         return "quotes make a text of it"
     return None
