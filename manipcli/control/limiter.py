@@ -141,7 +141,7 @@ class _Efforts:
         command: JointCommand,
         position: Array,
         velocity: Array,
-        told: Cut,
+        tally: Cut,
     ) -> None:
         """After `inside` has said that something may have to be."""
         own = self._limits
@@ -162,7 +162,7 @@ class _Efforts:
         if cut.any():
             broken = self._window.broken()[:3]
             broken[:2] &= limited == 0.0  # where a joint is too far or too fast, efforts that lead back go through
-            told.add(_EFFORTS, cut, broken)
+            tally.add(_EFFORTS, cut, broken)
             command.effort[:] = limited
 
 
@@ -183,7 +183,7 @@ class _Positions:
         self._by_velocity, self._by_acceleration = rows_of((VELOCITY,), where), rows_of((ACCELERATION,), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, told: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
         where, (wanted, step, growth) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -194,7 +194,7 @@ class _Positions:
         np.abs(self._step, self._size)
         np.subtract(growth, self._size, growth)
         if self._soft or not self._window.holds():
-            self._cut(command, wanted, told)
+            self._cut(command, wanted, tally)
         else:
             self._before[:], self._step[:] = wanted, step
         if command.velocity.any():
@@ -202,17 +202,17 @@ class _Positions:
             limited = limit_velocity(asked, velocity=self._velocity, dt=self._dt)
             cut = limited != asked
             if cut.any():
-                told.add(self._by_velocity, cut, cut[np.newaxis])
+                tally.add(self._by_velocity, cut, cut[np.newaxis])
                 command.velocity[where] = limited
         if command.acceleration.any():
             asked = command.acceleration[where]
             limited = limit_acceleration(asked, acceleration=self._acceleration)
             cut = limited != asked
             if cut.any():
-                told.add(self._by_acceleration, cut, cut[np.newaxis])
+                tally.add(self._by_acceleration, cut, cut[np.newaxis])
                 command.acceleration[where] = limited
 
-    def _cut(self, command: JointCommand, wanted: Array, told: Cut) -> None:
+    def _cut(self, command: JointCommand, wanted: Array, tally: Cut) -> None:
         own, dt = self._own, self._dt
         limited = limit_position(
             wanted,
@@ -230,7 +230,7 @@ class _Positions:
         cut = limited != wanted
         if cut.any():
             self._window.holds()
-            told.add(self._kinds, cut, self._window.broken())
+            tally.add(self._kinds, cut, self._window.broken())
         np.subtract(limited, self._before, self._step)
         self._before[:] = limited
         command.position[self._where] = limited
@@ -251,7 +251,7 @@ class _Velocities:
         self._kinds = rows_of((VELOCITY, ACCELERATION, POSITION), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, told: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
         where, (wanted, change, ahead) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -281,7 +281,7 @@ class _Velocities:
         cut = limited != wanted
         if cut.any():
             self._window.holds()
-            told.add(self._kinds, cut, self._window.broken())
+            tally.add(self._kinds, cut, self._window.broken())
         self._before[:] = limited
         command.velocity[where] = limited
 
@@ -296,7 +296,7 @@ class JointLimiter:
 
     Attributes:
         saturations: (n) int, in how many ticks each joint's command was cut.
-        reasons: (k, n) int, in how many of them by each of the `KINDS` of limits.
+        by_kind: (k, n) int, in how many of them by each of the `KINDS` of limits.
 
     Args:
         limits: (n) of the joints.
@@ -316,7 +316,7 @@ class JointLimiter:
         self._others: list[_Positions | _Velocities] = []
         self._cut = Cut(n)
         self.saturations = np.zeros(n, dtype=np.int64)
-        self.reasons = np.zeros((len(KINDS), n), dtype=np.int64)
+        self.by_kind = np.zeros((len(KINDS), n), dtype=np.int64)
 
     @property
     def saturated(self) -> npt.NDArray[np.bool_]:
@@ -328,7 +328,7 @@ class JointLimiter:
         for group in self._others:
             group.fresh = True
         self.saturations[:] = 0
-        self.reasons[:] = 0
+        self.by_kind[:] = 0
         self._cut.clear()
 
     def _obey(self, modes: Sequence[Mode], dt: float) -> None:
@@ -370,7 +370,7 @@ class JointLimiter:
             group.apply(command, position, velocity, cut)
         if cut.any:
             self.saturations += cut.joints
-            self.reasons += cut.kinds
+            self.by_kind += cut.kinds
 
     def _refuse_not_finite(self, command: JointCommand, position: Array, velocity: Array) -> None:
         # Products tell it quickly, for infinity times 0 is NaN; where they overflow, that only costs the closer look.

@@ -49,7 +49,7 @@ def cuts_of(session: Session) -> Cuts:
     joints = dict(zip(names, map(int, session.saturations), strict=True))
     kinds = {
         kind: dict(zip(names, map(int, counts), strict=True))
-        for kind, counts in zip(KINDS, session.saturated_by, strict=True)
+        for kind, counts in zip(KINDS, session.saturations_by_kind, strict=True)
     }
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
     return Cuts(joints, actuators, session.ticks, kinds)

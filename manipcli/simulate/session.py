@@ -120,9 +120,9 @@ class Session:
         return np.where(self._counted, self._limiter.saturations, 0.0)
 
     @property
-    def saturated_by(self) -> Array:
+    def saturations_by_kind(self) -> Array:
         """(k, n) in how many of these ticks by each of the `KINDS` of limits."""
-        return np.where(self._counted, self._limiter.reasons, 0.0)
+        return np.where(self._counted, self._limiter.by_kind, 0.0)
 
     @property
     def touching(self) -> tuple[Contact, ...]:
@@ -149,7 +149,7 @@ class Session:
         self._touch(state)
         if self._motors.watches:
             limiter = self._limiter
-            self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.reasons[EFFORT])
+            self._motors.count(state.effort, limiter.saturated, limiter.saturations, limiter.by_kind[EFFORT])
         manager = self.manager
         command = manager.update(time, state, self._contact_force)
         if manager.faults:

@@ -88,9 +88,9 @@ def test_ticks_in_which_the_effort_was_too_much_are_counted_apart():
     for effort, speed, counts in ((30.0, 0.0, (1, 1)), (5.0, 3.0, (2, 1)), (-30.0, 0.0, (3, 2)), (5.0, 0.0, (3, 2))):
         command.effort[:] = effort
         limiter.apply(command, np.zeros(1), np.array([speed]), 0.001)
-        assert (limiter.saturations[0], limiter.reasons[EFFORT, 0]) == counts
+        assert (limiter.saturations[0], limiter.by_kind[EFFORT, 0]) == counts
     limiter.reset()
-    assert not limiter.reasons.any()
+    assert not limiter.by_kind.any()
 
 
 @pytest.mark.parametrize(
@@ -120,9 +120,9 @@ def test_a_cut_names_the_limits_that_it_was(mode, wanted, kinds):
     value, q, v = wanted
     getattr(command, mode)[0] = value
     limiter.apply(command, np.array([q, 0.0]), np.array([v, 0.0]), DT)
-    assert {kind for kind, counts in zip(KINDS, limiter.reasons, strict=True) if counts[0]} == kinds
+    assert {kind for kind, counts in zip(KINDS, limiter.by_kind, strict=True) if counts[0]} == kinds
     assert limiter.saturations.tolist() == [int(bool(kinds)), 0]
-    assert not limiter.reasons[:, 1].any()
+    assert not limiter.by_kind[:, 1].any()
 
 
 def test_what_goes_with_a_position_is_limited_too():
