@@ -173,6 +173,7 @@ CONTROLLERS = "controllers:\n  js: %s\n"
         ("", "scene: {b: {sphere: {radius: 1}, mass: 1, xyz: [0, 0, 1]}}\n", "`xyz` stands below `pose`"),
         ("", "scene: {b: {mass: 1, size: [1, 1, 1]}}\n", "`size` stands below `box` or `tray`"),
         ("", "expect: [{no_collision: {pairs: [robot]}}]\n", "a pair is a list of its own: [[A, B]]"),
+        ("", "expect: [{contact_force: {pair: cup, above: 1}}]\n", "a pair is a list: [A, B]"),
     ],
 )
 def test_where_a_key_belongs_and_how_a_pair_is_written(step: str, rest: str, hint: str) -> None:
