@@ -31,6 +31,7 @@ ABSENT: Final = 230
 UNCOMMANDED: Final = 232
 NOT_SWITCHED: Final = 233
 GUARDED: Final = 242
+MOTIONLESS: Final = 244
 """Numbers of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
 """Findings about a controllers file that speak of joints which are not there, or not its own."""
@@ -147,7 +148,11 @@ def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) ->
 
 
 def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
-    """Why the engine of the task cannot hold its robot: told at the link, or where the task names the robot."""
+    """Why the robot can do no task, or the engine cannot hold it: told at the link, or where the task names it."""
+    if not robot.moving_joints:
+        message = f"robot '{robot.name}' has no joint that moves"
+        hint = "a thing that stands or is taken is a body of the scene, `urdf: {file: ...}`"
+        return (task.source.finding(MOTIONLESS, ("robot",), message, hint=hint),)
     engine = task.spec.simulation.engine
     if engine not in ENGINES.names:
         return ()

@@ -136,9 +136,6 @@ def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
     joints = _with_limits(reporter, spec, body.ordered())
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
-    if not moving:
-        hint = "a thing that stands or is taken is a body of the scene, `urdf: {file: ...}`"
-        reporter.error("ROBOT346", f"robot '{spec.robot}' has no joint that moves", ("description",), hint=hint)
     groups = build_groups(reporter, spec, links, joints)
     if reporter.source is not None:
         reporter.findings += misread_units(spec, reporter.source, joints, groups)

@@ -80,14 +80,19 @@ def test_a_mistake_in_a_robot_file_hides_no_name_of_the_task(tmp_path: Path) -> 
     assert [f.code for f in refused.value.findings] == ["ROBOT201", "TASK230"]
 
 
-def test_a_robot_that_cannot_move_is_refused_where_its_description_is_named(tmp_path: Path) -> None:
+def test_a_robot_that_cannot_move_does_no_task(tmp_path: Path) -> None:
+    """Its description is sound, and can be looked at."""
     urdf = tmp_path / "stick.urdf"
     urdf.write_text('<robot name="s"><link name="stick"/><link name="end"/><joint name="weld" type="fixed">'
                     '<parent link="stick"/><child link="end"/></joint></robot>')  # fmt: skip
-    file = tmp_path / "robot.yaml"
-    file.write_text("robot: r\ndescription: stick.urdf\n")
+    (tmp_path / "robot.yaml").write_text("robot: r\ndescription: stick.urdf\n")
+    read_robot(tmp_path / "robot.yaml")
+    (tmp_path / "controllers.yaml").write_text("{}\n")
+    task = tmp_path / "task.yaml"
+    task.write_text("task: t\nrobot: robot.yaml\ncontrollers: controllers.yaml\nsteps: [wait: 1 s]\n")
     with pytest.raises(InvalidInput) as refused:
-        read_robot(file)
-    (found,) = refused.value.findings
-    assert (found.code, found.place and (found.place.line, found.place.column)) == ("ROBOT346", (2, 14))
-    assert "no joint that moves" in found.message and "body of the scene" in (found.hint or "")
+        load_task(task)
+    (found,) = [one for one in refused.value.findings if one.place is not None and one.place.line == 2]
+    assert (found.code, found.place and found.place.column) == ("TASK244", 8)
+    assert "no joint that moves" in found.message
+    assert "body of the scene" in (found.hint or "")
