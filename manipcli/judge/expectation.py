@@ -233,4 +233,5 @@ def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:
         unit=found.unit,
         at=found.at,
         text=found.text,
+        relative=found.relative,
     )

@@ -61,7 +61,8 @@ class StepOutcome:
 
 @dataclass(frozen=True, slots=True)
 class ExpectationOutcome:
-    """How one expectation was met. `margin` in `unit` is below 0 when it is not; `at` [s] is its worst moment."""
+    """How one expectation was met. `margin` in `unit` is below 0 when it is not; `at` [s] is its worst moment;
+    `relative`: the margin over its tolerance, by which those of other units compare."""
 
     name: str
     outcome: ExpectationWord
@@ -69,6 +70,7 @@ class ExpectationOutcome:
     unit: str
     at: float | None
     text: str = ""
+    relative: float | None = None
 
     @property
     def distance(self) -> float:

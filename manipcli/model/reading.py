@@ -35,12 +35,14 @@ The numbers of `--format json` are rounded to as much, and keep their sign.
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What was found: the deciding `margin` (>= 0 passes) in `unit`, when [s], and about what."""
+    """What was found: the deciding `margin` (>= 0 passes) in `unit`, when [s], and about what; `relative`: the margin
+    over its tolerance, once it is that of a time."""
 
     margin: float
     unit: str
     at: float | None
     text: str = ""
+    relative: float | None = None
 
     @property
     def lacking(self) -> str:
@@ -215,7 +217,8 @@ class Extreme:
         k = int(np.argmin(order) if self._pick == "least" else np.argmax(order))
         value = float(order[k])
         if self._best is None or (value < self._order if self._pick == "least" else value > self._order):
-            self._best, self._order = more.found(first + int(ticks[k])), value
+            tick = first + int(ticks[k])
+            self._best, self._order = replace(more.found(tick), relative=float(more.relative[tick])), value
 
     @property
     def found(self) -> Measured | NotEvaluated | None:

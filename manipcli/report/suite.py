@@ -102,13 +102,13 @@ class CaseReport:
 
     @property
     def tightest(self) -> ExpectationOutcome | None:
-        """The expectation with the smallest margin, in SI numbers; None where there is none.
+        """The expectation with the smallest margin over its tolerance; None where there is none.
 
         What is met without a margin to speak of, as what never touched, counts only where there is nothing else.
         """
         judged = self.run.verdict.expectations if self.run is not None else ()
-        known = [one for one in judged if one.margin is not None]
-        return min(known, key=lambda one: (one.outcome == "passed", not one.distance, one.margin), default=None)
+        known = [one for one in judged if one.relative is not None]
+        return min(known, key=lambda one: (one.outcome == "passed", not one.distance, one.relative), default=None)
 
 
 @dataclass(frozen=True, slots=True)

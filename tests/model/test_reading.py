@@ -188,7 +188,7 @@ def test_signs_come_before_sizes_where_units_differ() -> None:
     assert both.relative == pytest.approx([0.5, -0.01])
     extreme = Extreme("least")
     extreme.add(both, TIMES[:2])
-    assert extreme.found == Measured(-0.001, "rad", 0.1, "tilt")
+    assert extreme.found == Measured(-0.001, "rad", 0.1, "tilt", relative=-0.01)
 
 
 def test_never_is_told_as_it_was_asked_and_never_not_as_always() -> None:

@@ -23,7 +23,7 @@ from manipcli.report.suite_json import render_suite
 
 DOCS = Path(__file__).parents[2] / "docs" / "json.md"
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))
-NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1)
+NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1, relative=-0.5)
 WRONG = Finding("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),

@@ -24,10 +24,11 @@ from manipcli.report.suite_junit import render_junit
 from manipcli.report.suite_page import render_page
 from manipcli.report.suite_text import gist, render_case, render_line, render_suite, render_summary
 
-NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5)
-UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4)
-NEVER = ExpectationOutcome("no_collision", "passed", 0.0, "N", None)
-MISSED = ExpectationOutcome("inside", "failed", -0.003, "m", 14.0, "'ball' is beside 'tray'")
+NEAR = ExpectationOutcome("near", "passed", 0.0156, "m", 14.5, relative=0.78)
+UPRIGHT = ExpectationOutcome("upright", "passed", 0.0873, "rad", 14.4, relative=0.99)
+FORCE = ExpectationOutcome("contact_force", "passed", 0.23, "N", 14.4, relative=0.04)
+NEVER = ExpectationOutcome("no_collision", "passed", 0.0, "N", None, relative=0.0)
+MISSED = ExpectationOutcome("inside", "failed", -0.003, "m", 14.0, "'ball' is beside 'tray'", relative=-0.12)
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 2.0, 2.0)
 
 
@@ -58,10 +59,11 @@ CRASHED = report(
 @pytest.mark.parametrize(
     ("judged", "tightest"),
     [
-        ((UPRIGHT, NEAR, NEVER), NEAR),  # the smallest SI number, not what never touched
+        ((UPRIGHT, NEAR, NEVER), NEAR),  # not what never touched
+        ((NEAR, FORCE), FORCE),  # 4 % of its tolerance is left, of the other, which is less in SI numbers, 78 %
         ((NEAR, MISSED), MISSED),
         ((NEVER,), NEVER),
-        ((NEAR, replace(MISSED, margin=None)), NEAR),
+        ((NEAR, replace(MISSED, margin=None, relative=None)), NEAR),
     ],
 )
 def test_the_tightest_expectation(judged: tuple[ExpectationOutcome, ...], tightest: ExpectationOutcome) -> None:
