@@ -84,7 +84,8 @@ def _without_verdict(report: CaseReport) -> Element:
         words["file"] = safe(report.case.file)
     error = SubElement(SubElement(one, "testcase", words), "error")
     error.set("type", report.outcome)
-    error.set("message", safe(report.text))
+    cause = report.troubles[0].message if report.troubles else ""
+    error.set("message", safe(": ".join(dict.fromkeys(word for word in (report.text, cause) if word))))
     error.text = "\n".join(safe(f"{one.place}: {one.message}" if one.place else one.message) for one in report.troubles)
     return one
 
