@@ -13,6 +13,7 @@ from manipcli.flow.unjudged import unjudged
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
+from manipcli.model.formula import leaves
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -20,6 +21,7 @@ from manipcli.model.scene_names import RESERVED
 from manipcli.plan.claims import Claims, no_hand
 from manipcli.plan.names import UnknownPosture
 from manipcli.plan.steps import STEPS
+from manipcli.plan.steps.move import MoveSpec
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
@@ -32,6 +34,7 @@ UNCOMMANDED: Final = 232
 NOT_SWITCHED: Final = 233
 GUARDED: Final = 242
 MOTIONLESS: Final = 244
+UNFELT: Final = 245
 """Numbers of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
 """Findings about a controllers file that speak of joints which are not there, or not its own."""
@@ -48,7 +51,7 @@ def disagreements(
     if controllers and controllers.source.untouched() and not misclaimed:
         claims = Claims.of(controllers.spec, controllers.place)
     found = (*not_there(task, robot, scene, claims), *_named_as_links(task, robot, scene))
-    warned = () if found else unjudged(task, robot, scene)
+    warned = () if found else (*unjudged(task, robot, scene), *_unfelt(task))
     misread = [*misread_units(task.spec, task.source, robot.joints, robot.groups)]
     if controllers:
         misread += misread_units(controllers.spec, controllers.source, robot.joints, robot.groups)
@@ -111,6 +114,18 @@ def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:
     if spec.replan is False:
         message = "where it stops is not known beforehand, and `replan: false` forbids to plan what follows from there"
         yield Problem(("guarded",), message, "leave `replan` out")
+
+
+def _unfelt(task: Located[TaskSpec]) -> Iterator[Finding]:
+    """Moves that may touch something, wait for its force, and look for that only when they have gone all their way."""
+    for k, step in enumerate(task.spec.steps):
+        body = step.body
+        if not isinstance(body, MoveSpec) or not body.touch or body.guarded or step.until is None:
+            continue
+        if any(one.name in ("contact_force", "collision") for one in leaves(step.until)):
+            message = "`until` is looked at when the move has gone all its way, however hard it presses by then"
+            hint = "`guarded: true` in the move stops it where `until` holds"
+            yield task.source.finding(UNFELT, ("steps", k, "until"), message, hint=hint, severity="warning")
 
 
 def _of_expectations(spec: TaskSpec, setting: Setting) -> Iterator[tuple[int, Loc, Problem]]:

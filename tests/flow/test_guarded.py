@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput
+from manipcli.flow.check import check_files
 from manipcli.flow.load import load_task
 from manipcli.model.kinematics import Kinematics
 from manipcli.pipeline import run_task
@@ -45,6 +46,18 @@ def test_a_guarded_move_needs_a_condition_and_leave_to_plan_again(tmp_path: Path
     (deaf,) = told(task_file(tmp_path, f"{ARM}simulation: {{engine: kinematic}}\n{touch}"))
     assert deaf.startswith("TASK237 7 `until` is not waited for, by which this move is guarded: ")
     assert told(task_file(tmp_path, f"{ARM}replan: false\nsteps:\n  - move: {{to: home}}\n{until}")) == []
+
+
+def test_a_move_that_waits_for_a_force_and_does_not_stop_for_it_is_told(tmp_path: Path) -> None:
+    scene, force = ARM + TABLE.replace("0.55", "0.9"), "any: [{contact_force: {of: table, above: 5 N}}]"
+
+    def warned(more: str, until: str = force) -> list[str]:
+        step = f"steps:\n  - move: {{to: home, touch: [table]{more}}}\n    until: {{{until}}}\n"
+        return [one.code for one in check_files([task_file(tmp_path, scene + step)]) if one.code == "TASK245"]
+
+    assert warned("") == ["TASK245"]
+    assert warned(", guarded: true") == []
+    assert warned("", "at_pose: {pose: home}") == []
 
 
 def test_the_next_step_begins_where_a_guarded_one_stopped(tmp_path: Path) -> None:
