@@ -184,7 +184,8 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
             code="USE001", message=_without_jargon(error.format_message()), hint=f"`{command} --help` shows the usage"
         )
         return ExitCode.USAGE, (finding,)
-    if isinstance(error, KeyboardInterrupt):
+    # Python 3.11 makes a RuntimeError of what interrupts the making of a class, as in an import.
+    if isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt):
         return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
     if isinstance(error, OSError) and error.errno in _FULL:
         where = "what was to be written" if error.filename is None else str(error.filename)

@@ -81,12 +81,15 @@ def test_the_verdict_decides_the_exit_code(
     assert main(["judge", "x.mcap"]) == code
 
 
+IN_A_CLASS = RuntimeError("Error calling __set_name__ on 'cached_property' instance 'maps' in 'Made'")
+IN_A_CLASS.__cause__ = KeyboardInterrupt()
 ERRORS = [
     (InvalidInput([Finding("TASK203", "no such joint", Place("t.yaml", 14, 9), hint="did you mean 'a'?")]), 4, "error"),
     (NotPlannable("out of reach", step="pick_1"), 1, "failed"),
     (SimulationFailed("cup exploded", time=1.0), 1, "failed"),
     (ManipcliError("odd"), 3, "error"),
     (KeyboardInterrupt(), 2, "error"),
+    (IN_A_CLASS, 2, "error"),
     (PermissionError(13, "Permission denied", "/nowhere/x.mcap"), 4, "error"),
     (OSError(28, "No space left on device"), 3, "error"),
     (FileNotFoundError(2, "No such file or directory"), 4, "error"),
