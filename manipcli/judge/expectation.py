@@ -79,6 +79,7 @@ class Expected:
         self._spec = spec
         self._extreme = Extreme("greatest" if spec.quantifier == "eventually" else "least")
         self._recent: deque[tuple[Moments, Reading]] = deque()
+        self._ticks, self._first, self._last = 0, 0.0, 0.0
         self._never: NotEvaluated | None = None
         self._when = When(None)
         reason = absent(spec.condition, world, seam)
@@ -93,6 +94,9 @@ class Expected:
         """The next ticks."""
         if self._never is not None:
             return
+        if not self._ticks:
+            self._first = float(moments.times[0])
+        self._ticks, self._last = self._ticks + len(moments.times), float(moments.times[-1])
         intervals = self._when.intervals
         if intervals is None:
             self._keep(moments)
@@ -138,9 +142,19 @@ class Expected:
             return found
         best = ("at best",) if self._spec.quantifier == "eventually" else ()
         words = ", ".join(word for word in (self._when.words, *best) if word)
-        broken = self._extreme.broken if isinstance(self._spec, WatchSpec) else None
-        since = "" if broken is None or broken == found.at else f"; broken at t = {broken:.3f} s"
-        return replace(found, text=f"{words}: {found.text}{since}" if words else f"{found.text}{since}")
+        text = f"{found.text}{self._broken(found)}"
+        return replace(found, text=f"{words}: {text}" if words else text)
+
+    def _broken(self, found: Measured) -> str:
+        """Of what was to hold for a time and did not: since when, and for how long, a knock or a press."""
+        first = self._extreme.broken
+        if first is None or self._spec.quantifier == "eventually" or self._when.intervals is None or self._when.last:
+            return ""
+        if isinstance(self._spec, WatchSpec):
+            return "" if first == found.at else f"; broken at t = {first:.3f} s"
+        since = "" if first == found.at else f", first at t = {first:.3f} s"
+        spacing = (self._last - self._first) / max(self._ticks - 1, 1)
+        return f"; broken for {readable(self._extreme.broken_ticks * spacing, 's')}{since}"
 
 
 def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:

@@ -196,6 +196,8 @@ class Extreme:
         self._idle = ""
         self.broken: float | None = None
         """The first moment [s] that counts at which it did not hold."""
+        self.broken_ticks = 0
+        """At how many ticks it did not."""
 
     def add(self, more: Reading, times: Array, first: int = 0, last: int | None = None) -> None:
         """The ticks from `first` up to and without `last` count, too."""
@@ -211,9 +213,11 @@ class Extreme:
             unit = more.units[0] if len(more.units) == 1 else ""
             self._fault = NotEvaluated(f"the recorded state is not finite at t = {at:.3f} s", unit)
             return
-        failing = np.flatnonzero(order < 0.0)
-        if self.broken is None and len(failing):
-            self.broken = float(times[first + ticks[failing[0]]])
+        failing = first + ticks[order < 0.0]
+        if len(failing):
+            self.broken_ticks += len(failing)
+            if self.broken is None:
+                self.broken = float(times[failing[0]])
         k = int(np.argmin(order) if self._pick == "least" else np.argmax(order))
         value = float(order[k])
         if self._best is None or (value < self._order if self._pick == "least" else value > self._order):

@@ -235,8 +235,8 @@ def test_tracking_names_the_worst_joint_its_unit_and_its_moment(column: int) -> 
     assert found.margin == pytest.approx(-0.03)
     assert found.at == pytest.approx(0.7)
     assert (found.unit, found.text) == (
-        ("rad", "joint 'j1' is 4.58 deg from its reference; within 2.86 deg"),
-        ("m", "joint 'slide' is 80 mm from its reference; within 50 mm"),
+        ("rad", "joint 'j1' is 4.58 deg from its reference; within 2.86 deg; broken for 20 ms"),
+        ("m", "joint 'slide' is 80 mm from its reference; within 50 mm; broken for 20 ms"),
     )[column]
 
 

@@ -219,7 +219,7 @@ def test_the_deciding_member_is_named_with_its_own_margin_and_moment() -> None:
         {"always": {"all": [{"upright": {"object": "cube", "within": "10 deg"}}, {"not": {"duration": {"below": 1}}}]}},
     )
     assert (found.name, found.outcome, found.unit, found.at) == ("all", "failed", "s", 0.0)
-    assert found.text == "not duration: 0.010 s of 1 s"
+    assert found.text == "not duration: 0.010 s of 1 s; broken for 1 s"
     assert found.margin == -0.99
 
 
@@ -227,7 +227,7 @@ def test_what_never_may_hold_and_what_never_came_true_say_how_close_it_was() -> 
     never = judged(recording(), {"never": NEAR, "during": "b"})
     assert never.name == "never_near"
     assert never.text.startswith("during 'b': 'cube' is at [")
-    assert never.text.endswith("; never within 500 mm")
+    assert never.text.endswith("; never within 500 mm; broken for 140 ms")
     ramp = np.linspace(-0.4, -0.1, T)
     late = judged(recording(np.concatenate([[0.5], ramp[1:]])), {"eventually": NEAR, "during": "b", "within": "200 ms"})
     assert (late.outcome, late.at) == ("failed", 0.8)
@@ -297,3 +297,21 @@ def test_a_watch_that_is_broken_at_its_worst_moment_tells_it_once(worst: int, to
     ).expectations
     assert (found.outcome, found.at, found.margin) == ("failed", TIMES[worst], pytest.approx(-0.3))
     assert found.text.endswith(told) and found.text.count("broken at") == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("expect", "told"),
+    [
+        ({"always": NEAR}, "; broken for 300 ms, first at t = 0.200 s"),
+        ({**NEAR, "during": "a"}, "; broken for 200 ms, first at t = 0.200 s"),
+        ({**NEAR, "during": "c"}, "; broken for 100 ms"),
+        ({**NEAR, "at": "end"}, None),
+        ({"eventually": NEAR, "during": "c"}, None),
+    ],
+)
+def test_what_was_to_hold_for_a_time_tells_for_how_long_it_did_not(expect: dict[str, Any], told: str | None) -> None:
+    margins = np.full(T, 0.5)
+    margins[20:40], margins[115:125] = -0.1, -0.1
+    margins[30] = -0.3
+    found = judged(recording(margins), expect)
+    assert found.text.endswith(told) if told else "broken" not in found.text

@@ -151,6 +151,9 @@ def test_over_time_it_is_the_extreme_of_what_applies_wherever_it_is_cut(
     for first, last in pairwise(sorted({0, T, *cuts})):
         pieces.add(found, TIMES, first, last)
     assert pieces.found == whole.found
+    failing = [k for value, k in ranks if value < 0.0]
+    assert (whole.broken, pieces.broken) == 2 * (TIMES[failing[0]] if failing else None,)
+    assert pieces.broken_ticks == whole.broken_ticks == len(failing)
     if not ranks:
         assert isinstance(whole.found, NotEvaluated)
         assert whole.found.reason.endswith("rests")
