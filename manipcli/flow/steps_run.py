@@ -24,7 +24,7 @@ from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
 from manipcli.model.touch import grips, held_force
-from manipcli.plan.step import Situation
+from manipcli.plan.step import Motion, Situation
 from manipcli.record.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
@@ -264,7 +264,7 @@ class StepsRun:
                 if end.weak:
                     self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
-                texts += [end.text] if end.text else []
+                texts += [end.text + _no_longer(motion, probe)] if end.text else []
             self._believed = planned.plan.end
             if awaited and until is not None:
                 if deadline is None:
@@ -343,6 +343,12 @@ def _missing(end: MotionEnd, probe: Probe | None) -> str:
     """How far what was waited for was from holding, where that is why a motion ended."""
     missing = probe.missing if probe is not None and end.awaited else ""
     return f"; at the end {missing}" if missing else ""
+
+
+def _no_longer(motion: Motion, probe: Probe | None) -> str:
+    """What a guarded motion was stopped by, where it does not hold any more at rest: the robot may have bounced off."""
+    missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
+    return f"; at rest {missing}" if missing else ""
 
 
 def _cut_since(before: Cuts, session: Session) -> str:

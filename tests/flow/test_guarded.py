@@ -75,7 +75,7 @@ steps:
     report = run_task(file, log=tmp_path / "log.mcap", allow_outside=True)
     assert report.verdict.verdict == "passed"
     stopped, last = report.verdict.steps[1:]
-    assert "`until` held" in stopped.text
+    assert stopped.text.endswith("`until` held")
     recording = open_recording(tmp_path / "log.mcap")
     states = recording.states
     at = {name: k for k, name in enumerate(load_task(file, allow_outside=True).robot.joint_names)}
@@ -86,6 +86,21 @@ steps:
     assert states.position[-1, at["joint_2"]] == pytest.approx(0.2)
     assert np.abs(np.diff(states.position, axis=0)).max() < 0.01
     assert last.outcome == "done"
+
+
+def test_what_stopped_a_guarded_move_and_does_not_hold_at_rest_is_told(tmp_path: Path) -> None:
+    """It stops because it is fast, and then is not; a hand that knocks on something and bounces off is told so."""
+    file = task_file(
+        tmp_path,
+        f"""{ARM}simulation: {{engine: kinematic}}
+steps:
+  - move: {{to: {{joint_1: 1.0}}, guarded: true}}
+    until: {{not: {{tool_speed: {{below: 10 cm/s}}}}}}
+""",
+    )
+    (step,) = run_task(file, log=tmp_path / "log.mcap", allow_outside=True).verdict.steps
+    assert step.outcome == "done"
+    assert "its end: `until` held; at rest it fails by 100 mm/s: " in step.text
 
 
 @pytest.mark.slow
