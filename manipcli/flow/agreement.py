@@ -13,7 +13,8 @@ from manipcli.flow.unjudged import unjudged
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.condition import Problem, Setting
 from manipcli.model.conditions import CONDITIONS
-from manipcli.model.formula import leaves
+from manipcli.model.conditions.collision import CollisionSpec, NoCollisionSpec
+from manipcli.model.conditions.contact_force import ContactForceSpec
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -23,6 +24,7 @@ from manipcli.plan.names import UnknownPosture
 from manipcli.plan.steps import STEPS
 from manipcli.plan.steps.move import MoveSpec
 from manipcli.simulate.engines import ENGINES
+from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
 from manipcli.spec.retry import retried
@@ -122,10 +124,25 @@ def _unfelt(task: Located[TaskSpec]) -> Iterator[Finding]:
         body = step.body
         if not isinstance(body, MoveSpec) or not body.touch or body.guarded or step.until is None:
             continue
-        if any(one.name in ("contact_force", "collision") for one in leaves(step.until)):
+        if _is_for_a_force(step.until):
             message = "`until` is looked at when the move has gone all its way, however hard it presses by then"
             hint = "`guarded: true` in the move stops it where `until` holds"
             yield task.source.finding(UNFELT, ("steps", k, "until"), message, hint=hint, severity="warning")
+
+
+def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
+    """Whether something in it, or in its `opposite`, comes to hold by pressing harder; a hand that is to let go moves on
+    until it does."""
+    if until.combines:
+        return any(_is_for_a_force(one, opposite=opposite != (until.name == "not")) for one in until.members)
+    match until.body:
+        case ContactForceSpec(above=above, below=below):
+            return (below if opposite else above) is not None
+        case CollisionSpec():
+            return not opposite
+        case NoCollisionSpec():
+            return opposite
+    return False
 
 
 def _of_expectations(spec: TaskSpec, setting: Setting) -> Iterator[tuple[int, Loc, Problem]]:

@@ -58,6 +58,14 @@ def test_a_move_that_waits_for_a_force_and_does_not_stop_for_it_is_told(tmp_path
     assert warned("") == ["TASK245"]
     assert warned(", guarded: true") == []
     assert warned("", "at_pose: {pose: home}") == []
+    assert warned("", "not: {no_collision: [robot, table]}") == ["TASK245"]
+    for let_go in (
+        "contact_force: {of: table, below: 1 N}",
+        "not: {contact_force: {of: table, above: 1 N}}",
+        "not: {any: [{collision: [robot, table]}]}",
+        "no_collision: [robot, table]",
+    ):
+        assert warned("", let_go) == [], let_go
 
 
 def test_the_next_step_begins_where_a_guarded_one_stopped(tmp_path: Path) -> None:
