@@ -131,8 +131,7 @@ def _unfelt(task: Located[TaskSpec]) -> Iterator[Finding]:
 
 
 def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
-    """Whether something in it, or in its `opposite`, comes to hold by pressing harder; a hand that is to let go moves on
-    until it does."""
+    """Whether something in it, or in its `opposite`, comes to hold by pressing harder."""
     if until.combines:
         return any(_is_for_a_force(one, opposite=opposite != (until.name == "not")) for one in until.members)
     match until.body:
