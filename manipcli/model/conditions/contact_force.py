@@ -28,7 +28,7 @@ class ContactForceSpec(Model):
     above: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Least force [N].")
     mean_over: Annotated[Time, Field(ge=1e-4, le=60)] | None = Field(
         default=None,
-        description="Of the force its mean over the last so long [s] counts, 0.1 ms to 60 s. Default: each tick's.",
+        description="The force is averaged over this time up to each tick [s], 0.1 ms to 60 s. Default: it is not.",
     )
 
     @model_validator(mode="after")
