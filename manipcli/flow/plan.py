@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
+from manipcli.flow.regrasp import Regrasps
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.posture import posture
@@ -26,12 +27,14 @@ from manipcli.spec.task import StepSpec
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """A step as written (`place`: file:line:column), and what was planned for it."""
+    """A step as written (`place`: file:line:column), and what was planned for it, by none of `grasps`, R_WT (3, 3) of
+    the tool, which lead nowhere."""
 
     id: str
     verb: str
     plan: StepPlan
     place: str
+    grasps: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +96,7 @@ def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> P
     planner = _planner(task)
     start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=tuple(_steps(task, planner, start, doing)), start=start, planner=planner, judged=judged)
+    return Plan(steps=_steps(task, planner, start, doing), start=start, planner=planner, judged=judged)
 
 
 def refused(task: Task, refusal: NotPlannable) -> Verdict:
@@ -127,12 +130,15 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
     )
 
 
-def plan_step(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:
-    """Plan one step; whatever refuses it is told with its id."""
+def plan_step(planner: Planner, step: StepSpec, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+    """Plan one step, by none of `grasps`; whatever refuses it is told with its id."""
+    member = STEPS[step.verb]
     try:
         if situation.at_start:
             planner.outside(situation)
-        return STEPS[step.verb].plan(step.body, planner, situation)
+        if grasps and member.regrasp is not None:
+            return member.regrasp(step.body, planner, situation, grasps)
+        return member.plan(step.body, planner, situation)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
 
@@ -142,16 +148,30 @@ def start_position(task: Task) -> Array:
     return posture(task.robot, task.spec.start)
 
 
-def _steps(task: Task, planner: Planner, situation: Situation, doing: Callable[[str], None]) -> Iterator[PlannedStep]:
-    for k, step in enumerate(task.spec.steps):
-        doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{step.id}'")
+def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
+    """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
+    done: list[PlannedStep] = []
+    regrasps = Regrasps(planner)
+    while (k := len(done)) < len(task.spec.steps):
+        grasps = regrasps.of(k)
+        again = ", with another grasp" if grasps else ""
+        doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{again}")
         try:
-            planned = plan_step(planner, step, situation)
+            done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
         except NotPlannable as refusal:
-            at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
-            raise NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at) from refusal
-        yield PlannedStep(id=str(step.id), verb=step.verb, plan=planned, place=task.log_place("steps", k))
-        situation = planned.end
+            del done[regrasps.back(refusal, [(one.verb, one.plan.end) for one in done]) :]
+    return tuple(done)
+
+
+def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tuple[Array, ...]) -> PlannedStep:
+    """Step `k` of the task, by none of `grasps`; a refusal tells where it is written."""
+    step = task.spec.steps[k]
+    try:
+        planned = plan_step(planner, step, start, grasps)
+    except NotPlannable as refusal:
+        at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
+        raise NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at) from refusal
+    return PlannedStep(str(step.id), step.verb, planned, task.log_place("steps", k), grasps)
 
 
 def _planner(task: Task) -> Planner:

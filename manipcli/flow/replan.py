@@ -8,7 +8,7 @@ down where it belongs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final
@@ -80,8 +80,10 @@ class Measured:
         """In what `now` is not what the step was `planned` for, each with how much; () where it is near enough."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
 
-    def plan(self, step: StepSpec, planned: Situation, now: Situation) -> tuple[StepPlan, Situation, str]:
-        """The plan of a step that was `planned` for another situation, from where things are `now`.
+    def plan(
+        self, step: StepSpec, planned: Situation, now: Situation, grasps: Sequence[Array] = ()
+    ) -> tuple[StepPlan, Situation, str]:
+        """The plan, by none of `grasps`, of a step that was `planned` for another situation, from where things are.
 
         An arm of few joints may be able to move what is held to where it belongs and unable to turn it. Where nothing
         can be planned, a turn in the hand that does not count by itself is left as it is.
@@ -93,7 +95,7 @@ class Measured:
             NotPlannable: neither can be planned; why the first one cannot.
         """
         try:
-            return plan_step(self._planner, step, now), now, ""
+            return plan_step(self._planner, step, now, grasps), now, ""
         except NotPlannable:
             left = self._turn_left(planned, now)
             if left is not None:

@@ -132,7 +132,10 @@ class StepsRun:
         self._watching.step_started(planned.id)
         for attempt in range(1, attempts + 1):
             if attempt > 1:
-                step = retried(self._task.file, index)
+                again = retried(self._task.file, index)
+                if again != step:
+                    planned = replace(planned, grasps=())  # they are of the step as it was
+                step = again
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
             end = self._attempt(step, planned, planned_start, again=attempt > 1)
             if end.outcome == "done" or attempt == attempts or not self._may_go_on:
@@ -216,7 +219,7 @@ class StepsRun:
         if anew:
             try:
                 with self._replanning:
-                    plan, now, stays = self._measured.plan(step, planned_start, now)
+                    plan, now, stays = self._measured.plan(step, planned_start, now, planned.grasps)
                 planned = replace(planned, plan=plan)
             except NotPlannable as refusal:
                 self._believed = now

@@ -6,7 +6,7 @@ controller goals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
@@ -135,6 +135,8 @@ class StepMember(Generic[S]):
         request: (spec) -> the switch of controllers that it asks for, so that the steps after it are checked against
             who is active then.
         guarded: (spec) -> whether it stops where the step's `until` comes to hold.
+        regrasp: (spec, planner, situation, grasps) -> as `plan`, with the tool turned to the object in another way than
+            in any of `grasps`, R_WT (3, 3) each; None for a step that takes nothing, or in one way only.
     """
 
     name: str
@@ -144,3 +146,4 @@ class StepMember(Generic[S]):
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
     request: Callable[[S], Switch | None] = _switches_nothing
     guarded: Callable[[S], bool] = _goes_on
+    regrasp: Callable[[S, Planner, Situation, Sequence[Array]], StepPlan] | None = None

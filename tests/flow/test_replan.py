@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.flow import replan
 from manipcli.flow.execute import controllers
 from manipcli.flow.load import Task, load_task
@@ -192,7 +192,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
     held = before.carried
     assert held is not None
 
-    def few_joints(planner: Planner, step: StepSpec, situation: Situation) -> StepPlan:
+    def few_joints(planner: Planner, step: StepSpec, situation: Situation, _: Sequence[Array]) -> StepPlan:
         assert situation.carried is not None
         if not np.allclose(situation.carried.X_LO.R, held.X_LO.R, atol=1e-9):
             raise NotPlannable("the arm has five joints")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Annotated, Literal, get_args
 
@@ -39,6 +39,8 @@ ALIKE = 0.5
 """Cosine of the angle between the ways in which two hands point that can be told to be turned by less or more."""
 SLOPES_DEG = (0.0, 30.0, 60.0)
 """Slopes of the straight approach that are tried: along the hand's axis, or from above it, which folds the arm less."""
+OTHER = math.radians(40.0)
+"""Grasps whose tools are turned by less to each other count as one: where one leads nowhere, the other hardly does."""
 HIGHER = (2 / 3, 5 / 6)
 """Shares of an object's height at which the tool takes it from above, where its middle cannot be: the palm touches."""
 
@@ -92,7 +94,9 @@ class PickGraspSpec(GraspSpec):
 class PickSpec(Model):
     """Open the hand, reach an object, approach it straight, and close the hand on it.
 
-    The tool's +z is the direction of approach, its y the direction in which the fingers close.
+    The tool's +z is the direction of approach, its y the direction in which the fingers close. Where a later step
+    cannot be planned with the object as it is held then, it is taken in another way, as far as `approach` leaves it
+    open: from the other side, with the hand turned over, from above.
     """
 
     object: str = Field(description="What to take.")
@@ -105,8 +109,9 @@ class PickSpec(Model):
     )
 
 
-def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The first of the candidate directions, rolls, distances and slopes that is reachable and free.
+def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+    """The first of the candidate directions, rolls, distances and slopes that is reachable and free; with the tool
+    turned clearly away from those of `grasps`, R_WT (3, 3) each.
 
     Raises:
         NotPlannable: the hand holds something already, or no candidate is possible.
@@ -159,6 +164,8 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         for k in range(len(goals)):
             if k == len(turns) and all(one is not None and one.reason != "touches" for one in out_of_reach.values()):
                 return  # higher up it is no nearer
+            if any(_same(goals[k][1], R_WT) for R_WT in grasps):
+                continue
             yield from itertools.product((k,), spread(spec.approach.distance), slopes())
 
     try:
@@ -231,6 +238,11 @@ def _nearer_first(one: Array, other: Array, R: Array) -> list[Array]:
     return [other, one] if alike and np.sum(other * R) > np.sum(one * R) + 1e-3 else [one, other]
 
 
+def _same(one: Array, other: Array) -> bool:
+    """Whether two rotations (3, 3) are nearer than `OTHER`: of R the trace is 1 + 2 cos(angle)."""
+    return float(np.sum(one * other)) > 1.0 + 2.0 * math.cos(OTHER)
+
+
 def _frame(x: Array, z: Array) -> Array:
     """The rotation with these two unit axes."""
     return np.column_stack([x, np.cross(z, x), z])
@@ -254,4 +266,4 @@ def uncommanded(spec: PickSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     )
 
 
-MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="pick", spec=PickSpec, plan=plan, check=check, uncommanded=uncommanded, regrasp=plan)

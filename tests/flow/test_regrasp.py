@@ -1,0 +1,129 @@
+"""What cannot be lifted or placed as it is held is taken in another way."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array, Transform
+from manipcli.flow import replan
+from manipcli.flow.load import Task, load_task
+from manipcli.flow.plan import Plan, plan_step, plan_task
+from manipcli.flow.regrasp import MOST
+from manipcli.pipeline import run_task
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Situation, StepPlan
+from manipcli.spec.task import StepSpec
+
+ROOT = Path(__file__).parents[2]
+PANDA = f"robot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"
+SCENE = """scene:
+  table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}
+  block: {box: {size: [4 cm, 4 cm, 10 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15], friction: 0.9}
+  bin: {tray: {size: [0.2, 0.2, 0.09]}, rests_on: table, at: [0.5, 0.2], fixed: true}
+"""
+PICK = "  - pick: {object: block}\n"
+LIFT = "  - lift: {object: block, by: 15 cm}\n"
+PLACE = "  - place: {object: block, at: [0.5, 0.2], on: bin}\n"
+
+
+def task_of(folder: Path, steps: str, head: str = "") -> Task:
+    file = folder / "task.yaml"
+    file.write_text(f"task: t\n{PANDA}{head}{SCENE}steps:\n{steps}")
+    return load_task(file, allow_outside=True)
+
+
+def tool(plan: Plan, end: Situation) -> Array:
+    """R_WT at the end of a step."""
+    return plan.planner.tool_pose(end).R
+
+
+def angle(one: Array, other: Array) -> float:
+    """Between two orientations [deg]."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(one.T @ other) - 1.0) / 2.0, -1.0, 1.0))))
+
+
+def test_what_cannot_be_lifted_as_it_is_held_is_taken_otherwise(tmp_path: Path) -> None:
+    lift = task_of(tmp_path, PICK + LIFT).spec.steps[1]
+    alone = plan_task(task_of(tmp_path, PICK))
+    end = alone.steps[0].plan.end
+    with pytest.raises(NotPlannable, match="no height to lift"):
+        plan_step(alone.planner, lift, end)
+    whole = plan_task(task_of(tmp_path, PICK + LIFT + PLACE))
+    assert [step.verb for step in whole.steps] == ["pick", "lift", "place"]
+    used, left = tool(whole, whole.steps[0].plan.end), whole.steps[0].grasps
+    assert angle(left[0], tool(alone, end)) < 0.1
+    assert min(angle(used, one) for one in left) > 40.0
+    # From where it is measured it is taken by none of these either, as long as it is taken by the same step.
+    away = Transform.of(xyz=(0.01, -0.01, 0.0)) @ whole.start.bodies[0]
+    moved = Situation(whole.start.position, (away,))
+    again = plan_step(whole.planner, task_of(tmp_path, PICK).spec.steps[0], moved, left)
+    assert angle(tool(whole, again.end), used) < 0.1
+
+
+def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_path: Path) -> None:
+    """The refusal is that of the step that came furthest, and tells how many grasps there were."""
+    task = task_of(
+        tmp_path, "  - move: {to: home}\n" + PICK + LIFT + "  - place: {object: block, at: [1.5, 0.0], on: table}\n"
+    )
+    told: list[str] = []
+    with pytest.raises(NotPlannable) as refused:
+        plan_task(task, doing=told.append)
+    assert told[0].startswith("planning step 1 of 4") and not any(
+        one.startswith("planning step 1 ") for one in told[1:]
+    )
+    tried = 1 + sum("'pick_1', with another grasp" in one for one in told)
+    assert 2 < tried <= MOST + 1
+    picked = sum(
+        before.startswith("planning step 2") and not after.startswith("planning step 2")
+        for before, after in itertools.pairwise(told)
+    )
+    assert refused.value.step == "place_1"
+    assert refused.value.cause.endswith(f"; {picked} grasps were tried")
+    assert refused.value.place is not None and refused.value.place.line == 12
+
+
+def test_a_refusal_with_an_empty_hand_or_of_the_only_grasp_is_told_as_it_is(tmp_path: Path) -> None:
+    told: list[str] = []
+    for steps in (
+        "  - move: {pose: {xyz: [2, 0, 1]}}\n",
+        PICK + "  - release: {}\n  - move: {pose: {xyz: [2, 0, 1]}}\n",
+    ):
+        with pytest.raises(NotPlannable) as refused:
+            plan_task(task_of(tmp_path, steps), doing=told.append)
+        assert "grasps" not in refused.value.cause
+    assert not any("another grasp" in one for one in told)
+
+
+def test_a_step_that_is_tried_with_other_values_may_use_every_grasp(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[Sequence[Array]] = []
+
+    def watched(planner: Planner, step: StepSpec, now: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+        if step.verb == "pick":
+            used.append(grasps)
+        return plan_step(planner, step, now, grasps)
+
+    monkeypatch.setattr(replan, "plan_step", watched)
+    for changed in (True, False):
+        used.clear()
+        pick = "  - pick: {object: block, approach: {distance: $distance}}\n"
+        never = "    until: {at_pose: {pose: home}}\n    timeout: 3 s\n"
+        retry = f"    on_fail: {{retry: 1{', with: {distance: 12 cm}' if changed else ''}}}\n"
+        head = "params: {distance: 10 cm}\nsimulation: {engine: kinematic}\n"
+        assert plan_task(task_of(tmp_path, pick + never + retry + LIFT, head)).steps[0].grasps
+        run_task(tmp_path / "task.yaml", log=tmp_path / "log.mcap", force=True, allow_outside=True)
+        assert used and all(bool(grasps) != changed for grasps in used)
+
+
+@pytest.mark.slow
+def test_the_block_that_was_taken_otherwise_lies_in_the_bin(tmp_path: Path) -> None:
+    task_of(tmp_path, PICK + LIFT + PLACE + "expect:\n  - inside: {object: block, of: bin}\n")
+    report = run_task(tmp_path / "task.yaml", log=tmp_path / "log.mcap", allow_outside=True)
+    assert report.verdict.verdict == "passed", report.verdict.text
