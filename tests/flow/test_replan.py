@@ -192,7 +192,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
     held = before.carried
     assert held is not None
 
-    def few_joints(planner: Planner, step: StepSpec, situation: Situation, _: Sequence[Array]) -> StepPlan:
+    def few_joints(planner: Planner, step: StepSpec, situation: Situation, _: Sequence[Array] = ()) -> StepPlan:
         assert situation.carried is not None
         if not np.allclose(situation.carried.X_LO.R, held.X_LO.R, atol=1e-9):
             raise NotPlannable("the arm has five joints")
