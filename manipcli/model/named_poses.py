@@ -121,12 +121,20 @@ class _Poses:
         for group in self._spec.poses[name]:
             if group not in self._spec.groups:
                 message = f"pose '{name}': there is no group '{group}'"
-                hint = did_you_mean(group, self._spec.groups)
-                self._reporter.error("ROBOT320", message, ("poses", name, group), hint=hint)
+                self._reporter.error("ROBOT320", message, ("poses", name, group), hint=self._instead(group))
             elif group in self._groups:  # one that could not be built has been reported
                 values |= self._part(name, group, ())
         at = (self._moving[joint].limits.nearest(q) if joint in self._moving else q for joint, q in values.items())
         return NamedPose(name=name, joints=tuple(values), positions=tuple(at))
+
+    def _instead(self, group: str) -> str | None:
+        """What stands where a group of that name is looked for."""
+        if group in self._moving:
+            own = next((one.name for one in self._groups.values() if group in one.joints), "GROUP")
+            return f"'{group}' is a joint; positions stand below a group: {{{own}: {{{group}: ...}}}}"
+        if not self._spec.groups:
+            return f"state it: groups: {{{group}: {{joints: [...]}}}}"
+        return did_you_mean(group, self._spec.groups)
 
     def _part(self, name: str, group: str, seen: tuple[str, ...]) -> dict[str, float]:
         """Joint values of one group in one pose; names of other poses are followed."""

@@ -162,6 +162,19 @@ def test_a_pose_that_cannot_be_is_told(file: Path, poses: dict[str, object], exp
     assert expected in messages(file, groups=GROUPS, poses=poses)
 
 
+def test_a_group_that_a_pose_lacks_is_told_how_to_write(file: Path) -> None:
+    def told(poses: dict[str, object], **groups: object) -> str | None:
+        with pytest.raises(InvalidInput) as refused:
+            build(file, poses=poses, **groups)
+        return next(one.hint for one in refused.value.findings if one.code == "ROBOT320")
+
+    assert told({"p": {"leg": [0.0]}}) == "state it: groups: {leg: {joints: [...]}}"
+    joint = "'j1' is a joint; positions stand below a group: {arm: {j1: ...}}"
+    assert told({"p": {"j1": [0.0]}}, groups=GROUPS) == joint
+    assert told({"p": {"j1": [0.0]}}) == joint.replace("arm", "GROUP")
+    assert told({"p": {"amr": [0.0]}}, groups=GROUPS) == "did you mean 'arm'?"
+
+
 def test_a_pose_of_few_digits_beyond_a_limit_is_at_it(file: Path) -> None:
     """As 90 deg under a limit of 1.570796: plans keep the limit to the last digit."""
     poses = {"p": {"arm": [1.0000003, 0.5]}, "q": {"arm": "p"}}
