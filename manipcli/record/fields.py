@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 from manipcli.core.text import any_of, did_you_mean, listed, nearest, shorten
-from manipcli.record.definition import MAX_DEPTH, Array, Field, Message, Number, Type
+from manipcli.record.definition import MAX_DEPTH, Array, Field, Message, Number, Text, Type
 from manipcli.record.layout import Key, Part
 
 MAX_WAYS = 64
@@ -113,7 +113,8 @@ def ways(message: Message, name: FieldName) -> tuple[Way, ...]:
         if not found:
             known = [short(message, way) for way in numbers(message)] if inner is message else numbers(inner or message)
             hint = did_you_mean(part.name, known, kind="fields")
-            if inner is message and name.key is None and len(arrays) == 1 and not nearest(part.name, known):
+            by_name = len(arrays) == 1 or any(one.type == Array(Text(), None) for one in message.fields)
+            if inner is message and name.key is None and by_name and not nearest(part.name, known):
                 hint = f"brackets pick an element: {name.topic.strip('/')}[{part.name}].FIELD; {hint}"
             raise UnknownField(f"{name.text}: {name.topic} has no field '{part.name}'", hint)
         if len(found) > 1:

@@ -151,6 +151,16 @@ def test_what_cannot_be_plotted_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_joint_is_told_to_stand_in_brackets(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for given in ("joint_states.joint_4.position", "joint_states.joint_4"):
+        assert main(["plot", str(log), given]) == 4
+        hint = "brackets pick an element: joint_states[joint_4].FIELD; fields: position, velocity, effort\n"
+        assert hint in capsys.readouterr().err
+    assert open_chart([log], ["joint_states[joint_4].position"]).panels[0].labels == ("joint_4",)
+    assert main(["plot", str(log), "joint_states.positions"]) == 4
+    assert "brackets" not in capsys.readouterr().err
+
+
 def test_what_a_hint_says_of_a_body_can_be_plotted(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     moves = open_chart([log], ["tf.translation.x"]).panels[0].labels[-1]
     assert main(["plot", str(log), f"tf.{moves}.z"]) == 4
