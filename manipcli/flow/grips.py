@@ -151,7 +151,7 @@ def too_heavy(task: Task, plan: Plan) -> Iterator[Finding]:
         friction = body.friction * task.robot.friction
         carried, weight = 2.0 * friction * force, body.mass * g
         if carried < RESERVE * weight:
-            message = f"step '{one.step}': two fingers with {force:.3g} N and a friction of {friction:.3g} carry "
+            message = f"step '{one.step}': two fingers with {force:.3g} N each and a friction of {friction:.3g} carry "
             message += f"{carried:.3g} N; '{body.name}' of {readable(body.mass, 'kg')} weighs {weight:.3g} N"
             hint = "it will slip"
             if carried >= weight:

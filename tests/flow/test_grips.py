@@ -157,7 +157,7 @@ def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     (found,) = gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
     assert (found.code, found.severity) == ("TASK241", "warning")
     assert found.message == (
-        "step 'pick_1': two fingers with 7 N and a friction of 0.9 carry 12.6 N; 'block' of 1.9 kg weighs 18.6 N"
+        "step 'pick_1': two fingers with 7 N each and a friction of 0.9 carry 12.6 N; 'block' of 1.9 kg weighs 18.6 N"
     )
     assert found.hint == "it will slip, it takes more than 10.4 N a finger or more friction"
     run = run_task(pick, overrides=[f"{mass}=1.9 kg"], log=pick.with_suffix(".mcap"), force=True)
