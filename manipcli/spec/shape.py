@@ -53,12 +53,8 @@ def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
 
 def is_of_fixed_length(kinds: Sequence[object]) -> bool:
     """Whether all lists among the types have a length, and the same."""
-    lengths = {
-        None if get_args(kind)[-1:] == (Ellipsis,) else len(get_args(kind))
-        for kind in kinds
-        if get_origin(kind) in (tuple, list)
-    }
-    return len(lengths) == 1 and None not in lengths
+    any_length = any(get_origin(kind) is list or get_args(kind)[-1:] == (Ellipsis,) for kind in kinds)
+    return not any_length and len({len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple}) == 1
 
 
 def takes_any_key(kinds: Sequence[object]) -> bool:
