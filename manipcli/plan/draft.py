@@ -14,6 +14,7 @@ from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_an
 from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
 from manipcli.model.posture import with_mimics
 from manipcli.plan.hand import closed_on, pressing
+from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import Walk, timed_line
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
@@ -100,32 +101,42 @@ class Draft:
         """
         try:
             with self._told(label):
-                self._solved(X_WT, self._grip(self._posture(hand)))
+                self._solved(X_WT, self._grip(self._posture(hand)), self._planner.solver)
         except NotPlannable as refusal:
             return refusal
         return None
 
     def reach(
-        self, label: str, X_WT: Transform, *, speed: float = 1.0, hand: str | None = None, free: bool = False
+        self,
+        label: str,
+        X_WT: Transform,
+        *,
+        speed: float = 1.0,
+        hand: str | None = None,
+        free: bool = False,
+        leaving: Open = "nothing",
     ) -> None:
         """The tool to a pose, straight in joint space; the hand goes to its pose `hand` meanwhile.
 
         Of the arm's postures with the tool there, those that touch something are passed over; if `free`, also those to
-        which the straight way does.
+        which the straight way does. The orientation may be left open.
         """
         if free:
             self._planner.free_start(self._now, self._allowed)
-        solver = self._planner.solver
+        solver = self._planner.solver.leaving(leaving)
         grip = None if hand is None else self._grip(self._posture(hand))
         with self._told(label):
-            goal = self._solved(X_WT, grip, free=free)
+            goal = self._solved(X_WT, grip, solver, free=free)
             trajectory = self._rest_to_rest(solver.joints, goal[list(solver.columns)], speed)
         self._add(label, trajectory, grip)
 
-    def straight(self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING) -> None:
-        """The tool on a straight line to a pose; one that is the step itself may lead along joint limits."""
+    def straight(
+        self, label: str, X_WT: Transform, *, speed: float, allowed: Pairs = NOTHING, leaving: Open = "nothing"
+    ) -> None:
+        """The tool on a straight line to a pose, of which the orientation may be left open on all the way; one that is
+        the step itself may lead along joint limits."""
         with self._told(label):
-            trajectory = self._straight(X_WT, speed, insist=label == self._verb)
+            trajectory = self._straight(X_WT, speed, insist=label == self._verb, leaving=leaving)
         self._add(label, trajectory, None, allowed=allowed)
 
     def withdraw(self, X_WT: Transform, body: str, *, speed: float, grazing: bool) -> None:
@@ -281,7 +292,7 @@ class Draft:
                 raise
             raise NotPlannable(f"{label}: {refusal.cause}", hint=refusal.hint, reason=refusal.reason) from refusal
 
-    def _solved(self, X_WT: Transform, grip: Grip | None, *, free: bool = False) -> Array:
+    def _solved(self, X_WT: Transform, grip: Grip | None, solver: InverseKinematics, *, free: bool = False) -> Array:
         """Position (n) with the tool there, and the hand where `grip` takes it, in which nothing touches."""
         planner = self._planner
         seed = self._now.position if grip is None else self._with(grip.joints, grip.target)
@@ -296,7 +307,7 @@ class Draft:
             on_way = query.check_trajectory(range(len(q)), seed, share, seed + share[:, None] * (q - seed))
             return None if on_way is None else f"{planner.in_the_way(on_way)}, on the way there"
 
-        return planner.solver.solve(X_WT, seed, planner.rng, refuse=refuse)
+        return solver.solve(X_WT, seed, planner.rng, refuse=refuse)
 
     def _query(self, allowed: Pairs = NOTHING) -> CollisionQuery:
         """What the arm may hit now; `allowed` pairs may touch, too."""
@@ -316,12 +327,18 @@ class Draft:
         verify(trajectory, limits)
         return trajectory
 
-    def _straight(self, X_WT: Transform, speed: float, *, insist: bool = False) -> JointTrajectory:
-        return self._timed(lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist)
+    def _straight(
+        self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
+    ) -> JointTrajectory:
+        def walk(solver: InverseKinematics) -> Array:
+            return linear_path(solver, self._now.position, X_WT)
 
-    def _timed(self, walk: Walk, speed: float, *, insist: bool = False) -> JointTrajectory:
+        return self._timed(walk, speed, insist=insist, leaving=leaving)
+
+    def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
-        return timed_line(walk, self._planner.solver, limits, period=self._planner.period, insist=insist)
+        solver = self._planner.solver.leaving(leaving)
+        return timed_line(walk, solver, limits, period=self._planner.period, insist=insist)
 
     def _add(
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING

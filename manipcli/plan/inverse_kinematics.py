@@ -7,6 +7,9 @@ weighed alike. One step solves
 
 over the joints that are free: a joint at its limit that would be pushed further out is held, and the step is solved
 again. Positions are then clamped to the limits, so every iterate is admissible.
+
+Of a goal that leaves a turn of the tool open, e and J lose what does not count: the part of the rotation about the
+goal's z axis, where the error is that between the two z axes; or all of it.
 """
 
 from __future__ import annotations
@@ -15,15 +18,19 @@ import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import NotPlannable, RefusalReason
-from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_axis_angle
 from manipcli.core.text import number_of
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.posture import position_limits
+
+Open = Literal["nothing", "spin", "turn"]
+"""What a goal leaves open of the tool's orientation: nothing, how it is turned about its z axis, or all of it."""
 
 POSITION_TOLERANCE = 1e-5  # m
 ANGLE_TOLERANCE = 1e-4  # rad
@@ -97,6 +104,13 @@ class InverseKinematics:
         self._columns = np.array(self.columns, dtype=np.intp)
         self._turning = np.array([robot.joint(name).type != "prismatic" for name in self.joints])
         self._lower, self._upper = position_limits(robot.joint(name) for name in self.joints)
+        self._open: Open = "nothing"
+
+    def leaving(self, open_: Open) -> InverseKinematics:
+        """The same for goals that leave so much of the orientation open."""
+        other = copy(self)
+        other._open = open_
+        return other
 
     def drawn_in(self, margin: Array) -> InverseKinematics:
         """The same within narrower limits: each joint's drawn in by its `margin` (m) [rad or m]."""
@@ -168,15 +182,15 @@ class InverseKinematics:
                 hint="move the goal away from what is touched, or change the orientation of the tool",
                 reason="touches",
             )
-        hint = "move the goal nearer, or change the orientation of the tool"
+        hint = "move the goal nearer" + ("" if self._open == "turn" else ", or change the orientation of the tool")
         kind: RefusalReason | None = None
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
-        if len(self.joints) < _ALL and distance <= _FAR:
+        if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
-            hint += f"; an arm of {few} takes few of them at a place: `move: {{to: ...}}` names joint positions"
+            hint += f"; an arm of {few} takes few of them at a place: `move: {{point: ...}}` leaves it open"
         raise NotPlannable(
             f"no joint positions reach ({place}) m, {distance:.3f} m from the robot's base: {best.explain()}",
             hint=hint,
@@ -213,7 +227,7 @@ class InverseKinematics:
     def _solution(self, X_WT: Transform, q: Array) -> Solution:
         """Judged by forward kinematics alone."""
         X_WC = self.forward(q)
-        error, angle = _pose_error(X_WT, X_WC.R, X_WC.p)
+        error, angle = _pose_error(X_WT, X_WC.R, X_WC.p, self._open)
         here = q[self._columns]
         at_limit = (here <= self._lower + _AT_LIMIT) | (here >= self._upper - _AT_LIMIT)
         return Solution(
@@ -235,16 +249,34 @@ class InverseKinematics:
     def _linearise(self, X_WT: Transform, q: Array) -> tuple[Array, Array, float]:
         """Error (6), its Jacobian (6, m) over the solver's joints, and the angle [rad]."""
         R, p, whole = self._kinematics.pose_and_jacobian(q, self.link, self._X_LT)
-        error, angle = _pose_error(X_WT, R, p)
-        return error, whole[:, self._columns], angle
+        error, angle = _pose_error(X_WT, R, p, self._open)
+        J = whole[:, self._columns]
+        if self._open == "spin":
+            z = X_WT.R[:, 2]
+            J[3:] -= np.outer(z, z @ J[3:])
+        elif self._open == "turn":
+            J[3:] = 0.0
+        return error, J, angle
 
 
-def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array) -> tuple[Array, float]:
-    """Pose error (6) in the world, and its angle [rad]."""
-    error = np.empty(6)
+def _pose_error(X_WG: Transform, R_WT: Array, p_WT: Array, open_: Open) -> tuple[Array, float]:
+    """Pose error (6) in the world of what is not left open, and its angle [rad]."""
+    error = np.zeros(6)
     error[:3] = X_WG.p - p_WT
-    error[3:] = rotation_vector(X_WG.R @ R_WT.T)
+    if open_ == "nothing":
+        error[3:] = rotation_vector(X_WG.R @ R_WT.T)
+    elif open_ == "spin":
+        error[3:] = rotation_vector(pointed(R_WT, X_WG.R[:, 2]) @ R_WT.T)
     return error, math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+
+
+def pointed(R: Array, z: Array) -> Array:
+    """R (3, 3), turned the short way so that its z axis is the unit vector `z` (3,)."""
+    axis, cosine = cross(R[:, 2], z), float(R[:, 2] @ z)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return R if cosine > 0.0 else np.column_stack([R[:, 0], -R[:, 1], -R[:, 2]])
+    return np.asarray(matrix_from_axis_angle(axis / sine, math.atan2(sine, cosine)) @ R)
 
 
 def rotation_vector(R: Array) -> Array:

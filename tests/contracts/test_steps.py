@@ -35,6 +35,10 @@ CASES: dict[str, tuple[tuple[str, Any], tuple[tuple[str, Any], ...]]] = {
     "move on a line": (
         ("move", {"pose": {"xyz": [0, 0.2, -0.1], "rpy": [0.3, 0, 0]}, "frame": "tool", "path": "linear"}), ()
     ),
+    "move to a point": (("move", {"point": [0.6, 0.1, 0.7]}), ()),
+    "move to a point on a line, pointing": (
+        ("move", {"point": [0, 0.1, -0.1], "pointing": [0.2, 0, 1], "frame": "tool", "path": "linear"}), ()
+    ),
     "move what is held": (("move", {"to": "home"}), (PICK, LIFT)),
     "follow": (("follow", {"joint_names": ["joint_1", "joint_2"], "points": POINTS}), ()),
     "grasp": (("grasp", {"posture": "wrap"}), ()),

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
+from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle, matrix_from_rpy
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.inverse_kinematics import (
     ANGLE_TOLERANCE,
     POSITION_TOLERANCE,
     InverseKinematics,
+    Open,
     Solution,
+    pointed,
     rotation_vector,
 )
 
@@ -64,6 +66,51 @@ def test_a_goal_near_the_seed_gives_positions_near_the_seed(solver: InverseKinem
     assert np.max(np.abs(q - middle)) < 0.1
 
 
+@pytest.mark.parametrize(("joints", "leaving"), [(3, "turn"), (4, "turn"), (5, "spin"), (7, "spin"), (7, "turn")])
+def test_what_a_goal_leaves_open_does_not_count_and_the_rest_does(
+    solver: InverseKinematics, middle: Array, joints: int, leaving: Open
+) -> None:
+    """Of the tool's orientation the goal gets what is left open at random: an arm of few joints comes there all the
+    same, because the rest was made by its own positions."""
+    rng = np.random.default_rng(4)
+    few = InverseKinematics(solver._kinematics, ARM[:joints], "link_7", X_LT=X_LT).leaving(leaving)
+    for arm in random_positions(LIMITS, 30, 2):
+        arm[joints:] = middle[joints:7]
+        made = arm_forward(arm)
+        turn = matrix_from_axis_angle((0.0, 0.0, 1.0), rng.uniform(-3.0, 3.0))
+        R = made.R @ turn if leaving == "spin" else matrix_from_rpy(rng.uniform(-1.5, 1.5, 3))
+        reached = arm_forward(few.solve(Transform.of(xyz=made.p, R=R), middle, rng)[:7])
+        assert np.linalg.norm(reached.p - made.p) <= POSITION_TOLERANCE
+        if leaving == "spin":
+            assert np.arccos(min(1.0, reached.R[:, 2] @ made.R[:, 2])) <= ANGLE_TOLERANCE + 1e-7
+
+
+@pytest.mark.parametrize("leaving", ["nothing", "spin", "turn"])
+def test_the_jacobian_is_that_of_the_error_at_the_goal(solver: InverseKinematics, middle: Array, leaving: Open) -> None:
+    """Central differences of the error; away from the goal the one of a rotation vector is another."""
+    own = solver.leaving(leaving)
+    for arm in random_positions(LIMITS, 5, 7):
+        q = np.array([*arm, *middle[7:]])
+        goal = own.forward(q)
+        _, J, _ = own._linearise(goal, q)
+        for k in range(7):
+            step = np.zeros(len(q))
+            step[k] = 1e-6
+            ahead, behind = (own._linearise(goal, q + sign * step)[0] for sign in (1.0, -1.0))
+            np.testing.assert_allclose((ahead - behind) / 2e-6, -J[:, k], atol=1e-6)
+
+
+@pytest.mark.parametrize("z", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (0.6, 0.0, 0.8), (-0.8, 0.6, 0.0)])
+def test_an_orientation_is_pointed_by_the_least_turn(z: tuple[float, float, float]) -> None:
+    for R in (np.eye(3), matrix_from_rpy((0.4, -0.9, 2.0))):
+        turned = pointed(R, np.array(z))
+        np.testing.assert_allclose(turned[:, 2], z, atol=1e-12)
+        np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(turned) == pytest.approx(1.0)
+        between = np.arccos(np.clip(R[:, 2] @ np.array(z), -1.0, 1.0))
+        assert np.linalg.norm(rotation_vector(turned @ R.T)) == pytest.approx(between, abs=1e-7)
+
+
 def test_same_seed_same_answer(solver: InverseKinematics, middle: Array) -> None:
     goal = arm_forward(random_positions(LIMITS, 1, 5)[0])
     first, second = (solver.solve(goal, middle, np.random.default_rng(3)) for _ in range(2))
@@ -84,14 +131,14 @@ def test_a_goal_in_millimetres_is_guessed(solver: InverseKinematics, middle: Arr
     assert "millimetres" in (refused.value.hint or "")
 
 
-def test_an_arm_of_few_joints_is_told_of_joint_positions(
+def test_an_arm_of_few_joints_is_told_of_points(
     solver: InverseKinematics, make_arm7: Callable[..., RobotModel], middle: Array
 ) -> None:
     goal = Transform.of(xyz=(0.3, 0.0, 0.8), rpy=(0.5, 0.5, 0.5))
     two = InverseKinematics(Kinematics(make_arm7()), ARM[:2], "link_7", X_LT=X_LT)
     with pytest.raises(NotPlannable) as refused:
         two.solve(goal, middle, np.random.default_rng(0))
-    assert "an arm of 2 joints takes few of them at a place: `move: {to: ...}`" in (refused.value.hint or "")
+    assert "an arm of 2 joints takes few of them at a place: `move: {point: ...}`" in (refused.value.hint or "")
     with pytest.raises(NotPlannable) as refused:
         solver.solve(Transform.of(xyz=(3.0, 0.0, 0.8)), middle, np.random.default_rng(0))
     assert "few" not in (refused.value.hint or "")

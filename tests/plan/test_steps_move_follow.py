@@ -67,6 +67,47 @@ def test_a_pose_is_meant_in_its_frame(bench: Make) -> None:
     np.testing.assert_allclose(X[:3, 3], here[:3, 3] - 0.05 * here[:3, 2], atol=2e-5)
 
 
+def test_a_point_and_a_direction_are_meant_in_their_frame_and_nothing_else_counts(bench: Make) -> None:
+    arm = bench(more="frames: {above: {parent: cup, pose: {xyz: [0, 0, 0.3], rpy: [0, 0, 90 deg]}}}")
+    X = goes_to(arm, {"point": [-0.1, 0, 0.35], "frame": "cup"})
+    np.testing.assert_allclose(X[:3, 3], [0.65, 0.0, 0.75], atol=2e-5)
+    X = goes_to(arm, {"point": [0.05, 0.1, 0], "pointing": [0, -2, 0], "frame": "above"})
+    np.testing.assert_allclose(X[:3, 3], [0.75 - 0.1, 0.05, 0.7], atol=2e-5)
+    np.testing.assert_allclose(X[:3, 2], [1, 0, 0], atol=2e-4)  # turned by 90 deg about z
+    here = arm.tool(arm.now.position)
+    X = goes_to(arm, {"point": [0, 0, 0], "pointing": [0, 0, 1], "frame": "tool"})
+    np.testing.assert_allclose(X, here, atol=1e-9)
+
+
+def test_a_point_is_reached_from_the_nearest_posture(bench: Make) -> None:
+    """The same way that a pose of the same place takes, or a shorter one."""
+    arm = bench()
+    pose, point = ({"xyz": [0.6, 0.1, 0.7], **AHEAD}, [0.6, 0.1, 0.7])
+    there, nearest = (
+        arm.plan("move", {word: value}).end.position for word, value in (("pose", pose), ("point", point))
+    )
+    here = arm.now.position
+    assert np.linalg.norm(nearest - here) <= np.linalg.norm(there - here)
+
+
+@pytest.mark.parametrize("pointing", [None, [0.2, 0, 1]])
+def test_a_line_to_a_point_is_straight_and_turns_to_where_it_points(bench: Make, pointing: list[float] | None) -> None:
+    arm = bench()
+    before = arm.now
+    spec = {"point": [0, 0.15, -0.1], "frame": "tool", "path": "linear"} | ({"pointing": pointing} if pointing else {})
+    X = arm.tools(before, arm.plan("move", spec), "move")
+    p = X[:, :3, 3]
+    goal = arm.tool(before.position) @ np.array([0, 0.15, -0.1, 1.0])
+    np.testing.assert_allclose(p[-1], goal[:3], atol=2e-5)
+    along = (p[-1] - p[0]) / np.linalg.norm(p[-1] - p[0])
+    assert np.linalg.norm((p - p[0]) - np.outer((p - p[0]) @ along, along), axis=1).max() < 1e-4
+    if pointing:
+        z = arm.tool(before.position)[:3, :3] @ np.array(pointing) / np.linalg.norm(pointing)
+        np.testing.assert_allclose(X[-1, :3, 2], z, atol=2e-4)
+        turned = np.arccos(np.clip(X[:, :3, 2] @ z, -1.0, 1.0))
+        assert (np.diff(turned) < 1e-4).all()
+
+
 def test_base_is_where_the_robot_is_mounted(bench: Make) -> None:
     arm = bench()
     X_base = goes_to(arm, {"pose": {"xyz": [0.6, 0.1, 0.7], **AHEAD}, "frame": "base"})

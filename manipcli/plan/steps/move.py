@@ -3,6 +3,7 @@
 - move: {to: home}
 - move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
+- move: {point: [0.4, 0.1, 0.3], pointing: [0, 0, -1]}
 - move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
 - move: {pose: {xyz: [0, 0, 5 cm]}, frame: tool, path: linear, speed: 0.02, touch: [button], guarded: true}
   until: {contact_force: {pair: [robot, button], above: 5 N, mean_over: 50 ms}}
@@ -14,13 +15,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.draft import Draft
+from manipcli.plan.inverse_kinematics import Open, pointed
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
@@ -28,13 +32,16 @@ from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Share
-from manipcli.spec.robot import PoseSpec
+from manipcli.spec.robot import PoseSpec, Vector3
 
 Speed = Annotated[Share, Field(gt=0, le=1, description="Share of the velocity, acceleration and jerk limits.")]
 
 
 class MoveSpec(Model):
-    """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` in a `frame`.
+    """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` or a `point` in a `frame`.
+
+    At a `point` the tool may be turned in any way; with `pointing`, about its z axis alone. That suits arms of fewer
+    than six joints, which can take few poses: with five they can go to a point and point, with three or four to a point.
 
     After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
     of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
@@ -50,6 +57,12 @@ class MoveSpec(Model):
 
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
+    point: Vector3 | None = Field(
+        None, description="Where the tool's origin goes, in `frame` [m]; its turn is left open."
+    )
+    pointing: tuple[float, float, float] | None = Field(
+        None, description="With `point`: a direction in `frame`, in which the tool's z axis points then. Default: any."
+    )
     frame: str = Field("world", description="`world`, `base`, `tool`, a body, or a named frame.")
     path: Literal["free", "joint", "linear"] = Field(
         "free",
@@ -73,13 +86,18 @@ class MoveSpec(Model):
 
     @model_validator(mode="after")
     def _one_target(self) -> MoveSpec:
-        if (self.to is None) == (self.pose is None):
-            raise ValueError("say either `to` (a named pose or joints) or `pose` (of the tool)")
+        if [self.to, self.pose, self.point].count(None) != 2:
+            raise ValueError("say one of `to` (a named pose or joints), `pose` and `point` (of the tool)")
         if self.to is not None and self.path == "linear":
-            raise ValueError("`path: linear` needs a tool `pose`, not `to`")
+            raise ValueError("`path: linear` needs a tool `pose` or `point`, not `to`")
         if self.to is not None and self.frame != "world":
-            message = "a named pose and joint positions have no frame; it is that of a tool `pose`"
+            message = "a named pose and joint positions have no frame; it is that of a tool `pose` or `point`"
             raise problem("conflict", message, at=("frame",), hint="leave it out", key=True)
+        if self.pointing is not None and self.point is None:
+            message = "`pointing` needs a `point`; a `pose` says the whole orientation"
+            raise problem("conflict", message, at=("pointing",), hint="leave it out", key=True)
+        if self.pointing is not None and not any(self.pointing):
+            raise problem("conflict", "a direction is not zero", at=("pointing",), hint="straight down: [0, 0, -1]")
         if self.to == {}:
             raise ValueError("`to` names no joint")
         return self
@@ -98,12 +116,12 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
         draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
-    elif spec.pose is not None:
-        X_WT = planner.frame(spec.frame, situation) @ spec.pose.transform
+    else:
+        X_WT, leaving = _goal(spec, planner, situation)
         if spec.path == "linear":
-            draft.straight("move", X_WT, speed=spec.speed)
+            draft.straight("move", X_WT, speed=spec.speed, leaving=leaving)
         else:
-            draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free")
+            draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free", leaving=leaving)
     planned = draft.plan()
     (motion,) = planned.motions
     end = planned.end
@@ -113,6 +131,19 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         else:
             end = pushed(planner, situation, end, motion.trajectory, spec.touch)
     return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
+
+
+def _goal(spec: MoveSpec, planner: Planner, situation: Situation) -> tuple[Transform, Open]:
+    """X_WT, and what of its orientation does not count: there it is as now, or the nearest that points as asked."""
+    X_WF = planner.frame(spec.frame, situation)
+    if spec.pose is not None:
+        return X_WF @ spec.pose.transform, "nothing"
+    R = planner.tool_pose(situation).R
+    p = X_WF.apply(spec.point or ())
+    if spec.pointing is None:
+        return Transform.of(xyz=p, R=R), "turn"
+    z = X_WF.R @ np.array(spec.pointing)
+    return Transform.of(xyz=p, R=pointed(R, z / np.linalg.norm(z))), "spin"
 
 
 def check(spec: MoveSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
@@ -131,7 +162,7 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
         return unmoved_joints(claims, robot.pose(spec.to).joints, ("to",))
     if spec.to is not None:
         return unmoved_joints(claims, tuple(spec.to), ("to",))
-    return unmoved_tool(claims, robot, ("pose",))
+    return unmoved_tool(claims, robot, ("pose",) if spec.pose is not None else ("point",))
 
 
 def guarded(spec: MoveSpec) -> bool:
