@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError, Place
+from manipcli.core.text import any_of, listed, nearest_file
 
 
 class RecordingRefused(InvalidInput):
@@ -71,8 +72,6 @@ class BadRecording(InvalidInput):
 
 def _beside(path: Path) -> str | None:
     """The log that was meant, or those that are in its folder."""
-    from manipcli.core.text import any_of, listed, nearest_file
-
     if not path.parent.is_dir():
         return f"the folder '{path.parent}' is not there either"
     names = sorted(each.name for each in path.parent.glob("*.mcap"))
