@@ -89,10 +89,12 @@ class _Builder:
 
     def _apart(self, a: str, b: str) -> str:
         """What keeps two bodies from starting inside each other."""
-        specs = [self.spec.scene[name] for name in (a, b) if name in self.spec.scene]
-        containers = {spec.inside for spec in specs}
-        if len(specs) == 2 and len(containers) == 1 and None not in containers and None in [spec.at for spec in specs]:
-            return f"say where in '{specs[0].inside}', as `at: [1 cm, 0]`: it counts from the middle"
+        specs = {name: self.spec.scene[name] for name in (a, b) if name in self.spec.scene}
+        inside = {spec.inside for spec in specs.values()}
+        middle = [f"'{name}'" for name, spec in specs.items() if spec.at is None]
+        if len(specs) == 2 and len(inside) == 1 and None not in inside and middle:
+            where = f"{' and '.join(middle)} {'are' if len(middle) > 1 else 'is'} in the middle of '{inside.pop()}'"
+            return f"{where}: `at: [X, Y]` says how far from it"
         return "move one of them; things that only touch are fine"
 
     def _blamed(self, bodies: Sequence[str]) -> Loc:

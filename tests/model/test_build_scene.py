@@ -112,10 +112,11 @@ def test_several_lie_inside_and_go_along_with_it(place: tuple[float, float], yaw
 def test_two_in_the_middle_are_refused_and_told_the_way() -> None:
     cup = CUP | {"rests_on": "desk", "at": [0.75, 0.0]}
     two = {name: BALL | {"inside": "cup"} for name in ("a", "b")}
-    assert (
-        only({"desk": DESK, "cup": cup} | two).hint
-        == "say where in 'cup', as `at: [1 cm, 0]`: it counts from the middle"
-    )
+    hint = only({"desk": DESK, "cup": cup} | two).hint
+    assert hint == "'a' and 'b' are in the middle of 'cup': `at: [X, Y]` says how far from it"
+    two["a"] |= {"at": [0.01, 0.0]}
+    hint = only({"desk": DESK, "cup": cup} | two).hint
+    assert hint == "'b' is in the middle of 'cup': `at: [X, Y]` says how far from it"
 
 
 def test_what_would_reach_through_the_wall_is_refused_with_the_excess() -> None:
