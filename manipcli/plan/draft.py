@@ -344,7 +344,8 @@ class Draft:
         self, label: str, trajectory: JointTrajectory | None, grip: Grip | None, *, allowed: Pairs = NOTHING
     ) -> None:
         """Accept a motion if nothing is in its way."""
-        refuse_collision(self._planner, self._now, self._query(allowed), label, trajectory, grip)
+        query, move = self._query(allowed), self._verb == "move"
+        refuse_collision(self._planner, self._now, query, label, trajectory, grip, move=move)
         duration = 0.0 if grip is None else grip_time(self._planner, self._now, grip)
         self._accept(label, trajectory, grip, duration if trajectory is None else max(duration, trajectory.duration))
 

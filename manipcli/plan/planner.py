@@ -242,8 +242,13 @@ class Planner:
         if hits:
             raise self.refusal(situation, min(hits, key=lambda hit: hit.distance), "is", "at the start")
 
-    def refusal(self, situation: Situation, hit: CollisionHit, verb: str, when: str) -> NotPlannable:
-        """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`."""
+    def refusal(
+        self, situation: Situation, hit: CollisionHit, verb: str, when: str, *, move: bool = False
+    ) -> NotPlannable:
+        """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`.
+
+        In a `move` it may be meant.
+        """
         carried = situation.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         hint = NO_WAY_AROUND
@@ -254,15 +259,22 @@ class Planner:
         elif begins and situation.at_start:
             hint = PUT_APART
         elif begins:
-            body = hit.b if hit.a.startswith(ROBOT) else hit.a
-            if frozenset((hit.a, hit.b)) in map(frozenset, self.hand_contacts(body)):
+            if body := self._touchable(situation, hit):
                 hint = f"`touch: [{body}]` of the `move` that leaves it lets it"
+        elif move and (body := self._touchable(situation, hit)):
+            hint = f"{NO_WAY_AROUND}; or `touch: [{body}]`, where the hand shall push it or press on it"
         if begins and hit.distance < 0.0 and not held:
             cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} already, {when}"
         else:
             near = f"{hit.amount} {'apart' if hit.distance >= 0.0 else 'into it'}"
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
         return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
+
+    def _touchable(self, situation: Situation, hit: CollisionHit) -> str:
+        """The body that the hand, or what it holds, hit; "" where something else did."""
+        pair = frozenset((hit.a, hit.b))
+        bodies = [name for name in (hit.a, hit.b) if not name.startswith(ROBOT)]
+        return next((one for one in bodies if pair in map(frozenset, self.may_touch(situation, [one]))), "")
 
     def in_the_way(self, hit: CollisionHit) -> str:
         """A hit as text; of what does not overlap, also how far apart it was to stay."""

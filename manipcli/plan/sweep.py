@@ -58,6 +58,8 @@ def refuse_collision(
     label: str,
     trajectory: JointTrajectory | None,
     grip: Grip | None,
+    *,
+    move: bool = False,
 ) -> None:
     """Nothing, if the `query` finds nothing in the way of this motion, which begins in `situation`.
 
@@ -67,4 +69,4 @@ def refuse_collision(
     times, positions = swept(planner, situation, trajectory, grip)
     hit = query.check_trajectory(range(positions.shape[1]), situation.position, times, positions)
     if hit is not None:
-        raise planner.refusal(situation, hit, "would come", f"at t = {hit.time:.2f} s of '{label}'")
+        raise planner.refusal(situation, hit, "would come", f"at t = {hit.time:.2f} s of '{label}'", move=move)

@@ -12,7 +12,7 @@ import pytest
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.collision import CollisionHit
+from manipcli.model.collision import Carried, CollisionHit
 from manipcli.model.posture import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.draft import Draft
@@ -160,6 +160,20 @@ def test_a_later_step_that_begins_in_something_is_told_what_lets_it_leave(bench:
     assert "already, before it moves" in refusal.cause
     assert refusal.hint == "`touch: [desk]` of the `move` that leaves it lets it"
     arm.do("move", {"pose": above, "path": "linear", "touch": ["desk"]})
+
+
+def test_a_hand_that_hits_something_on_its_move_is_told_how_it_may_and_an_arm_is_not(bench: Make) -> None:
+    arm = bench()
+    above = {"xyz": [0.7, -0.2, 0.54], "rpy": [0, "90 deg", 0]}
+    arm.do("move", {"pose": above})
+    hint = arm.refused("move", {"pose": {**above, "xyz": [0.7, -0.2, 0.43]}, "path": "linear"}).hint or ""
+    assert hint.endswith("; or `touch: [desk]`, where the hand shall push it or press on it")
+    arm.now = replace(arm.now, carried=Carried("cup", "palm", Transform.identity()))
+    held = CollisionHit("cup", "desk", -0.002, time=0.3)
+    assert "`touch: [desk]`" in (arm.planner.refusal(arm.now, held, "would come", "", move=True).hint or "")
+    for move, link in ((False, "palm"), (True, "link_3")):
+        hit = CollisionHit("desk", f"robot/{link}", -0.002, time=0.3)
+        assert "touch" not in (arm.planner.refusal(arm.now, hit, "would come", "", move=move).hint or "")
 
 
 def test_links_that_overlap_are_told_of_the_robot_file(bench: Make) -> None:
