@@ -92,6 +92,7 @@ class StepsRun:
         self._executor = Executor(session, touch=self._physics, told=told, alarm=alarm)
         replan = task.spec.replan
         self._replans = replan is not False
+        self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
         self._holding = Holding(task.true.robot, task.true.scene)
@@ -224,7 +225,8 @@ class StepsRun:
             except NotPlannable as refusal:
                 self._believed = now
                 why = f", where {'; '.join(differences)}" if differences else ""
-                way_out = "" if again or self._failed else "; `replan: false` keeps the plan that there was"
+                bound = again or self._failed or self._guards
+                way_out = "" if bound else "; `replan: false` keeps the plan that there was"
                 return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}{way_out}")
             why = "; ".join(differences) or ("it is tried again" if again else "the step before it failed")
             why += stays

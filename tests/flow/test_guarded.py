@@ -111,6 +111,23 @@ steps:
     assert "its end: `until` held; at rest it fails by 100 mm/s: " in step.text
 
 
+def test_no_way_out_is_proposed_that_a_guarded_move_forbids(tmp_path: Path) -> None:
+    """It stops soon on its way up, from where the next one ends below the floor; it is refused with `replan: false`."""
+    file = task_file(
+        tmp_path,
+        f"""{PANDA}simulation: {{engine: kinematic}}
+steps:
+  - move: {{pose: {{xyz: [0.5, 0, 0.25], rpy: [180 deg, 0, 0]}}}}
+  - move: {{pose: {{xyz: [0, 0, -20 cm]}}, frame: tool, path: linear, guarded: true}}
+    until: {{not: {{tool_speed: {{below: 5 cm/s}}}}}}
+  - move: {{pose: {{xyz: [0, 0, 30 cm]}}, frame: tool, path: linear}}
+""",
+    )
+    last = run_task(file, log=tmp_path / "log.mcap", allow_outside=True).verdict.steps[-1]
+    assert last.text.startswith("it cannot be planned from what is measured")
+    assert "replan: false" not in last.text
+
+
 @pytest.mark.slow
 def test_a_hand_presses_as_hard_as_asked_and_goes_on_from_there(tmp_path: Path) -> None:
     """It comes down on a table, through which the plan goes on for 5 cm, stays, and rises from where it is."""
