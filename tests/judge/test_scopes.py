@@ -315,3 +315,17 @@ def test_what_was_to_hold_for_a_time_tells_for_how_long_it_did_not(expect: dict[
     margins[30] = -0.3
     found = judged(recording(margins), expect)
     assert found.text.endswith(told) if told else "broken" not in found.text
+
+
+def test_a_watch_that_ended_the_run_is_not_passed_by_a_log_that_lacks_its_tick() -> None:
+    task = {"task": "t", "robot": "r", "controllers": "c", "steps": [{"wait": "1 s"}], "watch": [{"always": NEAR}]}
+    watch = task_spec().model_validate(task).watch
+    made = recording(np.full(T, 0.5))
+    (seen,) = judge(made, expect=watch, robot=ROBOT, scene=SCENE).expectations
+    assert seen.outcome == "passed"
+    text = f"'{seen.name}' is broken at t = 0.401 s by 3 mm: 'cube' is far"
+    broken = TaskEvent(0.401, "watch_broken", "a", "move", "failed", text, "")
+    verdict = judge(replace(made, events=(*made.events, broken)), expect=watch, robot=ROBOT, scene=SCENE)
+    (known,) = verdict.expectations
+    assert (verdict.verdict, known.outcome) == ("failed", "not_evaluated")
+    assert known.text == "it was broken at t = 0.401 s by 3 mm: 'cube' is far; the log does not hold that tick"

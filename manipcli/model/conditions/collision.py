@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -11,7 +12,7 @@ from pydantic_core import CoreSchema
 
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.model.moments import Moments
+from manipcli.model.moments import Moments, Touched
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair
@@ -81,20 +82,24 @@ def _gauge(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
         hit = hardest(contacts)
         return 0.0 if hit is None else hit.force
 
-    def look(moments: Moments) -> Reading:
-        force = moments.of_contacts(largest)
-
+    def compared(moments: Moments, force: Touched) -> Reading:
         def say(k: int) -> str:
-            hit = hardest(moments.touching(k))
+            hit = hardest(moments.touched(int(force.which[k])))
             if hit is None or not hit.force:
                 return "never touched" if sign < 0.0 else "nothing touches"
             asked = f"; {'at most' if sign < 0.0 else 'at least'} {readable(limit, 'N')}" if limit else ""
             return f"'{hit.a}' and '{hit.b}' press with {readable(hit.force, 'N')}{asked}"
 
         def at(k: int) -> float | None:
-            return float(moments.times[k]) if force[k] else None
+            return float(moments.times[k]) if force.value[k] else None
 
-        return reading(sign * (force - limit), moments.times, unit="N", scale=limit or 1.0, say=say, at=at)
+        return reading(sign * (force.value - limit), moments.times, unit="N", scale=limit or 1.0, say=say, at=at)
+
+    def look(moments: Moments) -> Reading:
+        low, high = moments.extremes_of_contacts(largest)
+        worst, best = (high, low) if sign < 0.0 else (low, high)
+        one = compared(moments, worst)
+        return one if low is high else replace(one, best=compared(moments, best))
 
     return look
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -66,20 +68,28 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
     kind = "force" if spec.mean_over is None else f"mean force over {readable(spec.mean_over, 's')}"
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
-    def look(moments: Moments) -> Reading:
-        force = moments.of_contacts(pressed) if mean is None else mean.of(moments)
-
-        def say(k: int) -> str:
+    def compared(moments: Moments, greatest: Array, smallest: Array) -> Reading:
+        def say(force: Array, k: int) -> str:
             limits = [("below", spec.below), ("above", spec.above)]
             asked = " and ".join(f"{word} {readable(value, 'N')}" for word, value in limits if value is not None)
             return f"the {kind} {what} is {readable(float(force[k]), 'N')}; {asked}"
 
-        readings = []
+        readings, times = [], moments.times
         if spec.below is not None:
-            readings.append(reading(spec.below - force, moments.times, unit="N", scale=spec.below, say=say))
+            most = partial(say, greatest)
+            readings.append(reading(spec.below - greatest, times, unit="N", scale=spec.below, say=most))
         if spec.above is not None:
-            readings.append(reading(force - spec.above, moments.times, unit="N", scale=spec.above, say=say))
+            least_ = partial(say, smallest)
+            readings.append(reading(smallest - spec.above, times, unit="N", scale=spec.above, say=least_))
         return least(readings)
+
+    def look(moments: Moments) -> Reading:
+        if mean is not None:
+            force = mean.of(moments)
+            return compared(moments, force, force)
+        low, high = moments.extremes_of_contacts(pressed)
+        worst = compared(moments, high.value, low.value)
+        return worst if low is high else replace(worst, best=compared(moments, low.value, high.value))
 
     return look
 
