@@ -117,7 +117,8 @@ class Executor:
                 self._come_to_rest()
                 if session.manager.faults:
                     return _fault(session)
-                return replace(DONE, text=f"stopped {left:.2f} s before its end: `until` held")
+                when = f"{left:.2f} s before its end" if left else "after its planned end"
+                return replace(DONE, text=f"stopped {when}: `until` held")
             if not busy and (awaited is None or holds):
                 return replace(DONE, text=told) if told else _held(motion, handles, self._touch)
             if over and deadline is not None:

@@ -70,6 +70,13 @@ def test_a_motion_that_does_not_await_is_not_asked_until(session_of: SessionOf) 
     assert Executor(session_of()).run(wait(0.1, awaits=False), until=until, deadline=None).outcome == "done"
 
 
+def test_a_guarded_motion_whose_time_is_over_is_told_so(session_of: SessionOf) -> None:
+    """Its references are at their end, and a goal is still waited for."""
+    executor, motion = Executor(session_of()), move(awaits=True, guarded=True)
+    end = executor.run(replace(motion, duration=0.1), until=lambda state: state.time >= 0.2, deadline=None)
+    assert end.text == "stopped after its planned end: `until` held"
+
+
 def test_a_guarded_motion_stops_within_its_limits_where_until_holds(session_of: SessionOf) -> None:
     session = session_of()
     way: list[float] = []
