@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 
-KINDS: Final = ("position", "velocity", "effort", "acceleration", "soft limit")
+KINDS: Final = ("position", "velocity", "effort", "acceleration", "soft_limit")
 """Of limits, as the rows of `JointLimiter.by_kind`."""
 POSITION, VELOCITY, EFFORT, ACCELERATION, SOFT = range(len(KINDS))
 _MOST = sys.float_info.max  # infinity is beyond it, so that it is found

@@ -77,7 +77,7 @@ class Cuts:
 
     def _of(self, name: str) -> str:
         """At which limits of a joint."""
-        counts = {kind: of[name] for kind, of in self.kinds.items() if of.get(name)}
+        counts = {kind.replace("_", " "): of[name] for kind, of in self.kinds.items() if of.get(name)}
         if list(counts.values()) == [self.joints[name]]:
             return f" ({next(iter(counts))})"
         worst = sorted(counts, key=lambda kind: -counts[kind])

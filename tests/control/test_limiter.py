@@ -101,11 +101,11 @@ def test_ticks_in_which_the_effort_was_too_much_are_counted_apart():
         ("effort", (-5.0, 1.0, 0.0), set()),
         ("effort", (-30.0, 1.0, 3.0), {"effort"}),
         ("effort", (5.0, 0.0, 3.0), {"velocity"}),
-        ("effort", (5.0, 0.9, 0.0), {"soft limit"}),
+        ("effort", (5.0, 0.9, 0.0), {"soft_limit"}),
         ("velocity", (2.1, 0.0, 2.08), {"velocity"}),
         ("velocity", (1.0, 0.0, 0.0), {"acceleration"}),
         ("velocity", (1.9, 0.999, 1.9), {"position"}),
-        ("velocity", (1.0, 0.79, 1.0), {"soft limit"}),
+        ("velocity", (1.0, 0.79, 1.0), {"soft_limit"}),
         ("position", (0.021, 0.0, 0.0), {"velocity", "acceleration"}),
         ("position", (0.015, 0.0, 0.0), {"acceleration"}),
         ("position", (1.00001, 1.0, 0.0), {"position"}),
@@ -114,7 +114,7 @@ def test_ticks_in_which_the_effort_was_too_much_are_counted_apart():
 def test_a_cut_names_the_limits_that_it_was(mode, wanted, kinds):
     """Limits of 1 rad, 2 rad/s, 10 N m and 5 rad/s2, in a period of 10 ms: 20 mrad, or 0.5 mrad from rest; a soft one
     at 0.8 rad that leaves no velocity there, where one is told."""
-    soft = SoftLimits(-0.8, 0.8, 20.0, 5.0) if "soft limit" in kinds else None
+    soft = SoftLimits(-0.8, 0.8, 20.0, 5.0) if "soft_limit" in kinds else None
     limiter, command = JointLimiter([JointLimits(-1, 1, 2, 10, 5, None, soft)] * 2), JointCommand(2)
     command.obey([mode, "free"])
     value, q, v = wanted
