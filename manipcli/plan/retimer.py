@@ -6,8 +6,9 @@ The path q(s) is a cubic spline through the waypoints over their chord length in
 
 velocity and acceleration limits bound s'^2 and s'' along the path; TOPP-RA finds the largest s'^2. Between two grid
 points s'' is constant, so s(t) is a parabola there. Jerk is not in that problem: where limits state it, s(t) is
-averaged over a sliding window first, which bounds the slope of s'' and leaves the path as it is. The samples are then
-checked at the control rate and time is stretched by what they still exceed.
+averaged over a sliding window first, which bounds the slope of s'' and leaves the path as it is. That takes the window
+longer: where it makes up much of the motion, smaller accelerations, which need less of it, are quicker. The samples are
+then checked at the control rate and time is stretched by what they still exceed.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +31,8 @@ from manipcli.plan.trajectory import JointTrajectory
 _GRID = 300, 500  # fewest and most grid points: 300 cost 0.12 % of time against 1000 (100: 0.7 %), at 7 ms
 _PER_WAYPOINT = 4  # grid points between two waypoints, up to the most
 _WINDOWS = 1.0, 2.0  # times acceleration / jerk: jumps of s'' from and to zero need one, full reversals two
+_MUCH = 0.25  # of the time without jerk limits: a window beyond it may be too wide; at half of it, it is
+_HALVINGS = 20  # of the accelerations: a million times more than is of use were meant for something else
 _ROUNDING = 1e-9
 
 
@@ -53,14 +57,19 @@ def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajec
     grid = np.linspace(0.0, float(spline.path_interval[1]), count + 1)
     scheme = toppra.constraint.DiscretizationType.Interpolation
     velocity = toppra.constraint.JointVelocityConstraint(np.column_stack((-limits.velocity, limits.velocity)))
-    acceleration = toppra.constraint.JointAccelerationConstraint(
-        np.column_stack((-limits.acceleration, limits.acceleration)), discretization_scheme=scheme
-    )
-    solver = toppra.algorithm.TOPPRA([velocity, acceleration], spline, gridpoints=grid, solver_wrapper="seidel")
-    _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
-    if speeds is None or not np.isfinite(speeds).all():
-        raise NotPlannable("the path has no timing within the velocity and acceleration limits: it is not smooth")
-    optimal, nominal = _progress(grid, speeds)
+
+    def timed(share: float) -> Timing:
+        """With this share of the accelerations."""
+        most = share * limits.acceleration
+        acceleration = toppra.constraint.JointAccelerationConstraint(
+            np.column_stack((-most, most)), discretization_scheme=scheme
+        )
+        solver = toppra.algorithm.TOPPRA([velocity, acceleration], spline, gridpoints=grid, solver_wrapper="seidel")
+        _, speeds, _ = solver.compute_parameterization(0.0, 0.0)
+        if speeds is None or not np.isfinite(speeds).all():
+            raise NotPlannable("the path has no timing within the velocity and acceleration limits: it is not smooth")
+        progress, duration = _progress(grid, speeds)
+        return Timing(progress, duration, float(np.max(_peaks(spline, grid, speeds) / limits.jerk)))
 
     def sampled(progress: Progress, length: float) -> JointTrajectory:
         def curve(times: Array) -> tuple[Array, Array, Array]:
@@ -70,16 +79,57 @@ def retime(points: Array, limits: MotionLimits, *, period: float) -> JointTrajec
 
         return on_ticks(curve, length, target=points[-1], limits=limits, period=period)
 
+    fastest = timed(1.0)
     if not np.isfinite(limits.jerk).any():
-        return sampled(optimal, nominal)
-    window = float(np.max(limits.acceleration / limits.jerk))
-    refuse_endless(points, limits, nominal + max(_WINDOWS) * window)
-    smooth = (sampled(*_averaged(optimal, nominal, factor * window, period)) for factor in _WINDOWS)
+        return sampled(fastest.progress, fastest.duration)
+    smooth = []
+    for factor in _WINDOWS:
+        one = _quickest(timed, fastest, factor)
+        refuse_endless(points, limits, one.duration + factor * one.window)
+        smooth.append(sampled(*_averaged(one.progress, one.duration, factor * one.window, period)))
     return min(smooth, key=lambda motion: motion.duration)
 
 
 Progress = Callable[[Array], tuple[Array, Array, Array]]
 """times (k,) [s] -> s, s', s'', each (k,)."""
+
+
+class Timing(NamedTuple):
+    """A motion along the path that takes `duration` [s] without regard to jerk; averaged over `window` [s] a jump of
+    its s'' from or to zero keeps the limits of jerk."""
+
+    progress: Progress
+    duration: float
+    window: float
+
+
+def _quickest(timed: Callable[[float], Timing], fastest: Timing, factor: float) -> Timing:
+    """Of the `fastest` motion and those with a half, a quarter ... of the accelerations the one that is over first when
+    it is averaged over `factor` times its window.
+
+    A motion takes T(a) + factor a / j, of which the first falls with a, and the second grows; neither does while the
+    grid points are too far apart for so much acceleration.
+    """
+    best, share = fastest, 1.0
+    if factor * fastest.window <= _MUCH * fastest.duration:
+        return best
+    for _ in range(_HALVINGS):
+        share /= 2.0
+        one = timed(share)
+        longer = one.duration + factor * one.window - best.duration - factor * best.window
+        if longer > _ROUNDING:
+            break
+        best = one
+    return best
+
+
+def _peaks(spline: Callable[[Array, int], Array], grid: Array, speeds: Array) -> Array:
+    """(n) the greatest |q''| at the grid points, from both sides."""
+    first, second, squares = spline(grid, 1), spline(grid, 2), speeds**2
+    rates = (0.5 * np.diff(squares) / np.diff(grid))[:, None]
+    bends = second * squares[:, None]
+    sides = np.abs([bends[:-1] + first[:-1] * rates, bends[1:] + first[1:] * rates])
+    return np.asarray(sides.max(axis=(0, 1)))
 
 
 def _progress(grid: Array, speeds: Array) -> tuple[Progress, float]:

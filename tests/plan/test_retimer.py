@@ -88,6 +88,20 @@ def test_one_joint_of_little_jerk_costs_little_more_than_it_must(jerk: tuple[flo
     assert exact <= motion.duration < 1.35 * exact
 
 
+@pytest.mark.parametrize("joint", [0, 1, 2])
+@pytest.mark.parametrize("more", [3.0, 30.0, 1e3, 1e6])
+def test_a_looser_limit_of_acceleration_makes_nothing_slower(joint: int, more: float) -> None:
+    """The oracle is the exact time of the same line. Joint 2 hardly moves, and is never the slowest."""
+    points = line(30) * np.array([1.0, 1.0, 1e-3])
+    loose = limits(100.0)
+    loose.acceleration[joint] *= more
+    exact = rest_to_rest(points[0], points[-1], loose, period=PERIOD).duration
+    motion = retime(joint_path(points), loose, period=PERIOD)
+    verify(motion, loose)
+    assert motion.duration <= 1.01 * retime(joint_path(points), limits(100.0), period=PERIOD).duration
+    assert motion.duration <= 1.1 * exact
+
+
 def test_without_a_jerk_limit_it_sets_off_with_all_its_acceleration() -> None:
     motion = retime(joint_path(line(30)), limits(), period=PERIOD)
     assert np.max(np.abs(motion.accelerations[0]) / limits().acceleration) > 0.99
