@@ -91,7 +91,8 @@ class Kinematics:
         # computeFrameJacobian would leave the placements of the joints as they were before.
         pin.computeJointJacobians(model, data, q)
         X = pin.updateFramePlacement(model, data, frame)
-        J: Array = np.array(pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))
+        found = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        J: Array = np.array(found).reshape(6, -1)  # of a single joint Pinocchio gives a vector
         R, p = np.array(X.rotation), np.array(X.translation)
         if offset is not None:
             arm = R @ offset.p

@@ -46,11 +46,18 @@ CONTINUOUS = """<robot name="c"><link name="a"/><link name="b">
 <axis xyz="0 0.6 0.8"/><limit lower="-1" upper="1" velocity="1" effort="2"/></joint></robot>"""
 
 
-@pytest.fixture(scope="module", params=[*SPECS, "continuous"])
+SINGLE = """<robot name="s"><link name="base"/>
+<link name="arm"><inertial><origin xyz="0.2 0.1 -0.05"/><mass value="2"/>
+  <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0.1 0.3" rpy="0.2 0.4 0"/>
+  <axis xyz="0 0.6 0.8"/><limit lower="-2" upper="2" effort="50" velocity="3"/></joint></robot>"""
+
+
+@pytest.fixture(scope="module", params=[*SPECS, "continuous", "single"])
 def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> RobotModel:
-    if request.param == "continuous":
+    if request.param in ("continuous", "single"):
         folder = tmp_path_factory.mktemp("continuous")
-        (folder / "c.urdf").write_text(CONTINUOUS)
+        (folder / "c.urdf").write_text(CONTINUOUS if request.param == "continuous" else SINGLE)
         return build_robot(RobotSpec(robot="c", description="c.urdf", mount=MOUNT), file=folder / "robot.yaml")[0]
     return build_robot(SPECS[request.param], file=ROBOTS / request.param / "robot.yaml")[0]
 
