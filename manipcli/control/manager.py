@@ -241,8 +241,9 @@ class ControllerManager:
         for controller in active:
             if controller.interfaces and set(joints) <= set(controller.joints):
                 return controller
-        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active)
-        raise InvalidArgument("CTRL140", f"no active controller claims all of {', '.join(joints)} ({claims})")
+        claims = "; ".join(f"{c.name}: {', '.join(c.joints)}" for c in active) or "none is active"
+        message = f"no active controller claims all of {', '.join(joints)} ({claims})"
+        raise InvalidArgument("CTRL140", message, hint=self.faults[-1].message if self.faults else None)
 
     def keep_references(self) -> None:
         """From now on the command holds the references, too."""

@@ -318,6 +318,10 @@ def test_a_controller_cannot_change_what_was_measured():
         manager.update(0.0, world)
         assert "read-only" in manager.faults[0].message
         assert world.position.tolist() == World(2).position.tolist()
+        with pytest.raises(InvalidArgument) as refused:
+            manager.serving(["a"])
+        (finding,) = refused.value.findings
+        assert finding.message.endswith("(none is active)") and finding.hint == manager.faults[0].message
 
 
 def test_a_position_controller_is_not_told_the_velocity_and_effort_of_the_one_before():
