@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -55,12 +55,16 @@ class ControllerSpec(Model):
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 
 
+MOST_GAIN: Final = 1e12
+"""No joint is as stiff; beyond 1e300 products of gains are no numbers any more."""
+
+
 class GainsSpec(Model):
     """PID gains of one joint. Units follow the command interface (effort: N m/rad, N m s/rad, N m/(rad s))."""
 
-    p: Annotated[float, Field(ge=0, description="Proportional, 0 or more. Default 0.")] = 0.0
-    i: Annotated[float, Field(ge=0, description="Integral, 0 or more. Default 0.")] = 0.0
-    d: Annotated[float, Field(ge=0, description="Derivative, 0 or more. Default 0.")] = 0.0
+    p: Annotated[float, Field(ge=0, le=MOST_GAIN, description="Proportional, 0 or more. Default 0.")] = 0.0
+    i: Annotated[float, Field(ge=0, le=MOST_GAIN, description="Integral, 0 or more. Default 0.")] = 0.0
+    d: Annotated[float, Field(ge=0, le=MOST_GAIN, description="Derivative, 0 or more. Default 0.")] = 0.0
     i_clamp: Annotated[float, Field(ge=0)] | None = Field(
         None, description="Greatest effort of the integral term, 0 or more. Default: unlimited."
     )

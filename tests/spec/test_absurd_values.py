@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import ValidationError
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.vocabulary import task_spec
+from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.load import load_task_text
 
 TASK = """\
@@ -131,3 +133,10 @@ def test_a_yaw_is_a_turn_at_most(written: str, instead: str) -> None:
 )
 def test_what_has_a_unit_or_fits_neither_way_is_not_guessed(written: str, instead: str) -> None:
     assert "millimetres" not in (refused(written, instead).hint or "")
+
+
+@pytest.mark.parametrize("gain", ["p", "i", "d"])
+def test_no_gain_is_so_large_that_its_products_are_no_numbers(gain: str) -> None:
+    with pytest.raises(ValidationError, match=r"less than or equal to 1000000000000"):
+        GainsSpec.model_validate({gain: 1e308})
+    assert getattr(GainsSpec.model_validate({gain: 1e12}), gain) == 1e12
