@@ -150,6 +150,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(error, format_=_wanted_format(words))
 
 
+def _is_interrupt(error: BaseException) -> bool:
+    """Also one of which another error was made while a program starts: by Python 3.11 of what interrupts the making of
+    a class, by pydantic of what interrupts that of a model."""
+    of_a_model = type(error).__name__ == "SchemaError" and KeyboardInterrupt.__name__ in str(error)
+    return of_a_model or isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
+
+
 def _fail(error: BaseException, *, format_: str) -> ExitCode:
     """Tells an error: as text on stderr; or as the one JSON object, or SARIF, on stdout."""
     from manipcli.report import json, text
@@ -184,8 +191,7 @@ def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
             code="USE001", message=_without_jargon(error.format_message()), hint=f"`{command} --help` shows the usage"
         )
         return ExitCode.USAGE, (finding,)
-    # Python 3.11 makes a RuntimeError of what interrupts the making of a class, as in an import.
-    if isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt):
+    if _is_interrupt(error):
         return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
     if isinstance(error, OSError) and error.errno in _FULL:
         where = "what was to be written" if error.filename is None else str(error.filename)

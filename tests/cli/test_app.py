@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 import typer
+from pydantic_core import SchemaError
 from typer.testing import CliRunner
 
 import manipcli
@@ -83,12 +84,15 @@ def test_the_verdict_decides_the_exit_code(
 
 IN_A_CLASS = RuntimeError("Error calling __set_name__ on 'cached_property' instance 'maps' in 'Made'")
 IN_A_CLASS.__cause__ = KeyboardInterrupt()
+IN_A_MODEL = SchemaError("Error building `literal` serializer:\n  KeyboardInterrupt: ")
 ERRORS = [
     (InvalidInput([Finding("TASK203", "no such joint", Place("t.yaml", 14, 9), hint="did you mean 'a'?")]), 4, "error"),
     (NotPlannable("out of reach", step="pick_1"), 1, "failed"),
     (SimulationFailed("cup exploded", time=1.0), 1, "failed"),
     (ManipcliError("odd"), 3, "error"),
     (KeyboardInterrupt(), 2, "error"),
+    (IN_A_MODEL, 2, "error"),
+    (SchemaError("Error building `literal` serializer"), 3, "error"),
     (IN_A_CLASS, 2, "error"),
     (PermissionError(13, "Permission denied", "/nowhere/x.mcap"), 4, "error"),
     (OSError(28, "No space left on device"), 3, "error"),
