@@ -16,7 +16,7 @@ from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
 from manipcli.spec.override import step_ids
 from manipcli.spec.task import StepSpec, TaskSpec
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, without
+from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at, without
 
 LISTS = ("steps", "expect", "watch")
 """Their faulty items are left out one by one."""
@@ -52,6 +52,7 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
             faults = [one["loc"] for one in error.errors(include_url=False)]
             if number and faults == [()] and left.untouched("simulation", "control_period"):
                 late += explain(error, root, model, source.area)
+            faults, root = (faults, root) if number else _without_fields(root, faults)
             root = _without(root, faults, kept)
     return None
 
@@ -80,6 +81,25 @@ def intended_ids(source: Source, verbs: Sequence[str]) -> tuple[str, ...]:
     counts = {verb: sum(verb in node.entries for node in known if isinstance(node, MappingNode)) for verb in verbs}
     possible = (f"{verb}_{number}" for verb in verbs for number in range(1, counts[verb] + more + 1) if more)
     return tuple(dict.fromkeys((*ids, *possible)))
+
+
+def _without_fields(root: MappingNode, faults: list[Loc]) -> tuple[list[Loc], MappingNode]:
+    """The tree without the faulty fields of steps, and the faults that are elsewhere: the names in the other fields are
+    still to be checked. A step that cannot be without its field is faulty again, and is left out then."""
+    steps = root.get("steps")
+    if not isinstance(steps, SequenceNode):
+        return faults, root
+    items, others = [*steps.items], []
+    for fault in faults:
+        field = fault[3:5] if fault[:1] == ("steps",) else ()  # behind the number of the step and which kind it is
+        item = items[int(fault[1])] if field else None
+        if fault == ("steps",) and len(faults) > 1:
+            continue  # none of the steps was sound; if none is now, that is told again
+        if not isinstance(item, MappingNode) or field[0] in ("until", "on_fail", "id"):
+            others.append(fault)
+        elif node_at(item, field) is not node_at(item, field[:-1]):  # of a value that may be this or that, once
+            items[int(fault[1])] = without(item, field)
+    return others, root.with_node("steps", SequenceNode(tuple(items), steps.place))
 
 
 def _without(root: MappingNode, faults: list[Loc], kept: dict[str, tuple[int, ...]]) -> MappingNode:

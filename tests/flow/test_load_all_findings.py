@@ -190,6 +190,36 @@ steps:
     assert [place[:2] for place in found] == [(4, 22), (6, 11), (7, 10)]
 
 
+def test_a_faulty_field_of_a_step_hides_no_name_in_its_others(tmp_path: Path) -> None:
+    """Of each step but the last the faulty field can be left out; of that, its only value."""
+    file = tmp_path / "task.yaml"
+    file.write_text(
+        f"""task: t
+robot: {ROOT}/robots/arm7_hand3/robot.yaml
+controllers: {ROOT}/controllers/arm7_hand3.yaml
+scene:
+  cup: {{cup: {{radius: 36 mm, height: 110 mm, wall: 4 mm}}, mass: 150 g, at: [0.75, 0.0], rests_on: floor}}
+steps:
+  - pick: {{object: cupp, approach: {{from: sid}}, grasp: {{posture: wrapp}}}}
+  - pour: {{object: cup, into: try, tilt: $titl}}
+    until: {{inside: {{object: bal, of: cup}}}}
+    timeout: 15 kg
+  - place: {{object: cop, at: strt}}
+  - move: {{to: hom, speed: fast}}
+  - wait: soon
+"""
+    )
+    with pytest.raises(InvalidInput) as refused:
+        load_task(file, allow_outside=True)
+    told = [(f.place.line, shown) for f in refused.value.findings if f.place for shown in [f.message.split(": ")[0]]]
+    assert told == [
+        (7, "steps[0].pick.object"), (7, "steps[0].pick.approach.from"), (7, "steps[0].pick.grasp.posture"),
+        (8, "steps[1].pour.into"), (8, "steps[1].pour.tilt"), (9, "steps[1].until.inside.object"),
+        (10, "steps[1].timeout"), (11, "steps[2].place.object"), (11, "steps[2].place.at"),
+        (12, "steps[3].move.to"), (12, "steps[3].move.speed"), (13, "steps[4].wait"),
+    ]  # fmt: skip
+
+
 def test_a_faulty_point_of_a_trajectory_is_told_at_its_line(tmp_path: Path) -> None:
     points = (
         ("[a, b]", "{positions: [0, 0, 0], time_from_start: 1}", "points[1].positions: 3 positions for 2 joints"),
