@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
-from manipcli.judge.moments import MomentsOfSpans, Order, unrecorded
+from manipcli.judge.moments import MomentsOfSpans, Order, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.condition import World
-from manipcli.model.formula import Seams
+from manipcli.model.formula import Seams, leaves
+from manipcli.model.moments import Moments
 from manipcli.model.reading import NotEvaluated
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
@@ -44,6 +45,8 @@ def examine(
     order = Order.of(recording, robot, scene)
     successive: MomentsOfSpans | None = None
     asked: list[Expected] = []
+    stateless = [all(seam[leaf.name].stateless for leaf in leaves(one.condition)) for one in expect]
+    last: Moments | None = None
     end = 0.0
     for span in recording.spans:
         if span.states.time.size == 0:
@@ -65,8 +68,9 @@ def examine(
             )
             asked = [Expected(one, world, steps, seam) for one in expect]
         moments = successive.next(span)
-        for one in asked:
-            one.look(moments)
+        last = every = at_every_tick(moments, last, recording.period)
+        for one, of_no_state in zip(asked, stateless, strict=True):
+            one.look(every if of_no_state else moments)
     names = labels(expect)
     if successive is None:
         none = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording holds no state")

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
 
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.condition import Seen
@@ -14,6 +17,9 @@ from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record.channels import CONTACTS, TF
 from manipcli.record.recording import Recording, Span
+
+MOST_TICKS: Final = 1_000_000
+"""Of a span, half a second or so: a log that says it has more of them is not believed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +75,28 @@ def unrecorded(recording: Recording) -> dict[Seen, str]:
     if CONTACTS in recording.silent:
         found["contacts"] = f"{recording.unknown(CONTACTS)}, though every run records some"
     return found
+
+
+def at_every_tick(moments: Moments, since: Moments | None, period: float) -> Moments:
+    """The moments of a thinned log at all control ticks, `period` [s] apart, up to the last of them; for conditions
+    that look at no state, of which it holds none there.
+
+    Args:
+        moments: those of a span.
+        since: what came of those before.
+        period: of control; 0 where the log does not say it.
+    """
+    if not period:
+        return moments
+    last = round(float(moments.times[-1]) / period)
+    first = round(float(moments.times[0]) / period) if since is None else round(float(since.times[-1]) / period) + 1
+    count = last - first + 1
+    if count <= len(moments.times) or count > MOST_TICKS:
+        return moments
+    times = np.round(np.arange(first, last + 1) * period, 9)
+    unknown = moments.states.map(lambda a: np.broadcast_to(np.nan, (count, *a.shape[1:])))
+    before = None if since is None else since.states.map(lambda a: a[-1])
+    return replace(moments, states=replace(unknown, time=times), before=before, references=())
 
 
 class MomentsOfSpans:

@@ -111,6 +111,8 @@ class Condition(Generic[S]):
         absent: (spec, world) -> why it can never be evaluated in this world, or None.
         scope: where it is expected to hold when the task does not say.
         example: how it is written, in YAML.
+        stateless: it looks at contacts and steps alone, which are known at every tick, also in a log that holds fewer
+            states than there were ticks.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Condition(Generic[S]):
     absent: Callable[[S, World], str | None]
     example: str
     scope: Scope = "end"
+    stateless: bool = False
 
 
 def unmoving(world: World, bodies: Sequence[str]) -> str | None:

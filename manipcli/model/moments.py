@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,13 +33,6 @@ class Touching:
 
     time: float
     contacts: tuple[Contact, ...]
-
-
-class Touched(NamedTuple):
-    """At each tick a value (T,) of contacts, and `which` (T,) of those of the moments it is of, from 1; 0: of none."""
-
-    value: Array
-    which: npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +72,11 @@ class Moments:
         """The ticks from `first` up to and without `last`."""
         if first == 0 and last == len(self.times):
             return self
-        before = self.states.map(lambda a: a[first - 1]) if first > 0 else self.before
-        since = self.times[first] if before is None else before.time
-        valid = int(np.searchsorted([one.time for one in self.contacts], since, side="right")) - 1
+        valid = int(np.searchsorted([one.time for one in self.contacts], self.times[first], side="right")) - 1
         return replace(
             self,
             states=self.states.map(lambda a: a[first:last]),
-            before=before,
+            before=self.states.map(lambda a: a[first - 1]) if first > 0 else self.before,
             references=tuple(Reference(one.joints, one.position[first:last]) for one in self.references),
             contacts=self.contacts[max(valid, 0) :],
         )
@@ -100,27 +90,6 @@ class Moments:
         """(T,) `value` of what touches at each tick."""
         values = np.array([value(()), *(value(one.contacts) for one in self.contacts)])
         return values[self._which()]
-
-    def extremes_of_contacts(self, value: Callable[[Sequence[Contact]], float]) -> tuple[Touched, Touched]:
-        """The least and the greatest `value` of what touched since the tick before, at each tick: a log may hold fewer
-        ticks than changes of contacts. The same twice where it does not."""
-        values = np.array([value(()), *(value(one.contacts) for one in self.contacts)])
-        which, times = self._which(), [one.time for one in self.contacts]
-        last = which[:1] if self.before is None else np.searchsorted(times, self.before.time[None], side="right")
-        since = np.concatenate([last, which[:-1]])
-        touched = Touched(values[which], which)
-        changed = np.flatnonzero(which > since + 1)
-        if not len(changed):
-            return touched, touched
-        low, high = which.copy(), which.copy()
-        for k in changed.tolist():
-            between = values[since[k] + 1 : which[k] + 1]
-            low[k], high[k] = since[k] + 1 + int(between.argmin()), since[k] + 1 + int(between.argmax())
-        return Touched(values[low], low), Touched(values[high], high)
-
-    def touched(self, which: int) -> tuple[Contact, ...]:
-        """The contacts of that number in `Touched`."""
-        return self.contacts[which - 1].contacts if which else ()
 
     def _which(self) -> npt.NDArray[np.intp]:
         """(T,) which of `contacts` holds at each tick, counted from 1; 0: none yet."""

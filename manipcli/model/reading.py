@@ -69,8 +69,6 @@ class Reading:
         applies: (T,) where there is anything to say: of an object that no hand holds, there is no slip.
         idle: why it does not apply, where it does not.
         found: tick -> what to tell of it.
-        best: where things are known to have changed between two ticks, all above is of the least margin since the tick
-            before; this is of the greatest. None: they have not.
     """
 
     margins: Array
@@ -79,7 +77,6 @@ class Reading:
     applies: Mask
     idle: str
     found: Callable[[int], Measured]
-    best: Reading | None = None
 
     @property
     def order(self) -> Array:
@@ -132,9 +129,6 @@ def greatest(readings: Sequence[Reading]) -> Reading:
 def opposite(of: Reading, *, word: str = "not ") -> Reading:
     """`not`: the same margin with the other sign, and -`EDGE` at most where `of` holds; `word` is said before what was
     found."""
-    if of.best is not None:
-        least_of, greatest_of = replace(of, best=None), of.best
-        return replace(opposite(greatest_of, word=word), best=opposite(least_of, word=word))
 
     def found(k: int) -> Measured:
         one = of.found(k)
@@ -153,29 +147,26 @@ def never(of: Reading) -> Reading:
 
     Never not is always.
     """
+    against = opposite(of, word="")
 
-    def as_asked(text: str) -> str:
-        if text.startswith("not "):
-            return text.removeprefix("not ")
-        measured, between, asked = text.rpartition("; ")
-        return f"{measured}; never {asked}" if between else text
+    def found(k: int) -> Measured:
+        one = against.found(k)
+        if one.text.startswith("not "):
+            return replace(one, text=one.text.removeprefix("not "))
+        measured, between, asked = one.text.rpartition("; ")
+        return replace(one, text=f"{measured}; never {asked}") if between else one
 
-    return _told(opposite(of, word=""), as_asked)
+    return replace(against, found=found)
 
 
 def named(of: Reading, word: str) -> Reading:
     """The same, telling which condition it is."""
-    return _told(of, lambda text: f"{word}: {text}")
-
-
-def _told(of: Reading, change: Callable[[str], str]) -> Reading:
-    """The same with other texts."""
 
     def found(k: int) -> Measured:
         one = of.found(k)
-        return replace(one, text=change(one.text))
+        return replace(one, text=f"{word}: {one.text}")
 
-    return replace(of, found=found, best=None if of.best is None else _told(of.best, change))
+    return replace(of, found=found)
 
 
 def _picked(readings: Sequence[Reading], pick: Callable[..., npt.NDArray[np.intp]]) -> Reading:
@@ -189,11 +180,9 @@ def _picked(readings: Sequence[Reading], pick: Callable[..., npt.NDArray[np.intp
     ticks = np.arange(margins.shape[1])
     applies = np.logical_and.reduce([one.applies for one in readings])
     idle = next((one.idle for one in readings if not one.applies.all()), "")
-    best = _picked([one.best or one for one in readings], pick) if any(one.best for one in readings) else None
     return Reading(
-        margins[member, ticks], relative[member, ticks], units, applies, idle, lambda k: readings[member[k]].found(k),
-        best,
-    )  # fmt: skip
+        margins[member, ticks], relative[member, ticks], units, applies, idle, lambda k: readings[member[k]].found(k)
+    )
 
 
 class Extreme:
@@ -212,8 +201,6 @@ class Extreme:
 
     def add(self, more: Reading, times: Array, first: int = 0, last: int | None = None) -> None:
         """The ticks from `first` up to and without `last` count, too."""
-        if self._pick == "greatest" and more.best is not None:
-            more = more.best
         order, applies = more.order[first:last], more.applies[first:last]
         ticks = np.flatnonzero(applies)
         if len(ticks) < len(applies):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated
 
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -12,7 +11,7 @@ from pydantic_core import CoreSchema
 
 from manipcli.core.units import readable
 from manipcli.model.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.model.moments import Moments, Touched
+from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading, reading
 from manipcli.model.state import Contact
 from manipcli.model.touch import between, impossible_pair
@@ -82,24 +81,20 @@ def _gauge(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
         hit = hardest(contacts)
         return 0.0 if hit is None else hit.force
 
-    def compared(moments: Moments, force: Touched) -> Reading:
+    def look(moments: Moments) -> Reading:
+        force = moments.of_contacts(largest)
+
         def say(k: int) -> str:
-            hit = hardest(moments.touched(int(force.which[k])))
+            hit = hardest(moments.touching(k))
             if hit is None or not hit.force:
                 return "never touched" if sign < 0.0 else "nothing touches"
             asked = f"; {'at most' if sign < 0.0 else 'at least'} {readable(limit, 'N')}" if limit else ""
             return f"'{hit.a}' and '{hit.b}' press with {readable(hit.force, 'N')}{asked}"
 
         def at(k: int) -> float | None:
-            return float(moments.times[k]) if force.value[k] else None
+            return float(moments.times[k]) if force[k] else None
 
-        return reading(sign * (force.value - limit), moments.times, unit="N", scale=limit or 1.0, say=say, at=at)
-
-    def look(moments: Moments) -> Reading:
-        low, high = moments.extremes_of_contacts(largest)
-        worst, best = (high, low) if sign < 0.0 else (low, high)
-        one = compared(moments, worst)
-        return one if low is high else replace(one, best=compared(moments, best))
+        return reading(sign * (force - limit), moments.times, unit="N", scale=limit or 1.0, say=say, at=at)
 
     return look
 
@@ -118,6 +113,7 @@ NO_COLLISION = Condition(
     absent=lambda spec, world: untouchable(world),
     scope="always",
     example="no_collision: {pairs: [[robot, desk], [robot, tray]]}",
+    stateless=True,
 )
 COLLISION = Condition(
     name="collision",
@@ -127,4 +123,5 @@ COLLISION = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world),
     example="collision: [robot, desk]",
+    stateless=True,
 )

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -68,28 +66,20 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
     kind = "force" if spec.mean_over is None else f"mean force over {readable(spec.mean_over, 's')}"
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
-    def compared(moments: Moments, greatest: Array, smallest: Array) -> Reading:
-        def say(force: Array, k: int) -> str:
+    def look(moments: Moments) -> Reading:
+        force = moments.of_contacts(pressed) if mean is None else mean.of(moments)
+
+        def say(k: int) -> str:
             limits = [("below", spec.below), ("above", spec.above)]
             asked = " and ".join(f"{word} {readable(value, 'N')}" for word, value in limits if value is not None)
             return f"the {kind} {what} is {readable(float(force[k]), 'N')}; {asked}"
 
-        readings, times = [], moments.times
+        readings = []
         if spec.below is not None:
-            most = partial(say, greatest)
-            readings.append(reading(spec.below - greatest, times, unit="N", scale=spec.below, say=most))
+            readings.append(reading(spec.below - force, moments.times, unit="N", scale=spec.below, say=say))
         if spec.above is not None:
-            least_ = partial(say, smallest)
-            readings.append(reading(smallest - spec.above, times, unit="N", scale=spec.above, say=least_))
+            readings.append(reading(force - spec.above, moments.times, unit="N", scale=spec.above, say=say))
         return least(readings)
-
-    def look(moments: Moments) -> Reading:
-        if mean is not None:
-            force = mean.of(moments)
-            return compared(moments, force, force)
-        low, high = moments.extremes_of_contacts(pressed)
-        worst = compared(moments, high.value, low.value)
-        return worst if low is high else replace(worst, best=compared(moments, low.value, high.value))
 
     return look
 
@@ -154,4 +144,5 @@ CONTACT_FORCE = Condition(
     absent=lambda spec, world: untouchable(world),
     scope="always",
     example="contact_force: {pair: [robot, cup], below: 20 N}",
+    stateless=True,
 )

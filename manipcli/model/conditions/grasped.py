@@ -51,4 +51,5 @@ GRASPED = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world),
     example="grasped: {object: cup}",
+    stateless=True,
 )

@@ -60,4 +60,5 @@ STEP_DONE = Condition(
     check=check,
     absent=lambda spec, world: None if spec.step in world.steps else f"the recording knows no step '{spec.step}'",
     example="step_done: {step: lift_1}",
+    stateless=True,
 )
