@@ -296,8 +296,9 @@ def readable(value: float, symbol: str, *, digits: int = 3) -> str:
         return f"{value:g} {symbol}".rstrip()
     if value == 0.0:
         return f"0 {symbol}".rstrip()  # never -0
+    size = abs(float(f"{value:.{digits}g}"))  # as it is shown: 0.9999 s is 1 s, and not 1e+03 ms
     for least, shown, factor in _READABLE.get(symbol, ()):
-        if abs(value) >= least:
+        if size >= least:
             return f"{value * factor:.{digits}g} {shown}"
     return f"{value:.{digits}g} {symbol}".rstrip()
 

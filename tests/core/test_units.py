@@ -130,6 +130,8 @@ def test_any_text_is_a_quantity_or_a_unit_error(text: str) -> None:
         (1.5, "m", "1.5 m"),
         (-0.05, "rad", "-2.86 deg"),
         (0.25, "s", "250 ms"),
+        (0.99996, "s", "1 s"),
+        (-0.99996e-3, "m", "-1 mm"),
         (3.0, "N", "3 N"),
         (0.0, "m", "0 m"),
     ],
