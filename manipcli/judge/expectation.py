@@ -153,8 +153,9 @@ class Expected:
         if isinstance(self._spec, WatchSpec):
             return "" if first == found.at else f"; broken at t = {first:.3f} s"
         since = "" if first == found.at else f", first at t = {first:.3f} s"
-        spacing = (self._last - self._first) / max(self._ticks - 1, 1)
-        return f"; broken for {readable(self._extreme.broken_ticks * spacing, 's')}{since}"
+        whole = self._last - self._first
+        broken = self._extreme.broken_ticks * whole / max(self._ticks - 1, 1)
+        return f"; broken for {readable(min(broken, whole), 's')}{since}"
 
 
 def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:

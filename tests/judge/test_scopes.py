@@ -303,6 +303,8 @@ def test_a_watch_that_is_broken_at_its_worst_moment_tells_it_once(worst: int, to
     ("expect", "told"),
     [
         ({"always": NEAR}, "; broken for 300 ms, first at t = 0.200 s"),
+        ({"never": NEAR}, "; broken for 1.71 s"),
+        ({"always": {"not": {"any": [NEAR, {"not": NEAR}]}}}, "; broken for 2 s"),
         ({**NEAR, "during": "a"}, "; broken for 200 ms, first at t = 0.200 s"),
         ({**NEAR, "during": "c"}, "; broken for 100 ms"),
         ({**NEAR, "at": "end"}, None),
