@@ -176,18 +176,22 @@ class InverseKinematics:
             return min(found, key=lambda solution: float(np.linalg.norm(solution.q - seed))).q
         distance = float(np.linalg.norm(X_WT.p - self._kinematics.robot.X_WB.p))
         place = ", ".join(f"{value:.3f}" for value in X_WT.p)
+        turn = "" if self._open == "turn" else ", or change the orientation of the tool"
         if refusal is not None:
             raise NotPlannable(
                 f"the arm reaches ({place}) m only where {refusal}",
-                hint="move the goal away from what is touched, or change the orientation of the tool",
+                hint=f"move the goal away from what is touched{turn}",
                 reason="touches",
             )
-        hint = "move the goal nearer" + ("" if self._open == "turn" else ", or change the orientation of the tool")
+        hint = f"move the goal nearer{turn}"
         kind: RefusalReason | None = None
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
+        elif self._open == "spin" and (found_at := self.leaving("turn").track(X_WT, seed)).converged:
+            off = float(np.degrees(np.arccos(np.clip(self.forward(found_at.q).R[:, 2] @ X_WT.R[:, 2], -1.0, 1.0))))
+            hint = f"without `pointing` the point is reached, with the tool {off:.0f} deg off"
         if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} takes few of them at a place: `move: {{point: ...}}` leaves it open"

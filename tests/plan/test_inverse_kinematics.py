@@ -85,6 +85,16 @@ def test_what_a_goal_leaves_open_does_not_count_and_the_rest_does(
             assert np.arccos(min(1.0, reached.R[:, 2] @ made.R[:, 2])) <= ANGLE_TOLERANCE + 1e-7
 
 
+def test_a_point_that_is_reached_and_not_in_that_direction_is_told_so(solver: InverseKinematics, middle: Array) -> None:
+    few = InverseKinematics(solver._kinematics, ARM[:3], "link_7", X_LT=X_LT).leaving("spin")
+    arm = np.array([*random_positions(LIMITS, 1, 2)[0][:3], *middle[3:7]])
+    made = arm_forward(arm)
+    away = Transform.of(xyz=made.p, R=made.R @ matrix_from_rpy([1.0, 0.0, 0.0]))
+    with pytest.raises(NotPlannable) as refused:
+        few.solve(away, np.array([*arm[:3] + 0.02, *middle[3:]]), np.random.default_rng(0))
+    assert refused.value.hint == "without `pointing` the point is reached, with the tool 57 deg off"
+
+
 @pytest.mark.parametrize("leaving", ["nothing", "spin", "turn"])
 def test_the_jacobian_is_that_of_the_error_at_the_goal(solver: InverseKinematics, middle: Array, leaving: Open) -> None:
     """Central differences of the error; away from the goal the one of a rotation vector is another."""

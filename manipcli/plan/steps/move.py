@@ -41,7 +41,8 @@ class MoveSpec(Model):
     """The robot goes to a named pose or joint positions (`to`), or its tool to a `pose` or a `point` in a `frame`.
 
     At a `point` the tool may be turned in any way; with `pointing`, about its z axis alone. That suits arms of fewer
-    than six joints, which can take few poses: with five they go to a point and point, with three or four to a point.
+    than six joints, which can take few poses. Three joints take the tool to a point; to point there, too, it takes five
+    of which none only turns the tool about its z axis.
 
     After `pick` or `grasp` the hand stays closed, whether it met anything or not, until `release` or `place` opens it:
     of a named pose only the joints of the arm count then, and joints of the hand named one by one are refused.
