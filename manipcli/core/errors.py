@@ -106,8 +106,9 @@ class InvalidArgument(InvalidInput, ValueError):
         super().__init__((Finding(code=code, message=message, hint=hint),))
 
 
-RefusalReason = Literal["orientation", "touches", "in_the_way"]
-"""The arm cannot turn its tool so; it reaches a pose only so that something touches; something is in a motion's way."""
+RefusalReason = Literal["orientation", "touches", "in_the_way", "line"]
+"""The arm cannot turn its tool so; it reaches a pose only so that something touches; something is in a motion's way;
+the arm cannot take its tool along a straight line."""
 
 
 class NotPlannable(ManipcliError):

@@ -92,6 +92,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
             raise NotPlannable(
                 f"the straight line ends {where}: {found.explain()}",
                 hint=f"{_OTHERWISE}, make it shorter, or move `free` instead",
+                reason="line",
             )
         jump = np.abs(found.q[columns] - q[columns])
         worst = int(np.argmax(jump))
@@ -100,6 +101,7 @@ def follow_poses(solver: InverseKinematics, q: npt.ArrayLike, poses: Sequence[Tr
                 f"the arm would have to jump {where}: joint '{solver.joints[worst]}' by {jump[worst]:.2f} within one "
                 f"point of the line (near singular: {solver.singularity(q)})",
                 hint=f"{_OTHERWISE}, or move `free` instead",
+                reason="line",
             )
         q = found.q
         waypoints.append(q[columns])

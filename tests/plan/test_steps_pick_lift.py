@@ -140,6 +140,20 @@ def test_one_height_is_taken_as_it_is(bench: Make, story: Story) -> None:
     assert arm.body("cup", plan.end).p[2] - 0.4 == pytest.approx(0.05, abs=1e-4)
 
 
+def test_what_cannot_be_lifted_or_put_so_far_is_told_what_those_steps_can_do_about_it(
+    bench: Make, story: Story
+) -> None:
+    """A straight line of a `lift` or a `place` is no `move`, of which another path could be asked."""
+    arm = bench()
+    arm.now = story.steps["pick"][1].end
+    lift = arm.refused("lift", {"object": "cup", "by": 1.5})
+    arm.now = story.steps["lift"][1].end
+    place = arm.refused("place", {"object": "cup", "at": [1.12, 0.45], "on": "desk"})
+    assert "the straight line ends" in lift.cause and "the straight line ends" in place.cause
+    assert (lift.hint or "").startswith("lift it less, `by: ...`; or ")
+    assert (place.hint or "").startswith("put it where the arm reaches, `at: [x, y]`; or ")
+
+
 def test_what_is_not_held_is_not_lifted(bench: Make, story: Story) -> None:
     arm = bench()
     for verb, spec in (("lift", {}), ("pour", {"into": "tray"}), ("place", {})):

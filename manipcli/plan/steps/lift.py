@@ -9,6 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
@@ -20,6 +21,8 @@ from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.spec.base import Model
+
+_LESS = "lift it less, `by: ...`; or take it in another way: `approach: {yaw: ...}` of its `pick`"
 
 
 class LiftSpec(Model):
@@ -38,7 +41,10 @@ def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
     def attempt(height: float) -> StepPlan:
         draft = Draft(planner, situation, verb="lift")
         up = Transform.of(xyz=(0.0, 0.0, height))
-        draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=under)
+        try:
+            draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=under)
+        except NotPlannable as refusal:
+            raise NotPlannable(refusal.cause, hint=_LESS if refusal.reason == "line" else refusal.hint) from refusal
         return draft.plan()
 
     return first_feasible(attempt, spread(spec.by), what=f"no height to lift '{spec.object}' by")

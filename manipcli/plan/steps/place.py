@@ -49,6 +49,7 @@ _LOWER = (
     "where the hand is in the way, take the object higher, `grasp: {height: ...}` of its `pick`; "
     "else put it elsewhere, `at: [x, y]`, or turn it, `yaw: ...`"
 )
+_WITHIN = "put it where the arm reaches, `at: [x, y]`; or take it in another way: `approach: {yaw: ...}` of its `pick`"
 _ROOMIER = "put it where the opening fingers have room, turn it: `yaw: ...`, or open the hand less: `posture: ...`"
 
 
@@ -128,11 +129,12 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
 
 @contextmanager
 def _hinted(hint: str) -> Iterator[None]:
-    """What is in the way inside is told with this hint."""
+    """What is in the way inside is told with this hint; a line that cannot be followed as what it is of a `place`."""
     try:
         yield
     except NotPlannable as refusal:
-        raise NotPlannable(refusal.cause, hint=hint if refusal.reason == "in_the_way" else refusal.hint) from refusal
+        told = {"in_the_way": hint, "line": _WITHIN}.get(refusal.reason or "", refusal.hint)
+        raise NotPlannable(refusal.cause, hint=told) from refusal
 
 
 def _horizontal(X_WT: Transform) -> Array | None:
