@@ -339,7 +339,9 @@ class TaskSpec(Model):
             if abs(ticks - strides[name]) > 1e-6 * ticks:
                 most = 1.0 / period
                 message = f"{rate:g} Hz is no whole part of the control rate ({most:g} Hz)"
-                near = most / max(1, round(ticks))
+                strides_near = range(max(1, int(ticks / 2)), int(2 * ticks) + 2)
+                plain = [most / n for n in strides_near if abs(most / n - round(most / n, 3)) < 1e-9 * most]
+                near = min(plain or [most / max(1, round(ticks))], key=lambda one: abs(one - rate))
                 hint = f"write '{near:.10g} Hz'" + (", the control rate" if near == most else "")
                 raise problem("conflict", message, at=("record", "rates", name), hint=hint)
         common = math.lcm(*(strides.get(name, 1) for name in JUDGED if name not in self.record.left_out))
