@@ -170,7 +170,8 @@ def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tup
         planned = plan_step(planner, step, start, grasps)
     except NotPlannable as refusal:
         at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
-        raise NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at) from refusal
+        told = NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at, loc=refusal.loc)
+        raise told from refusal
     return PlannedStep(str(step.id), step.verb, planned, task.log_place("steps", k), grasps)
 
 

@@ -35,8 +35,11 @@ class Regrasps:
             done: of each of the others its verb and its predicted end.
 
         Raises:
-            NotPlannable: no grasp is left to try; of the refusals the one that came latest in the task.
+            NotPlannable: no grasp is left to try; of the refusals the one that came latest in the task. Or a value of
+                the step is the cause, with which no grasp helps.
         """
+        if refusal.loc:
+            raise refusal
         step = len(done)
         if self._latest is None or step > self._latest[0]:
             self._latest = step, refusal

@@ -25,6 +25,7 @@ PANDA = f"robot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers
 SCENE = """scene:
   table: {box: {size: [0.6, 0.8, 0.2]}, pose: {xyz: [0.55, 0, 0.1]}, fixed: true}
   block: {box: {size: [4 cm, 4 cm, 10 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.15], friction: 0.9}
+  far: {box: {size: [0.2, 0.2, 0.2]}, pose: {xyz: [1.5, 0, 0.1]}, fixed: true}
   bin: {tray: {size: [0.2, 0.2, 0.09]}, rests_on: table, at: [0.5, 0.2], fixed: true}
 """
 PICK = "  - pick: {object: block}\n"
@@ -69,7 +70,7 @@ def test_what_cannot_be_lifted_as_it_is_held_is_taken_otherwise(tmp_path: Path) 
 def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_path: Path) -> None:
     """The refusal is that of the step that came furthest, and tells how many grasps there were."""
     task = task_of(
-        tmp_path, "  - move: {to: home}\n" + PICK + LIFT + "  - place: {object: block, at: [1.5, 0.0], on: table}\n"
+        tmp_path, "  - move: {to: home}\n" + PICK + LIFT + "  - place: {object: block, at: [1.5, 0.0], on: far}\n"
     )
     told: list[str] = []
     with pytest.raises(NotPlannable) as refused:
@@ -85,7 +86,22 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
     )
     assert refused.value.step == "place_1"
     assert refused.value.cause.endswith(f"; {picked} grasps were tried")
-    assert refused.value.place is not None and refused.value.place.line == 12
+    assert refused.value.place is not None and refused.value.place.line == 13
+
+
+def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: Path) -> None:
+    told: list[str] = []
+    place = "  - place: {object: block, at: [1.5, 0.0], on: table}\n"
+    task = task_of(tmp_path, PICK.replace("block", "block, approach: {from: top}") + LIFT + place)
+    with pytest.raises(NotPlannable) as refused:
+        plan_task(task, doing=told.append)
+    assert len(told) == 3
+    assert refused.value.cause == "[1.5, 0] m lies beside 'table', whose middle is at [0.55, 0] m"
+    assert refused.value.hint == "`at` is in the world; 'table' offers 0.6 m x 0.8 m about its middle"
+    assert refused.value.place is not None and (refused.value.place.line, refused.value.place.column) == (
+        12,
+        place.index("[") + 1,
+    )
 
 
 def test_a_refusal_with_an_empty_hand_or_of_the_only_grasp_is_told_as_it_is(tmp_path: Path) -> None:

@@ -170,13 +170,15 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
     X_WU = planner.body_pose(situation, spec.on)
     under = planner.scene.body(spec.on)
     if X_WU.R[2, 2] < UPRIGHT:
-        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.on}', which is tilted")
+        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.on}', which is tilted", loc=("on",))
     floor, size = _surface(under)
     x, y, _ = X_WU.inverse().apply([*spec.at, 0.0]) - under.centre
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
         raise NotPlannable(
             f"[{spec.at[0]:g}, {spec.at[1]:g}] m lies beside '{spec.on}', whose middle is at "
-            f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m"
+            f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
+            hint=f"`at` is in the world; '{spec.on}' offers {size[0]:g} m x {size[1]:g} m about its middle",
+            loc=("at",),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
     x_axis = planner.body_pose(situation, spec.object).R[:, 0]
@@ -189,6 +191,7 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
         raise NotPlannable(
             f"nothing of '{spec.on}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
             hint=f"choose `at` over a part of '{spec.on}'",
+            loc=("at",),
         )
     return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
 
