@@ -9,6 +9,7 @@ import numpy as np
 
 from manipcli.flow.live import Live, Probe
 from manipcli.judge.expectation import labels
+from manipcli.judge.verdict import broken_at
 from manipcli.model.moments import ROUNDING, Moments
 from manipcli.model.reading import Reading, never
 from manipcli.spec.condition import ExpectationSpec, WatchSpec
@@ -78,7 +79,7 @@ def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Read
         return None
     tick = int(np.argmax(bad))
     found, time = answer.found(tick), float(moments.times[tick])
-    return Broken(k, f"'{name}' is broken at t = {time:.3f} s{found.lacking}: {found.text}")
+    return Broken(k, f"{broken_at(name)}t = {time:.3f} s{found.lacking}: {found.text}")
 
 
 def _during(steps: Sequence[str], moments: Moments) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -10,7 +10,7 @@ from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
-from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord
+from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
 from manipcli.model.conditions import CONDITIONS
 from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
@@ -77,7 +77,7 @@ def _broken_after_all(recording: Recording) -> str:
 
 def _unless_broken(outcome: ExpectationOutcome, recording: Recording) -> ExpectationOutcome:
     """The same, but for a watch that ended the run between two ticks of a thinned log: on those it may seem to hold."""
-    told = f"'{outcome.name}' is broken at "
+    told = broken_at(outcome.name)
     broken = [event.text for event in recording.events if event.kind == "watch_broken" and event.text.startswith(told)]
     if not broken or outcome.outcome != "passed":
         return outcome

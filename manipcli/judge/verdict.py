@@ -18,6 +18,11 @@ INTERRUPTED = "RUN101"
 """The code of the error that says: somebody stopped the run, in the middle of a step or between two."""
 
 
+def broken_at(watch: str) -> str:
+    """How a log begins to tell that the watch of this name ended the run."""
+    return f"'{watch}' is broken at "
+
+
 @dataclass(frozen=True, slots=True)
 class Attempt:
     """One attempt at a step: from when to when [s], and how it ended."""

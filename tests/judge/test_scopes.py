@@ -15,7 +15,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.expectation import expectation_problems, labels
 from manipcli.judge.judge import judge
-from manipcli.judge.verdict import ExpectationOutcome
+from manipcli.judge.verdict import ExpectationOutcome, broken_at
 from manipcli.model.build_scene import build_scene
 from manipcli.model.condition import Setting
 from manipcli.model.conditions import CONDITIONS
@@ -325,7 +325,7 @@ def test_a_watch_that_ended_the_run_is_not_passed_by_a_log_that_lacks_its_tick()
     made = recording(np.full(T, 0.5))
     (seen,) = judge(made, expect=watch, robot=ROBOT, scene=SCENE).expectations
     assert seen.outcome == "passed"
-    text = f"'{seen.name}' is broken at t = 0.401 s by 3 mm: 'cube' is far"
+    text = f"{broken_at(seen.name)}t = 0.401 s by 3 mm: 'cube' is far"
     broken = TaskEvent(0.401, "watch_broken", "a", "move", "failed", text, "")
     verdict = judge(replace(made, events=(*made.events, broken)), expect=watch, robot=ROBOT, scene=SCENE)
     (known,) = verdict.expectations
