@@ -187,11 +187,11 @@ class InverseKinematics:
         kind: RefusalReason | None = None
         if distance > _FAR:
             hint = "in millimetres? write '500 mm', not 500"
+        elif self._open == "spin" and (alone := self.leaving("turn").track(X_WT, seed)).converged:
+            off = float(np.degrees(np.arccos(np.clip(self.forward(alone.q).R[:, 2] @ X_WT.R[:, 2], -1.0, 1.0))))
+            hint = f"without `pointing` the point is reached, with the tool {off:.0f} deg off"
         elif best.angle_error > _TURNED:
             hint, kind = "change the orientation of the tool: the arm cannot turn it like this", "orientation"
-        elif self._open == "spin" and (found_at := self.leaving("turn").track(X_WT, seed)).converged:
-            off = float(np.degrees(np.arccos(np.clip(self.forward(found_at.q).R[:, 2] @ X_WT.R[:, 2], -1.0, 1.0))))
-            hint = f"without `pointing` the point is reached, with the tool {off:.0f} deg off"
         if len(self.joints) < _ALL and distance <= _FAR and self._open == "nothing":
             few = number_of(len(self.joints), "joint")
             hint += f"; an arm of {few} takes few of them at a place: `move: {{point: ...}}` leaves it open"
