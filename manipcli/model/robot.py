@@ -13,190 +13,17 @@ from typing import Literal
 
 from manipcli.core.errors import Place
 from manipcli.core.geometry import Array, Transform
-
-JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
-
-
-Rgba = tuple[float, float, float, float]
-"""A colour: red, green, blue and opacity, 0 to 1."""
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """Centred at its frame; `size` (3,) [m]: full edge lengths along x, y, z."""
-
-    size: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """`radius` [m], centred at its frame."""
-
-    radius: float
-
-
-@dataclass(frozen=True, slots=True)
-class Cylinder:
-    """Axis along z, centred at its frame; `radius` and `length` [m]."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True, slots=True)
-class Mesh:
-    """A mesh file: `uri` as `package://NAME/...`, `path` where it was found, `scale` per axis."""
-
-    uri: str
-    path: Path
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-
-
-Shape = Box | Sphere | Cylinder | Mesh
-
-
-@dataclass(frozen=True, slots=True)
-class Geometry:
-    """A shape placed in the frame of a link or an object; `rgba` only matters to what is drawn."""
-
-    X_LS: Transform
-    shape: Shape
-    rgba: Rgba | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Inertial:
-    """`mass` [kg]; `X_LI`: inertial frame (origin at the centre of mass) in the link; `inertia` (3, 3) [kg m2] in I."""
-
-    mass: float
-    X_LI: Transform
-    inertia: Array
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """`place`: where the description has it."""
-
-    name: str
-    inertial: Inertial | None
-    visuals: tuple[Geometry, ...]
-    collisions: tuple[Geometry, ...]
-    place: Place | None = field(default=None, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class SoftLimits:
-    """Where a joint is slowed down before its limits (URDF's safety_controller); `control/limits.py` has the law.
-
-    Attributes:
-        lower, upper: rad or m; None: none on this side.
-        k_position: velocity per distance to them [1/s]; 0: they do not act.
-        k_velocity: effort per velocity beyond what they allow [N m s/rad or N s/m]; 0: efforts are not bounded.
-    """
-
-    lower: float | None = None
-    upper: float | None = None
-    k_position: float = 0.0
-    k_velocity: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class JointLimits:
-    """SI: rad or m, and per second. None is unlimited (`lower`, `upper`) or not stated (the rest)."""
-
-    lower: float | None = None
-    upper: float | None = None
-    velocity: float | None = None
-    effort: float | None = None
-    acceleration: float | None = None
-    jerk: float | None = None
-    soft: SoftLimits | None = None
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """`lower` and `upper`, infinite where there is none."""
-        return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
-
-    @property
-    def within_soft(self) -> tuple[float, float]:
-        """The part of the `range` within the soft limits that act: from beyond these a joint is led back."""
-        lower, upper = self.range
-        soft = self.soft
-        if soft is None or soft.k_position <= 0.0:
-            return lower, upper
-        least, most = lower if soft.lower is None else soft.lower, upper if soft.upper is None else soft.upper
-        return max(lower, least), min(upper, most)
-
-    def is_soft(self, side: int) -> bool:
-        """Whether the lower (0) or the upper (1) end of `within_soft` is a soft limit."""
-        return self.within_soft[side] != self.range[side]
-
-    def nearest(self, position: float) -> float:
-        """The position within the limits that is nearest to this one."""
-        lower, upper = self.range
-        return min(max(position, lower), upper)
-
-
-@dataclass(frozen=True, slots=True)
-class Mimic:
-    """position = multiplier * position of `joint` + offset."""
-
-    joint: str
-    multiplier: float = 1.0
-    offset: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """`X_PJ`: joint frame in the parent link at zero position; `axis` (3,) unit, in J. Damping N m s/rad or N s/m."""
-
-    name: str
-    type: JointType
-    parent: str
-    child: str
-    X_PJ: Transform
-    axis: Array
-    limits: JointLimits
-    mimic: Mimic | None = None
-    damping: float = 0.0
-    friction: float = 0.0
-
-    @property
-    def moves(self) -> bool:
-        return self.type != "fixed"
-
-    @property
-    def independent(self) -> bool:
-        """Moves and follows no other joint: what a controller may command."""
-        return self.moves and self.mimic is None
-
-    @property
-    def unit(self) -> Literal["rad", "m"]:
-        """Of its position."""
-        return "m" if self.type == "prismatic" else "rad"
-
-    def meant(self, position: float) -> str | None:
-        """The hint where a position beyond the limits lies within them as degrees, or as millimetres.
-
-        Only for more than a turn or 5 m: less may as well be a position that is too far.
-        """
-        what, unit, size, few = (
-            ("millimetres", "mm", 1000.0, 5.0) if self.unit == "m" else ("degrees", "deg", 180.0 / math.pi, math.tau)
-        )
-        lower, upper = self.limits.range
-        if lower <= position <= upper or abs(position) <= few or not lower <= position / size <= upper:
-            return None
-        return f"in {what}? write '{position:g} {unit}'"
-
-    @property
-    def effort_unit(self) -> Literal["N m", "N"]:
-        """Of its effort."""
-        return "N" if self.type == "prismatic" else "N m"
-
-    @property
-    def inertia_unit(self) -> Literal["kg m2", "kg"]:
-        """Of what resists its acceleration."""
-        return "kg" if self.type == "prismatic" else "kg m2"
+from manipcli.description.elements import (
+    Joint,
+    Link,
+    JointLimits,
+    SoftLimits,
+    Mimic,
+    TransmissionTag,
+    Inertial,
+    JointType,
+)
+from manipcli.shapes.primitives import Geometry, Shape, Mesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,22 +50,6 @@ class Tool:
 
     link: str
     X_LT: Transform
-
-
-@dataclass(frozen=True, slots=True)
-class TransmissionTag:
-    """A `<transmission>`, roles resolved: parallel tuples in role order, as many actuators as joints.
-
-    A simple one has its reduction at the actuator, wherever it was written; its joint reduction is 1.
-    """
-
-    name: str
-    type: str
-    joints: tuple[str, ...]
-    joint_reductions: tuple[float, ...]
-    joint_offsets: tuple[float, ...]
-    actuators: tuple[str, ...]
-    actuator_reductions: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
