@@ -93,9 +93,9 @@ def gather() -> Seeds:
     """The bad examples of all checks, the robots of this project and of pybullet_data, a mesh of each format."""
     import pybullet_data
 
-    from manipcli.model.checks import CHECKS
-    from manipcli.model.mesh_stl import binary_stl
-    from manipcli.model.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_joint
+    from manipcli.description.lint.checks import CHECKS
+    from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_joint
+    from manipcli.shapes.mesh_stl import binary_stl
 
     descriptions: list[tuple[str, bytes, dict[str, bytes]]] = []
     for check in CHECKS:
@@ -207,10 +207,10 @@ SPOILERS = [
 def examine_cases() -> None:
     """A worker: numbers of cases on standard input, a line about each on standard output."""
     from manipcli.core.errors import ManipcliError
+    from manipcli.description.lint.examine import examine
+    from manipcli.description.normalised_urdf import engine_urdf
+    from manipcli.description.packages import Packages
     from manipcli.model.build_robot import build_robot
-    from manipcli.model.examine import examine
-    from manipcli.model.normalise import engine_urdf
-    from manipcli.model.packages import Packages
     from manipcli.spec.robot import RobotSpec
 
     seed, folder = int(sys.argv[2]), Path(sys.argv[3])

@@ -22,10 +22,7 @@ from benchmarks.table import Row
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
 from manipcli.core.geometry import Array
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import plan_task
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.pipeline import run_task
 from manipcli.plan.limits import MotionLimits
@@ -33,9 +30,12 @@ from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
 from manipcli.record.recorder import Recorder
+from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.engines.pybullet import PybulletEngine
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
 
 POUR = Path(__file__).resolve().parents[1] / "tasks" / "pour.yaml"
 BLOCK = 250
@@ -110,7 +110,7 @@ def watched_run(folder: Path) -> tuple[float, Cost]:
         version=member.version,
         prepare=member.prepare,
     )
-    with patch("manipcli.flow.execute.ENGINES", {"pybullet": watched}):
+    with patch("manipcli.run.execute.ENGINES", {"pybullet": watched}):
         report = run_task(POUR, log=folder / "pour.mcap", force=True)
     return report.timing.simulate - cost.paused, cost
 

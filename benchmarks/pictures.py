@@ -13,8 +13,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from manipcli.flow.chart import open_chart
-from manipcli.flow.replay import open_playback
+from manipcli.logs.chart import open_chart
+from manipcli.logs.replay import open_playback
 from manipcli.replay import figure
 from manipcli.replay.film import SIZE, cutting, write_film
 from manipcli.replay.player import player_page

@@ -10,15 +10,15 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
-from manipcli.model.condition import Condition
-from manipcli.model.conditions import CONDITIONS
+from manipcli.conditions.condition import Condition
+from manipcli.conditions.members import CONDITIONS
 from manipcli.spec.base import about
 
 PAGE = Path(__file__).with_name("conditions.md")
 INTRODUCTION = """\
 # Conditions
 
-<!-- Written by docs/write_conditions.py: change that, or the docstrings of manipcli/model/conditions/. -->
+<!-- Written by docs/write_conditions.py: change that, or the docstrings of manipcli/conditions/members/. -->
 
 A condition is a question about a run with a signed margin in a unit: positive where it holds, and by how much. The same
 conditions are waited for by steps (`until`), watched (`watch`) and expected of the recording (`expect`); all ask the

@@ -13,23 +13,24 @@ from tempfile import TemporaryDirectory
 
 from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
-from manipcli.flow.check import check_files, kind_of, schema, words
-from manipcli.flow.controllers import controllers_of
-from manipcli.flow.execute import Progress, controllers, simulate
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import Task, load_libraries
-from manipcli.flow.log import default_log, judge_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
-from manipcli.flow.plan import Plan, plan_task, refused
-from manipcli.flow.recorded_task import recorded_task
-from manipcli.flow.sample import load_task
-from manipcli.flow.verify import compared, refused_as_unlike
-from manipcli.flow.vocabulary import meanings
 from manipcli.judge.steps import RunStatus
 from manipcli.judge.verdict import INTERRUPTED, Verdict
+from manipcli.logs.log import default_log, judge_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
+from manipcli.logs.recorded_task import recorded_task
+from manipcli.logs.verify import compared, refused_as_unlike
+from manipcli.preflight.check_files import check_files, kind_of, schema, words
+from manipcli.preflight.gains import gain_findings
 from manipcli.record.faults import RecordingFailed
 from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
+from manipcli.run.execute import Progress, controllers, simulate
+from manipcli.task.controller_rows import controllers_of
+from manipcli.task.load_task import load_libraries
+from manipcli.task.plan_task import Plan, plan_task, refused
+from manipcli.task.sample import load_task
+from manipcli.task.task import Task
+from manipcli.task.vocabulary import meanings
 
 __all__ = [
     "Finding",

@@ -17,7 +17,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.report.suite import Trouble, troubles_of
 
 if TYPE_CHECKING:
-    from manipcli.flow.plan import PlannedStep
+    from manipcli.task.plan_task import PlannedStep
 
 BEAT_PERIOD = 0.25
 """[s] of wall time between two signs of life while ticks go by."""

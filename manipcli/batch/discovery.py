@@ -64,9 +64,9 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
         shown: what it is called; default `path` itself.
     """
     from manipcli.spec.load import read_bytes
+    from manipcli.spec.source.tree import MappingNode, ScalarNode, SequenceNode
+    from manipcli.spec.source.yaml import parse
     from manipcli.spec.task import TAG, SimulationSpec
-    from manipcli.spec.tree import MappingNode, ScalarNode, SequenceNode
-    from manipcli.spec.yaml import parse
 
     name = shown if shown is not None else str(path)
     try:
@@ -118,8 +118,8 @@ def shown_path(path: Path) -> str:
 def is_named_task(path: Path) -> bool:
     """Whether a file that somebody named as a task has the top-level key `task`, however that is written."""
     from manipcli.spec.load import read_bytes
-    from manipcli.spec.tree import MappingNode
-    from manipcli.spec.yaml import parse
+    from manipcli.spec.source.tree import MappingNode
+    from manipcli.spec.source.yaml import parse
 
     if first_look(path, named=True) == "task":
         return True

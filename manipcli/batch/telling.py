@@ -10,11 +10,10 @@ from manipcli.batch.baseline import Key, compared, kept_baseline, measured, read
 from manipcli.batch.job import Job
 from manipcli.core.errors import Finding, Loc, Place
 from manipcli.core.whole_file import write_whole
-from manipcli.flow.invalid import invalid_page, invalid_verdict
-from manipcli.flow.replay import open_playback
-from manipcli.flow.report import file_places, log_page, refused_page
-from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.verdict import Verdict
+from manipcli.logs.invalid import invalid_page, invalid_verdict
+from manipcli.logs.replay import open_playback
+from manipcli.logs.report import file_places, log_page, refused_page
 from manipcli.pipeline import load_task
 from manipcli.replay.image import png_bytes
 from manipcli.replay.shots import Shots
@@ -25,8 +24,9 @@ from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step
 from manipcli.spec import load
-from manipcli.spec.located import Located
+from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 SIZE = (960, 720)
 """Width and height of the picture [pixel]."""

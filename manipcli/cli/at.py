@@ -30,7 +30,7 @@ def at(
 
     Any ROS 2 log will do, as far as it goes.
     """
-    from manipcli.flow.moment import moment
+    from manipcli.logs.moment import moment
     from manipcli.report.moment import render_json, render_text
 
     found = moment(log, _when(log, time))
@@ -47,7 +47,7 @@ def _when(log: Path, word: str) -> float:
     try:
         return seconds(word)
     except InvalidInput:
-        from manipcli.flow.moment import step_ends
+        from manipcli.logs.moment import step_ends
 
         ends = step_ends(log)
         if word in ends:

@@ -14,7 +14,7 @@ from manipcli.cli.outputs import check_outputs, check_picture
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 
 if TYPE_CHECKING:
-    from manipcli.flow.describe import Inspection
+    from manipcli.description.lint.inspection import Inspection
 
 Codes = list[str] | None
 
@@ -62,7 +62,7 @@ def check_urdf(
 
     Exit code 0: no error. 1: errors (with --strict: or warnings). 4: no such file, or a wrong option.
     """
-    from manipcli.flow import describe
+    from manipcli.description.lint import inspection as describe
     from manipcli.report import description
 
     if explain is not None:
@@ -109,7 +109,7 @@ def _mended(
     inspection: Inspection, inspect: Callable[[Path], Inspection], *, in_place: bool, force: bool
 ) -> Inspection:
     """What there is to say once the file is mended."""
-    from manipcli.flow import describe
+    from manipcli.description.lint import inspection as describe
 
     path, changes = describe.mend(inspection, in_place=in_place, force=force)
     for change in changes:
@@ -127,7 +127,7 @@ def _rendered(
     passed: bool,
     tree: bool,
 ) -> str:
-    from manipcli.model.checks import CHECKS
+    from manipcli.description.lint.checks import CHECKS
     from manipcli.report import description, sarif
 
     if format_ == "sarif":

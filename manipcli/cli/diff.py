@@ -29,7 +29,7 @@ def diff(
     Exit code 0: the same happened; 1: something is different. What they were made from (files, seed, versions) is told,
     but makes no difference by itself.
     """
-    from manipcli.flow.diff import diff_logs
+    from manipcli.logs.diff import diff_logs
     from manipcli.report import log_diff
 
     made = diff_logs(a, b, tolerance=tolerance)

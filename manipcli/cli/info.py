@@ -12,7 +12,7 @@ def info(log: LogFile, *, format_: Format = "text") -> ExitCode:
 
     Any MCAP file will do, also one that was cut or damaged; what is missing is told first.
     """
-    from manipcli.flow.log_info import log_info
+    from manipcli.logs.log_info import log_info
     from manipcli.report.log_info import render_json, render_text
 
     found = log_info(log)

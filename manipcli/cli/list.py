@@ -39,7 +39,7 @@ def list_(
     if task is not None:
         return _controllers(kind, task, format_)
     if kind == "checks" and format_ == "text":
-        from manipcli.model.checks import CHECKS
+        from manipcli.description.lint.checks import CHECKS
         from manipcli.report.description import render_checks
 
         console.result(render_checks(CHECKS))

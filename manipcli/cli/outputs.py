@@ -15,8 +15,8 @@ from manipcli.core.errors import Finding, InvalidInput
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from manipcli.flow.load import Task
     from manipcli.judge.verdict import Verdict
+    from manipcli.task.task import Task
 
 ReportFile = Annotated[
     Path | None,
@@ -109,7 +109,7 @@ class Outputs:
             warnings: what was doubted before it was run.
             meshes, package_path, allow_outside: the meshes that are known, and where others may be.
         """
-        from manipcli.flow.report import file_places, log_page, log_places
+        from manipcli.logs.report import file_places, log_page, log_places
         from manipcli.record.reading import open_recording
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
@@ -128,7 +128,7 @@ class Outputs:
 
     def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Finding]) -> None:
         """Writes what is asked for about a task of which a step cannot be planned."""
-        from manipcli.flow.report import refused_page, task_places
+        from manipcli.logs.report import refused_page, task_places
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 
@@ -144,7 +144,7 @@ class Outputs:
         file = task or log
         if file is None or not self.wanted:
             return
-        from manipcli.flow.invalid import invalid_page, invalid_verdict
+        from manipcli.logs.invalid import invalid_page, invalid_verdict
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 

@@ -47,8 +47,8 @@ def plan(
     except NotPlannable as refusal:
         if format_ != "json":
             raise
-        from manipcli.flow.plan import refused
         from manipcli.report.json import render_verdict
+        from manipcli.task.plan_task import refused
 
         console.result(render_verdict(refused(loaded, refusal)))
         return refusal.exit_code

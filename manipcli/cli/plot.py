@@ -67,7 +67,7 @@ def plot(
         from manipcli.replay.figure import kind_of
 
         kind = kind_of(output)
-    from manipcli.flow.chart import open_chart
+    from manipcli.logs.chart import open_chart
 
     chart = open_chart(logs, asked, start=start, end=end)
     for note in chart.notes:
@@ -110,7 +110,7 @@ def _write_table(chart: Chart, csv: str) -> None:
 
 
 def _list_fields(logs: list[Path], format_: OutputFormat) -> None:
-    from manipcli.flow.chart import field_lines
+    from manipcli.logs.chart import field_lines
     from manipcli.report.json import Json, dumps
     from manipcli.report.table import table
 

@@ -101,7 +101,7 @@ def replay(
             )
         from manipcli.cli.outputs import check_outputs
         from manipcli.cli.pictures import Pictures
-        from manipcli.flow.replay import open_playback
+        from manipcli.logs.replay import open_playback
 
         check_outputs(*files, reads=(log,))
         pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)

@@ -75,8 +75,8 @@ def tune(
         raise InvalidInput([Finding("USE071", f"a control period of {period}; expected 1 us to 1 s")])
     from manipcli.control.tuning import Wish
     from manipcli.core.whole_file import write_whole
-    from manipcli.flow import tune as flow
     from manipcli.report.tuning import render_json, render_text
+    from manipcli.tuning import tune as flow
 
     tuning = flow.tune(
         robot,

@@ -35,10 +35,10 @@ def view(
     """
     with Interrupts():
         given = xacro_arguments(arguments or [])
-        from manipcli.flow.describe import located
-        from manipcli.flow.look import load_sight
+        from manipcli.description.lint.inspection import located
         from manipcli.replay.view import View
         from manipcli.report import text
+        from manipcli.task.viewed import load_sight
 
         places = tuple(package_path or ())
         path = located(file, package_path=places)

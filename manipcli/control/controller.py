@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import ControllerSpec, Interface, Role

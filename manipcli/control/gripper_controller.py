@@ -14,7 +14,7 @@ from manipcli.control.controller import ControllerOutput, FeedForward, JointStat
 from manipcli.control.gains import build_pid, joint_gains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointType
+from manipcli.description.elements import JointType
 from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface, Role
 

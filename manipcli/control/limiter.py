@@ -20,7 +20,7 @@ from manipcli.control.cut import ACCELERATION, EFFORT, KINDS, POSITION, VELOCITY
 from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointLimits, SoftLimits
+from manipcli.description.elements import JointLimits, SoftLimits
 
 SLACK = 1e-3
 """Relative, on velocity and acceleration limits of positions: what is planned to a limit goes through as it is."""

@@ -29,7 +29,7 @@ from manipcli.control.trajectory_interfaces import controlled_by_error, refused
 from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.robot import JointLimits, JointType
+from manipcli.description.elements import JointLimits, JointType
 from manipcli.model.transmission import Compat
 from manipcli.plan.trajectory import Interpolation, JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role

@@ -11,7 +11,7 @@ import numpy as np
 from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, told_apart
-from manipcli.model.robot import JointLimits, JointType
+from manipcli.description.elements import JointLimits, JointType
 from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
 
 REST = 1.2e-7

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from manipcli.conditions.condition import World
+from manipcli.conditions.formula import Seams, leaves
+from manipcli.conditions.robustness import NotEvaluated
+from manipcli.conditions.state_window import Moments
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
 from manipcli.judge.moments import MomentsOfSpans, Order, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
-from manipcli.model.condition import World
-from manipcli.model.formula import Seams, leaves
-from manipcli.model.moments import Moments
-from manipcli.model.reading import NotEvaluated
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording
+from manipcli.scene.scene import Scene
 from manipcli.spec.condition import ExpectationSpec
 
 

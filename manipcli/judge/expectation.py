@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from manipcli.conditions.condition import Problem, Setting, World
+from manipcli.conditions.formula import Seams, absent, opened, problems, scopes
+from manipcli.conditions.members.step_done import StepDoneSpec
+from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Reading, never
+from manipcli.conditions.state_window import ROUNDING, Moments
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
-from manipcli.model.condition import Problem, Setting, World
-from manipcli.model.conditions.step_done import StepDoneSpec
-from manipcli.model.formula import Seams, absent, opened, problems, scopes
-from manipcli.model.moments import ROUNDING, Moments
-from manipcli.model.reading import EDGE, Extreme, Measured, NotEvaluated, Reading, never
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5

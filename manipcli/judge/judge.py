@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.errors import Finding
 from manipcli.core.text import listed
 from manipcli.judge.cuts import Cuts
@@ -11,11 +13,9 @@ from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording
+from manipcli.scene.scene import Scene
 from manipcli.spec.condition import ExpectationSpec
 
 STORED, UNTIL = "verdict", "until"

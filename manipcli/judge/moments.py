@@ -8,15 +8,15 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.conditions.condition import Seen
+from manipcli.conditions.robustness import NotEvaluated
+from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
 from manipcli.judge.verdict import StepOutcome
-from manipcli.model.condition import Seen
-from manipcli.model.moments import Moments, Reference, StepTime, Touching
-from manipcli.model.reading import NotEvaluated
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record.channels import CONTACTS, TF
 from manipcli.record.recording import Recording, Span
+from manipcli.scene.scene import Scene
 
 MOST_TICKS: Final = 1_000_000
 """Of a span, half a second or so: a log that says it has more of them is not believed."""

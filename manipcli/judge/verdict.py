@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Finding
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
-from manipcli.model.reading import EDGE
 
 VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]

@@ -12,7 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
-from manipcli.model.robot import Joint, RobotModel
+from manipcli.description.elements import Joint
+from manipcli.model.robot import RobotModel
 
 
 def relative_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.text import did_you_mean
-from manipcli.model.robot import Actuator, Joint, TransmissionTag
+from manipcli.description.elements import Joint, TransmissionTag
+from manipcli.model.robot import Actuator
 from manipcli.model.transmissions import BY_TYPE, TRANSMISSIONS
 from manipcli.spec.robot import RobotSpec, TransmissionSpec
 

@@ -9,28 +9,19 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
+from manipcli.description.description import unread_description
+from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.lint.examine import examine
+from manipcli.description.normalised_urdf import portable_urdf
+from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
-from manipcli.model.checks import CHECKS
-from manipcli.model.description import unread_description
-from manipcli.model.examine import examine
 from manipcli.model.joint_units import misread_units
 from manipcli.model.named_poses import build_groups, build_poses, interval
-from manipcli.model.normalise import portable_urdf
-from manipcli.model.packages import NotFound, Packages
-from manipcli.model.robot import (
-    Group,
-    Joint,
-    JointLimits,
-    Link,
-    Mimic,
-    RobotModel,
-    SoftLimits,
-    Tool,
-    TransmissionTag,
-)
-from manipcli.model.urdf import Parts, read_parts
-from manipcli.spec.located import Source
+from manipcli.model.robot import Group, RobotModel, Tool
 from manipcli.spec.robot import AttachSpec, LimitsSpec, RobotSpec
+from manipcli.spec.source.located import Source
 
 
 class Reporter:
@@ -245,7 +236,7 @@ class _Body:
 
     def ordered(self) -> tuple[Joint, ...]:
         """Joints depth first; links are put into the order of their joints."""
-        from manipcli.model.topology import depth_first
+        from manipcli.description.urdf.topology import depth_first
 
         joints = depth_first(self.root, {joint.name: joint for joint in self.joints})
         by_name = {link.name: link for link in self.links}

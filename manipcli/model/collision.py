@@ -22,9 +22,9 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.coal_shape import coal_shape
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.scene import Scene
+from manipcli.scene.scene import Scene
+from manipcli.shapes.coal_shape import coal_shape
 
 if TYPE_CHECKING:
     import coal

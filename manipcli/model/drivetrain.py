@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.robot import Actuator, RobotModel, TransmissionTag
+from manipcli.description.elements import TransmissionTag
+from manipcli.model.robot import Actuator, RobotModel
 from manipcli.model.transmission import Maps, Transmission
 from manipcli.model.transmissions import BY_TYPE
 

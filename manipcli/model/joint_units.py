@@ -9,12 +9,13 @@ from collections.abc import Iterable, Iterator
 
 from manipcli.core.errors import Finding, Loc
 from manipcli.core.units import describe
-from manipcli.model.robot import Group, Joint
+from manipcli.description.elements import Joint
+from manipcli.model.robot import Group
 from manipcli.spec.base import Model
 from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import Held, children, unit_of
-from manipcli.spec.located import Source
-from manipcli.spec.tree import Node, ScalarNode, SequenceNode, child, shown
+from manipcli.spec.source.located import Source
+from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, shown
 
 
 def misread_units(spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> Iterator[Finding]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean, told_apart
-from manipcli.model.robot import Group, Joint, Link, NamedPose
+from manipcli.description.elements import Joint, Link
+from manipcli.model.robot import Group, NamedPose
 from manipcli.spec.robot import GroupSpec, RobotSpec
 
 if TYPE_CHECKING:

@@ -5,25 +5,16 @@ Frames: L link, J joint (coincides with its child link), P parent link, B robot 
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Literal
 
-from manipcli.core.errors import Place
-from manipcli.core.geometry import Array, Transform
+from manipcli.core.geometry import Transform
 from manipcli.description.elements import (
     Joint,
     Link,
-    JointLimits,
-    SoftLimits,
-    Mimic,
     TransmissionTag,
-    Inertial,
-    JointType,
 )
-from manipcli.shapes.primitives import Geometry, Shape, Mesh
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.scene import Scene
+from manipcli.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import did_you_mean
 
 if TYPE_CHECKING:
-    from manipcli.model.robot import TransmissionTag
+    from manipcli.description.elements import TransmissionTag
 
 Quantity = Literal["position", "velocity", "effort"]
 Compat = Literal["ros1", "ros2"]

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc, Place
 from manipcli.core.text import did_you_mean
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, matrix_from_axis_angle
 from manipcli.model.collision import RESOLUTION, Carried, CollisionQuery
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limits import MotionLimits

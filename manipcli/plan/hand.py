@@ -8,7 +8,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.collision import CollisionQuery
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 
 STEPS = 40

@@ -26,8 +26,8 @@ import numpy.typing as npt
 from manipcli.core.errors import NotPlannable, RefusalReason
 from manipcli.core.geometry import Array, Transform, cross, frozen, matrix_from_axis_angle
 from manipcli.core.text import number_of
+from manipcli.model.configuration import position_limits
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.posture import position_limits
 
 Open = Literal["nothing", "spin", "turn"]
 """What a goal leaves open of the tool's orientation: nothing, how it is turned about its z axis, or all of it."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, frozen
-from manipcli.model.posture import position_limits
+from manipcli.model.configuration import position_limits
 from manipcli.model.robot import RobotModel
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
+from manipcli.scene.scene import Scene
 
 
 def unknown_pose(robot: RobotModel, name: str, loc: Loc) -> tuple[Problem, ...]:

@@ -14,13 +14,14 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.model.collision import Carried, CollisionChecker, CollisionHit, CollisionQuery, Pair, pairs
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Cylinder, RobotModel
-from manipcli.model.scene import Interior, Scene
-from manipcli.model.start_overlap import TOLERANCE
+from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
 from manipcli.plan.step import Situation
+from manipcli.scene.scene import Interior, Scene
+from manipcli.scene.start_overlap import TOLERANCE
+from manipcli.shapes.primitives import Cylinder
 
 Pairs = frozenset[Pair]
 """Pairs of parts that may touch; a part is a body, or `robot/<link>`."""

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.robot import Cylinder
 from manipcli.plan.planner import Pairs, Planner
 from manipcli.plan.step import Situation
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.shapes.primitives import Cylinder
 
 PRESSED: Final = 1e-3
 """[m] Deeper in it than at the start by this the hand pushes a body: what it only leaves stays where it is."""

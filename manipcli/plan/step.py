@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
+from manipcli.conditions.condition import Problem
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.model.collision import RESOLUTION, CollisionQuery
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import ramp
 from manipcli.plan.planner import Planner
 from manipcli.plan.sampling import LONGEST

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
 from manipcli.plan.planner import ROBOT, Planner
 from manipcli.plan.step import Situation

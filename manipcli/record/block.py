@@ -16,7 +16,6 @@ from manipcli.core.geometry import Array, wrapped
 from manipcli.model.batch_kinematics import relative_batch
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record.channels import Channel, ControllerChannel, Recorded, WrenchChannel
@@ -31,6 +30,7 @@ from manipcli.record.rows import (
     wrench_template,
 )
 from manipcli.record.selection import Selection
+from manipcli.scene.scene import Scene
 from manipcli.spec.controllers import Interface
 
 Index = npt.NDArray[np.uint64]

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from manipcli.core.geometry import Transform
-from manipcli.model.robot import Box, Cylinder, Geometry, Mesh, RobotModel, Sphere
-from manipcli.model.scene import Scene
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.recording import TaskEvent
+from manipcli.scene.scene import Scene
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 
 WORLD = "world"
 GREY = (0.7, 0.7, 0.7, 1.0)

@@ -17,7 +17,6 @@ from pathlib import Path
 from manipcli.control.action import Feedback, GoalResult
 from manipcli.control.controller import ControllerOutput
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
@@ -31,6 +30,7 @@ from manipcli.record.recording import TaskEvent
 from manipcli.record.rows import message_record
 from manipcli.record.schemas import schema_text
 from manipcli.record.selection import EVERYTHING, Selection, word
+from manipcli.scene.scene import Scene
 from manipcli.spec.task import JUDGED
 
 BLOCK_SECONDS = 0.5

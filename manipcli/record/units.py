@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manipcli.core.errors import InvalidInput
-from manipcli.model.located_xml import parse_document
+from manipcli.description.located_xml import parse_document
 from manipcli.record.fields import Way
 
 JointUnits = Mapping[str, str]

@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.robot import Cylinder, RobotModel, Sphere
+from manipcli.model.robot import RobotModel
 from manipcli.replay.surface import Surface, cylinder_surface, sphere_surface
+from manipcli.shapes.primitives import Cylinder, Sphere
 
 THICKEST: Final = 0.02
 """Radius of a bone [m] at most."""

@@ -14,11 +14,13 @@ import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.core.text import listed
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, Rgba, RobotModel, Shape, Sphere
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Inertial, Link
+from manipcli.model.robot import RobotModel
 from manipcli.replay.bones import bones
 from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
 
 Layer = Literal["visual", "collision", "inertia"]
 LAYERS: tuple[Layer, ...] = ("visual", "collision", "inertia")

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.coal_shape import coal_shape
-from manipcli.model.robot import Geometry
 from manipcli.model.state import Contact
 from manipcli.replay.drawing import link_frame
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
+from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.primitives import Geometry
 
 if TYPE_CHECKING:
     import coal

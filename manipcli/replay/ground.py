@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from manipcli.model.scene import Scene
 from manipcli.replay.drawing import Drawing
 from manipcli.replay.placing import Poses
+from manipcli.scene.scene import Scene
 
 FLOOR = "floor"
 """The kind of body that everything stands on."""

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.model.mesh import TriangleMesh, read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
-from manipcli.model.robot import Rgba
 from manipcli.replay.surface import Surface, smoothed
+from manipcli.shapes.mesh import TriangleMesh, read_mesh
+from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.primitives import Rgba
 
 MAX_MATERIAL_BYTES = 1_000_000
 

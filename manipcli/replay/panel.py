@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.geometry import Array
-from manipcli.model.posture import posture, with_mimics, zero_posture
-from manipcli.model.robot import Joint, RobotModel
+from manipcli.description.elements import Joint
+from manipcli.model.configuration import posture, with_mimics, zero_posture
+from manipcli.model.robot import RobotModel
 from manipcli.replay.placing import Placing
 from manipcli.replay.stage import Stage
 

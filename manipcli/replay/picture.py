@@ -15,7 +15,7 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.model.posture import posture
+from manipcli.model.configuration import posture
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw

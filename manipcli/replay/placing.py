@@ -10,7 +10,7 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform, quat_product, rotate
 from manipcli.model.batch_kinematics import forward_batch, link_places
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
+from manipcli.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)

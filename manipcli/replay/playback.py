@@ -14,11 +14,11 @@ import numpy as np
 from manipcli.core.geometry import Array, wrapped
 from manipcli.judge.verdict import Verdict
 from manipcli.model.batch_kinematics import tool_poses
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
 from manipcli.replay.placing import Placing, Poses
+from manipcli.scene.scene import Scene
 
 RATE = 50.0
 """[Hz] at which a run is shown unless somebody asks for another."""

@@ -18,7 +18,6 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.replay.camera import framing
 from manipcli.replay.drawing import WORLD, Drawing, draw, link_frame
 from manipcli.replay.forces import LONGEST, Forces
@@ -26,6 +25,7 @@ from manipcli.replay.ground import floors_of, ground_height
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
 from manipcli.replay.surface import Surface
+from manipcli.scene.scene import Scene
 
 Json = dict[str, object]
 Reference = tuple[str, int, int]

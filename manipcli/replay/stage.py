@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from manipcli.core.geometry import Transform
-from manipcli.model.robot import Rgba
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
 from manipcli.replay.ground import ground_height
 from manipcli.replay.image import sky
 from manipcli.replay.placing import Poses
+from manipcli.shapes.primitives import Rgba
 
 if TYPE_CHECKING:
     import viser

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.robot import Box, Cylinder, Rgba, Sphere
+from manipcli.shapes.primitives import Box, Cylinder, Rgba, Sphere
 
 Faces = npt.NDArray[np.int32]
 

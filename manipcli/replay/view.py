@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from manipcli.core.geometry import Array
-from manipcli.model.posture import posture
+from manipcli.model.configuration import posture
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.replay.drawing import draw
 from manipcli.replay.ground import floors_of
 from manipcli.replay.panel import JointPanel, LayerSwitches
 from manipcli.replay.placing import Placing
 from manipcli.replay.server import LocalServer
 from manipcli.replay.stage import Stage
+from manipcli.scene.scene import Scene
 
 
 class View(LocalServer):

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import listed, number_of, shorten
-from manipcli.model.check import Check
-from manipcli.model.guess_groups import GuessedGroup
-from manipcli.model.summary import Summary
+from manipcli.description.lint.check import Check
+from manipcli.description.lint.guess_groups import GuessedGroup
+from manipcli.description.lint.summary import Summary
 from manipcli.report.json import Json, dumps, finding_object
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, describe

@@ -15,10 +15,10 @@ from manipcli.core.geometry import Array, frozen, wrapped
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording, Span
 from manipcli.replay.sampling import references
 from manipcli.report.holds import HoldFacts, HoldMeter, find_holds
+from manipcli.scene.scene import Scene
 
 BUCKETS = 240
 """Parts of the run of each of which the largest error is kept."""

@@ -14,14 +14,14 @@ from typing import Literal
 
 import numpy as np
 
+from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.geometry import Array, quat_product, rotate, rotate_inverse
 from manipcli.model.batch_kinematics import tool_poses
-from manipcli.model.moments import ROUNDING
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact
 from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
+from manipcli.scene.scene import Scene
 
 BRIDGED = 0.05
 """[s] Contact that is lost for less is not lost, and what is touched for less is not stood on."""

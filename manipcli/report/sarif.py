@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from manipcli import __version__
 from manipcli.core.errors import Finding
-from manipcli.model.check import Check
+from manipcli.description.lint.check import Check
 from manipcli.report.json import Json, dumps
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"

@@ -14,8 +14,8 @@ from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
+from manipcli.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,8 @@ from manipcli.control.roles import is_hand
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
+from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
 
 SLOW: Final = 10

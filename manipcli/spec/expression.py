@@ -29,7 +29,7 @@ from manipcli.core.units import (
     format_quantity,
     parse_quantity,
 )
-from manipcli.spec.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode, dotted
+from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode, dotted
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
 NAME = re.compile(r"[A-Za-z_]\w*")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.spec.ros.nodes import MANAGER
 from manipcli.spec.ros.table import models
-from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _DESCRIPTIONS = (".urdf", ".xacro")
 

@@ -10,8 +10,8 @@ from pydantic import BaseModel
 
 from manipcli.core.errors import Loc
 from manipcli.spec.expression import escaped
+from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Plain
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
 # The second line only means something to readers of YAML 1.1, which a log may well meet.

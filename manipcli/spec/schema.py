@@ -8,8 +8,8 @@ from pydantic import BaseModel
 
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.robot import RobotSpec
+from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import TaskSpec
-from manipcli.spec.tree import Plain
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _LIMITS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}

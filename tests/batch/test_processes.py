@@ -30,7 +30,7 @@ from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Trouble
 
 if TYPE_CHECKING:
-    from manipcli.flow.plan import PlannedStep
+    from manipcli.task.plan_task import PlannedStep
 
 CHILD = f"""
 import os, signal, sys, time

@@ -25,8 +25,9 @@ from manipcli.cli.app import COMMANDS, main
 from manipcli.core import collector
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
 from manipcli.core.geometry import Transform
+from manipcli.description.elements import Joint, JointLimits
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.model.robot import Joint, JointLimits, RobotModel
+from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.flow.describe import explained
-from manipcli.model.checks import CHECKS
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.lint.inspection import explained
 from manipcli.report.description import render_explanation
 
 ENDS = '<parent link="a"/><child link="b"/>'

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.model.check import Check
-from manipcli.model.checks import CHECKS
-from manipcli.model.examine import Examination, examine
-from manipcli.model.packages import Packages
+from manipcli.description.lint.check import Check
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.lint.examine import Examination, examine
+from manipcli.description.packages import Packages
 from manipcli.spec.load import load_robot
 
 ROOT = Path(__file__).parents[2]

@@ -9,15 +9,15 @@ from typing import Any
 
 import pytest
 
+from manipcli.conditions.condition import Condition
+from manipcli.conditions.members import CONDITIONS
 from manipcli.core.units import parse_unit
-from manipcli.flow.vocabulary import task_spec
-from manipcli.model.condition import Condition
-from manipcli.model.conditions import CONDITIONS
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.load import load_task_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.schema import task_schema
 from manipcli.spec.task import TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 ROOT = Path(__file__).parents[2]
 HEAD = "task: t\nrobot: r\ncontrollers: c\nsteps:\n  - id: lift_1\n    wait: 1 s\n"

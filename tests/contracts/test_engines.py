@@ -14,21 +14,11 @@ import pytest
 from manipcli.control.command import JointCommand, Mode
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.robot import (
-    Box,
-    Geometry,
-    Inertial,
-    Joint,
-    JointLimits,
-    JointType,
-    Link,
-    Mimic,
-    RobotModel,
-    Shape,
-    Sphere,
-)
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Inertial, Joint, JointLimits, JointType, Link, Mimic
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Shape, Sphere
 from manipcli.simulate.engine import Engine, EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES
 
@@ -560,7 +550,7 @@ def test_what_bullet_holds_is_read_back(tmp_path: Path) -> None:
     """The comparison is silent about the robot that was loaded, and names every way in which another one differs."""
     import pybullet as p
 
-    from manipcli.model.normalise import engine_urdf
+    from manipcli.description.normalised_urdf import engine_urdf
     from manipcli.simulate.engines.pybullet_readback import differences
 
     skew = Inertial(1.0, Transform.of(xyz=(0.1, 0.2, 0.0), rpy=(0.3, 0.2, 0.1)), frozen(np.diag([0.02, 0.03, 0.04])))

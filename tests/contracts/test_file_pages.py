@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import AnyController
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.task import TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ("task.md", "robot.md", "controllers.md")

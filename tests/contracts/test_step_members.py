@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from manipcli.flow.vocabulary import task_spec
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import STEPS
 from manipcli.spec.base import about
 from manipcli.spec.load import load_task_text
+from manipcli.task.vocabulary import task_spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 WRITTEN = runpy.run_path(str(DOCS / "write_steps.py"))

@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.flow.load import Task, load_task
-from manipcli.flow.plan import start_position
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.spec.controllers import GripperSpec
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import start_position
 
 ROOT = Path(__file__).parents[2]
 PICK = ("pick", {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}})

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from manipcli.control.actuation import STIFFNESS, Actuation, motor_effort_limits
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link, TransmissionTag
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Actuator, Inertial, Joint, JointLimits, Link, RobotModel, TransmissionTag
+from manipcli.model.robot import Actuator, RobotModel
 
 PERIOD = 1e-3
 ZERO = np.zeros(3)

@@ -9,8 +9,9 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Transform, frozen
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link, Mimic
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Inertial, Joint, JointLimits, Link, Mimic, RobotModel
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 
 PERIOD = 0.001

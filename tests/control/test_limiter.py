@@ -12,7 +12,7 @@ from manipcli.control.command import JointCommand
 from manipcli.control.cut import EFFORT, KINDS
 from manipcli.control.limiter import SLACK
 from manipcli.core.errors import InvalidArgument
-from manipcli.model.robot import JointLimits, SoftLimits
+from manipcli.description.elements import JointLimits, SoftLimits
 
 HARD = {"lower": -1.0, "upper": 1.0}
 SOFT = SoftLimits(-0.8, 0.8, 20.0, 5.0)

@@ -13,7 +13,8 @@ from manipcli.control.limiter import JointLimiter
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument, InvalidInput, Place
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Joint, JointLimits, Link, Mimic, RobotModel
+from manipcli.description.elements import Joint, JointLimits, Link, Mimic
+from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.controllers_file import ControllersSpec

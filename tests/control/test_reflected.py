@@ -5,8 +5,9 @@ import pytest
 
 from manipcli.control.reflected import Postures, load_of
 from manipcli.core.geometry import Transform, frozen
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link, Mimic
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Inertial, Joint, JointLimits, Link, Mimic, RobotModel
+from manipcli.model.robot import RobotModel
 
 MASSES = {"lead": 2.0, "half": 3.0, "back": 5.0}
 DAMPING = {"lead": 0.5, "half": 4.0, "back": 7.0}

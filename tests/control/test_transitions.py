@@ -7,7 +7,7 @@ from manipcli.control.course import POSITION, VELOCITY, Course, Part
 from manipcli.control.reference import Feeds, Reference
 from manipcli.control.trajectory_goal import JointFacts
 from manipcli.control.transitions import Transitions
-from manipcli.model.robot import JointLimits
+from manipcli.description.elements import JointLimits
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, JointConstraintSpec
 

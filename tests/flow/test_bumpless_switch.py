@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array
-from manipcli.flow.execute import controllers
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import start_position
+from manipcli.run.execute import controllers
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import start_position
 
 ROOT = Path(__file__).parents[2]
 PD = ((100, 8), (100, 8), (60, 4), (60, 4), (10, 0.4), (10, 0.4), (3, 0.05))

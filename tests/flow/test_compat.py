@@ -7,9 +7,9 @@ import pytest
 
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
-from manipcli.flow.execute import controllers
-from manipcli.flow.load import load_task
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.run.execute import controllers
+from manipcli.task.load_task import load_task
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
 PERIOD, ERROR, I_GAIN = 1e-3, 0.01, 50.0

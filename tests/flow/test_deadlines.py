@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import plan_task
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
 
 ROOT = Path(__file__).parents[2]
 TASK = """\

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
 
 TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
 <joint name="hinge"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.flow.embedding import embeddable
+from manipcli.run.embedding import embeddable
 
 
 def test_names_are_plain_and_distinct_and_materials_come_along(tmp_path: Path) -> None:

@@ -12,10 +12,11 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.core.errors import SimulationFailed
-from manipcli.flow import execute, steps_run
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.step import Motion
 from manipcli.record.reading import read_recording
+from manipcli.run import execute
+from manipcli.run import step_loop as steps_run
 
 ROOT = Path(__file__).parents[2]
 TABLE = "table: {box: {size: [0.4, 0.4, 0.2]}, pose: {xyz: [0.7, 0, 0.1]}, fixed: true}"

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.check import check_files
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
 from manipcli.model.kinematics import Kinematics
+from manipcli.preflight.check_files import check_files
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 HOME = ROOT / "tasks" / "home.yaml"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>"""

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
 
 ARM = """<link name="{0}_arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
 <inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>

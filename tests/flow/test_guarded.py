@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.check import check_files
-from manipcli.flow.load import load_task
 from manipcli.model.kinematics import Kinematics
 from manipcli.pipeline import run_task
+from manipcli.preflight.check_files import check_files
 from manipcli.record.reading import open_recording
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 ARM = f"robot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: {ROOT}/controllers/arm7_hand3.yaml\n"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
+from manipcli.preflight.gains import gain_findings
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

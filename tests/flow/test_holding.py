@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.flow.holding import Holding
-from manipcli.flow.load import load_task
 from manipcli.model.state import Contact
+from manipcli.run.holding import Holding
+from manipcli.task.load_task import load_task
 
 POUR = Path(__file__).resolve().parents[2] / "tasks" / "pour.yaml"
 

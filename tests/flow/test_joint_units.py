@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
+from manipcli.task.load_task import load_task
 
 
 def link(name: str) -> str:

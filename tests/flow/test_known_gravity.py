@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from manipcli.task.task import Task
 
 from manipcli.core.geometry import Array
 from manipcli.core.units import EARTH_GRAVITY
-from manipcli.flow.execute import controllers
-from manipcli.flow.load import Task
-from manipcli.flow.plan import plan_task, start_position
-from manipcli.flow.sample import load_task
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.pipeline import run_task, verify_log
+from manipcli.run.execute import controllers
+from manipcli.task.plan_task import plan_task, start_position
+from manipcli.task.sample import load_task
 
 ROOT = Path(__file__).parents[2]
 MOVES = f"""\

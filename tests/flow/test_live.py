@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from manipcli import pipeline
-from manipcli.flow import execute
-from manipcli.flow.live import Live
-from manipcli.flow.load import load_task
-from manipcli.flow.log import judge_recording
+from manipcli.conditions.condition import World
+from manipcli.conditions.formula import leaves
+from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.robustness import Reading
+from manipcli.conditions.state_window import Moments
 from manipcli.judge import expectation
-from manipcli.model.condition import World
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.formula import leaves
-from manipcli.model.moments import Moments
-from manipcli.model.reading import Reading
+from manipcli.logs.log import judge_recording
 from manipcli.record.reading import open_recording
+from manipcli.run import execute
+from manipcli.run.live_conditions import Live
 from manipcli.spec.condition import ConditionSpec
+from manipcli.task.load_task import load_task
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 TASKS = sorted([*ROOT.glob("tasks/*.yaml"), *ROOT.glob("examples/*/task.yaml")])

@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.log import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.judge.steps import PLAN_FILE
+from manipcli.logs.log import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.pipeline import judge_log, run_task
 from manipcli.record.reading import read_recording
 

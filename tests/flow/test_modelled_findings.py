@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.check import check_files
+from manipcli.preflight.check_files import check_files
 
 TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
 <joint name="hinge"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.flow.check import check_files
-from manipcli.flow.load import load_task
+from manipcli.preflight.check_files import check_files
+from manipcli.task.load_task import load_task
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
 FINGER = '<collision><geometry><box size="0.01 0.01 0.04"/></geometry></collision>'

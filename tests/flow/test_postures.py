@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.flow.check import check_files
+from manipcli.preflight.check_files import check_files
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 

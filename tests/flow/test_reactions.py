@@ -11,11 +11,11 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.onlooker import Progress
 from manipcli.judge.verdict import Verdict
 from manipcli.record.reading import read_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.report import json as json_report
+from manipcli.run.observer import Progress
 from manipcli.simulate.executor import REST
 
 ROOT = Path(__file__).parents[2]

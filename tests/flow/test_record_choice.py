@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.flow.replay import open_playback
+from manipcli.logs.replay import open_playback
 from manipcli.pipeline import judge_log, run_task
 
 ROOT = Path(__file__).parents[2]

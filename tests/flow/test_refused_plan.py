@@ -11,9 +11,9 @@ import pytest
 
 from manipcli.cli.app import main
 from manipcli.core.errors import NotPlannable
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import plan_task
 from manipcli.model.kinematics import Kinematics
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.flow import replan
-from manipcli.flow.load import Task, load_task
-from manipcli.flow.plan import Plan, plan_step, plan_task
-from manipcli.flow.regrasp import MOST
 from manipcli.pipeline import run_task
+from manipcli.plan.grasp_backtracking import MOST
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
+from manipcli.run import replan
 from manipcli.spec.task import StepSpec
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import Plan, plan_step, plan_task
 
 ROOT = Path(__file__).parents[2]
 PANDA = f"robot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"

@@ -10,22 +10,23 @@ from typing import cast
 
 import numpy as np
 import pytest
+from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.flow import replan
-from manipcli.flow.execute import controllers
-from manipcli.flow.load import Task, load_task
-from manipcli.flow.plan import Plan, plan_step, plan_task
-from manipcli.flow.replan import COMMANDED, LOST, Measured, after
 from manipcli.model.collision import Carried
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
+from manipcli.run import replan
+from manipcli.run.execute import controllers
+from manipcli.run.replan import COMMANDED, LOST, Measured, after
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.task import StepSpec
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import Plan, plan_step, plan_task
 
 ROOT = Path(__file__).parents[2]
 PICK, LIFT, PLACE, MOVE = range(4)

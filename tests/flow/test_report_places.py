@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from manipcli.flow.report import limit_of, log_page
-from manipcli.model.conditions.at_pose import AtPoseSpec
-from manipcli.model.conditions.contact_force import ContactForceSpec
-from manipcli.model.conditions.moved import MovedSpec, UnmovedSpec
-from manipcli.model.conditions.near import NearSpec
-from manipcli.model.conditions.slip import SlipSpec
+from manipcli.conditions.members.at_pose import AtPoseSpec
+from manipcli.conditions.members.contact_force import ContactForceSpec
+from manipcli.conditions.members.moved import MovedSpec, UnmovedSpec
+from manipcli.conditions.members.near import NearSpec
+from manipcli.conditions.members.slip import SlipSpec
+from manipcli.logs.report import limit_of, log_page
 from manipcli.pipeline import run_task, verify_log
 from manipcli.report.html import render_page
 from manipcli.spec.base import Model

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
-from manipcli.flow.robot_file import read_robot
+from manipcli.task.load_task import load_task
+from manipcli.task.robot_file import read_robot
 
 ROOT = Path(__file__).parents[2]
 HEAD = f"robot: r\ndescription: {ROOT}/robots/arm7_hand3/urdf/arm7_hand3.urdf.xacro\n"

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 JOINTS = [f"joint_{k}" for k in range(1, 8)]

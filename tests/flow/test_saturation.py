@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.log import judge_log
-from manipcli.flow.log_info import log_info
+from manipcli.logs.log import judge_log
+from manipcli.logs.log_info import log_info
 from manipcli.pipeline import run_task
 from manipcli.record.reading import open_recording
 from manipcli.report.log_info import render_text

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
-from manipcli.flow.log import mesh_files
-from manipcli.flow.mesh_search import MeshSearch
+from manipcli.logs.log import mesh_files
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 MESH = next((ROOT / "robots").rglob("*.stl"))

@@ -11,7 +11,7 @@ import yaml
 from mcap.reader import make_reader
 
 from manipcli.cli.app import main
-from manipcli.flow.graph import PRODUCERS, log_graph, task_graph
+from manipcli.logs.graph import PRODUCERS, log_graph, task_graph
 from manipcli.pipeline import run_task
 from manipcli.record.channels import channel_table
 from manipcli.report.graph import Graph

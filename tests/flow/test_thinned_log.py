@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from manipcli.flow.log_info import log_info
-from manipcli.flow.moment import moment
-from manipcli.flow.replay import open_playback
+from manipcli.logs.log_info import log_info
+from manipcli.logs.moment import moment
+from manipcli.logs.replay import open_playback
 from manipcli.pipeline import judge_log, run_task
 from manipcli.record.faults import Thinned
 

@@ -12,16 +12,16 @@ from manipcli.control.command import JointCommand
 from manipcli.control.stability import Loop, largest_damping
 from manipcli.control.tuning import MARGIN, Tuned, Wish
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.gains import gain_findings
-from manipcli.flow.load import load_task
-from manipcli.flow.tune import Tuning, chart_of, tune, written
 from manipcli.model.build_robot import build_robot
-from manipcli.model.scene import Scene
 from manipcli.pipeline import run_task
+from manipcli.preflight.gains import gain_findings
 from manipcli.record.reading import open_recording
+from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_controllers, load_robot
+from manipcli.task.load_task import load_task
+from manipcli.tuning.tune import Tuning, chart_of, tune, written
 
 ROOT = Path(__file__).parents[2]
 INERTIA = 0.004 + 0.5 * 0.2**2

@@ -11,10 +11,10 @@ import pytest
 from manipcli.control.reflected import Load
 from manipcli.control.tuning import MARGIN, Wish, tune_efforts
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.extremes import climbed
-from manipcli.flow.load import load_task
-from manipcli.flow.tune import tune
 from manipcli.model.kinematics import Kinematics
+from manipcli.task.load_task import load_task
+from manipcli.tuning.extremes import climbed
+from manipcli.tuning.tune import tune
 
 ROOT = Path(__file__).parents[2]
 H = 1e-3
@@ -60,7 +60,7 @@ def test_the_top_of_a_hill_is_found() -> None:
 def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """After one round the iiwa's are not calm where they are tightest."""
     files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
-    monkeypatch.setattr("manipcli.flow.tune.ROUNDS", 1)
+    monkeypatch.setattr("manipcli.tuning.tune.ROUNDS", 1)
     (note,) = (one for one in tune(*files, Wish(20.0, 1.0, H)).notes if "may grow" in one)
     found = re.fullmatch(r"But in a posture .* all of them together may grow by ([\d.]+) alone, not by 2[.0]*", note)
     assert found is not None
@@ -69,7 +69,7 @@ def test_gains_without_their_margin_say_so(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_gains_that_are_unstable_somewhere_are_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
     files = ROOT / "robots" / "iiwa7" / "robot.yaml", ROOT / "controllers" / "iiwa7.yaml"
-    monkeypatch.setattr("manipcli.flow.tune.ROUNDS", 1)
+    monkeypatch.setattr("manipcli.tuning.tune.ROUNDS", 1)
     monkeypatch.setattr("manipcli.control.tuning.MARGIN", 0.9)
     with pytest.raises(InvalidInput, match="these are unstable in a posture that was found last"):
         tune(*files, Wish(20.0, 1.0, H))

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.load import load_task
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 ARM = [f"panda_joint{k}" for k in range(1, 8)]

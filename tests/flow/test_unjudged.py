@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.flow.load import load_task
+from manipcli.task.load_task import load_task
 
 POUR = Path(__file__).resolve().parents[2] / "tasks" / "pour.yaml"
 

@@ -13,9 +13,9 @@ import pytest
 from scipy import stats
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.sample import load_task
-from manipcli.flow.vary import bind, deviate, draw
 from manipcli.judge.drawn import Drawn, Number
+from manipcli.task.sample import load_task
+from manipcli.task.vary import bind, deviate, draw
 
 ROOT = Path(__file__).parents[2]
 COUNT = 2000
@@ -168,7 +168,7 @@ def test_deviates_of_other_seeds_samples_paths_and_components_do_not_hang_togeth
 
 
 def test_a_sample_is_the_same_in_another_process() -> None:
-    statement = "from manipcli.flow.vary import deviate; print(deviate(1, 17, 'scene.cup.mass', 0).hex())"
+    statement = "from manipcli.task.vary import deviate; print(deviate(1, 17, 'scene.cup.mass', 0).hex())"
     told = subprocess.run([sys.executable, "-c", statement], capture_output=True, text=True, check=True, cwd=ROOT)
     assert float.fromhex(told.stdout.strip()) == deviate(1, 17, "scene.cup.mass", 0) == 0.7757466454688621
 

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from manipcli.cli.app import main
 from manipcli.core.errors import InvalidInput
-from manipcli.flow import recorded_task
+from manipcli.logs import recorded_task
 from manipcli.pipeline import run_task, verify_log
 
 ROOT = Path(__file__).parents[2]

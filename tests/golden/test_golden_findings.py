@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.model.examine import examine
-from manipcli.model.packages import Packages
+from manipcli.description.lint.examine import examine
+from manipcli.description.packages import Packages
 
 HERE = Path(__file__).parent
 DESCRIPTIONS = {"panda": "franka_panda/panda.urdf", "iiwa": "kuka_iiwa/model.urdf"}

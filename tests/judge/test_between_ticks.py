@@ -13,14 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipcli.core.geometry import Transform
-from manipcli.flow.vocabulary import task_spec
+from manipcli.description.elements import Link
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome
-from manipcli.model.build_scene import build_scene
-from manipcli.model.robot import Link, RobotModel
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
+from manipcli.scene.build_scene import build_scene
 from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 PERIOD, EVERY, T = 0.001, 10, 101
 TIMES = np.round(np.arange(T) * PERIOD, 9)

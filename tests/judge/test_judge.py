@@ -9,19 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.conditions.condition import Setting
+from manipcli.conditions.members import CONDITIONS
 from manipcli.core.geometry import Transform, frozen
-from manipcli.flow.vocabulary import task_spec
+from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
-from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Setting
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.robot import Group, Joint, JointLimits, Link, RobotModel
+from manipcli.model.robot import Group, RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
+from manipcli.scene.build_scene import build_scene
 from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 PERIOD = 0.01
 T = 201  # 2 s

@@ -11,20 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.conditions.condition import Setting
+from manipcli.conditions.members import CONDITIONS
 from manipcli.core.geometry import Array, Transform
-from manipcli.flow.vocabulary import task_spec
+from manipcli.description.elements import Link
 from manipcli.judge.expectation import expectation_problems, labels
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import ExpectationOutcome, broken_at
-from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Setting
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.robot import Link, RobotModel
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
+from manipcli.scene.build_scene import build_scene
 from manipcli.spec.base import Model
 from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.task import BodySpec, TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 PERIOD, T = 0.01, 201
 TIMES = np.round(np.arange(T) * PERIOD, 9)

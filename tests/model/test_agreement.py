@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.description.lint.examine import examine
+from manipcli.description.normalised_urdf import engine_urdf, massless_joints
+from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot
-from manipcli.model.examine import examine
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.normalise import engine_urdf, massless_joints
-from manipcli.model.packages import Packages
 from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import RobotSpec
 

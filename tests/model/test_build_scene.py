@@ -12,10 +12,10 @@ import pytest
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.core.geometry import Transform
-from manipcli.model.build_scene import build_scene
-from manipcli.model.packages import Packages
-from manipcli.model.robot import Box, Cylinder
-from manipcli.model.scene import Scene
+from manipcli.description.packages import Packages
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Scene
+from manipcli.shapes.primitives import Box, Cylinder
 from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
 
 DESK: dict[str, Any] = {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0, 0.2]}, "fixed": True}

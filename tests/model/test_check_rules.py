@@ -8,11 +8,20 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.model.examine import examine
-from manipcli.model.mesh_stl import binary_stl
-from manipcli.model.packages import Packages
-from manipcli.model.samples import CUBE, INERTIAL, LIMIT, MOTOR, TETRAHEDRON, one_joint, one_link, transmission
-from manipcli.model.zero_overlap import overlaps_at_zero
+from manipcli.description.lint.examine import examine
+from manipcli.description.lint.samples import (
+    CUBE,
+    INERTIAL,
+    LIMIT,
+    MOTOR,
+    TETRAHEDRON,
+    one_joint,
+    one_link,
+    transmission,
+)
+from manipcli.description.lint.zero_overlap import overlaps_at_zero
+from manipcli.description.packages import Packages
+from manipcli.shapes.mesh_stl import binary_stl
 
 
 def findings(folder: Path, text: str, **files: bytes) -> tuple[Finding, ...]:

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.collision import Carried, CollisionChecker, CollisionQuery, pairs
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, Mesh, RobotModel, Shape, Sphere
-from manipcli.model.scene import Body, Scene
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Mesh, Shape, Sphere
 
 RADIUS = 0.1
 ROD = 1.0  # from one joint to the next, and to the ball at the tip

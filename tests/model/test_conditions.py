@@ -10,15 +10,16 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from manipcli.conditions.condition import Condition, Setting, World
+from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.robustness import Reading
+from manipcli.conditions.state_window import Moments
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Condition, Setting, World
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.moments import Moments
-from manipcli.model.reading import Reading
-from manipcli.model.robot import Group, Joint, JointLimits, JointType, Link, NamedPose, RobotModel, Tool
-from manipcli.model.scene import Scene
+from manipcli.description.elements import Joint, JointLimits, JointType, Link
+from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
 from manipcli.model.state import WorldState
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Scene
 from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
 
 BODIES: dict[str, Any] = {

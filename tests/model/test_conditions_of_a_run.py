@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from manipcli.conditions.condition import Condition, Setting, World
+from manipcli.conditions.members import CONDITIONS
+from manipcli.conditions.robustness import Reading
+from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.build_scene import build_scene
-from manipcli.model.condition import Condition, Setting, World
-from manipcli.model.conditions import CONDITIONS
-from manipcli.model.moments import Moments, Reference, StepTime, Touching
-from manipcli.model.reading import Reading
-from manipcli.model.robot import Group, Joint, JointLimits, JointType, Link, RobotModel, Tool
+from manipcli.description.elements import Joint, JointLimits, JointType, Link
+from manipcli.model.robot import Group, RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
+from manipcli.scene.build_scene import build_scene
 from manipcli.spec.task import BodySpec, TaskSpec
 
 PERIOD, T = 0.01, 101

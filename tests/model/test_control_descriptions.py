@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import ManipcliError
-from manipcli.model.examine import examine
-from manipcli.model.packages import Packages
-from manipcli.model.samples import CUBE, INERTIAL, LIMIT
+from manipcli.description.lint.examine import examine
+from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT
+from manipcli.description.packages import Packages
 
 HARDWARE = "<hardware><plugin>p/P</plugin></hardware>"
 ATTRIBUTES = 'name="hw" type="system"'

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.description.elements import TransmissionTag
 from manipcli.model import DifferentialTransmission, FourBarLinkageTransmission, SimpleTransmission
 from manipcli.model.build_robot import build_robot, rebuild_robot
 from manipcli.model.drivetrain import Drivetrain
-from manipcli.model.robot import Actuator, RobotModel, TransmissionTag
+from manipcli.model.robot import Actuator, RobotModel
 from manipcli.spec.load import load_robot_text
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>'

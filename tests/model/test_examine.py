@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.model.bounds import Bounds, bounds
+from manipcli.description.bounds import Bounds, bounds
+from manipcli.description.lint.check import Check
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.lint.examine import MOST_OF_A_CODE, Examination, examine
+from manipcli.description.lint.guess_groups import guess_groups
+from manipcli.description.lint.summary import summarise, tree_lines
+from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot
-from manipcli.model.check import Check
-from manipcli.model.checks import CHECKS
-from manipcli.model.examine import MOST_OF_A_CODE, Examination, examine
-from manipcli.model.guess_groups import guess_groups
-from manipcli.model.packages import Packages
-from manipcli.model.summary import summarise, tree_lines
 from manipcli.spec.robot import RobotSpec
 
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.landing import GRAZES, LEAST, landing
-from manipcli.model.robot import Box, Geometry, Sphere
-from manipcli.model.scene import Body
+from manipcli.scene.drop_test import GRAZES, LEAST, landing
+from manipcli.scene.scene import Body
+from manipcli.shapes.primitives import Box, Geometry, Sphere
 
 GREY = (0.5, 0.5, 0.5, 1.0)
 

@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
+from manipcli.description.description import read_description
+from manipcli.description.elements import JointLimits, SoftLimits
+from manipcli.description.normalised_urdf import engine_urdf
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_robot import bare_robot, build_robot
-from manipcli.model.description import read_description
-from manipcli.model.normalise import engine_urdf
-from manipcli.model.packages import Packages
-from manipcli.model.robot import JointLimits, RobotModel, SoftLimits
-from manipcli.model.urdf import Parts, read_parts
+from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import LimitsSpec, RobotSpec
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'

@@ -7,9 +7,9 @@ import pytest
 from scipy.stats.qmc import Sobol
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model import body_shapes
-from manipcli.model.mass import union
-from manipcli.model.robot import Box, Cylinder, Geometry, Sphere
+from manipcli.scene import body_shapes
+from manipcli.shapes.mass_properties import union
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Sphere
 from manipcli.spec.task import CupSpec, TraySpec
 
 WHITE = (1.0, 1.0, 1.0, 1.0)

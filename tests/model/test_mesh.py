@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipcli.core.errors import InvalidInput
-from manipcli.model import mesh as mesh_module
-from manipcli.model import mesh_collada, mesh_stl
-from manipcli.model.coal_shape import coal_shape
-from manipcli.model.mesh import read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
-from manipcli.model.mesh_files import clean_mesh
-from manipcli.model.mesh_stl import binary_stl
-from manipcli.model.robot import Mesh
-from manipcli.model.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron
+from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron
+from manipcli.shapes import mesh as mesh_module
+from manipcli.shapes import mesh_collada, mesh_stl
+from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.mesh import read_mesh
+from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.mesh_files import clean_mesh
+from manipcli.shapes.mesh_stl import binary_stl
+from manipcli.shapes.primitives import Mesh
 
 CUBE_OBJ = b"""# two boxes' worth of nothing: one quad and one triangle
 o first

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.model.packages import NotFound, Packages
+from manipcli.description.packages import NotFound, Packages
 
 
 @pytest.fixture

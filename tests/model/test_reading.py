@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manipcli.model.reading import (
+from manipcli.conditions.robustness import (
     EDGE,
     Extreme,
     Measured,

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform
-from manipcli.model.build_scene import build_scene
-from manipcli.model.robot import Geometry, Mesh
-from manipcli.model.scene import Scene
-from manipcli.model.scene_file import scene_from_json, scene_to_json
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Scene
+from manipcli.scene.scene_file import scene_from_json, scene_to_json
+from manipcli.shapes.primitives import Geometry, Mesh
 from manipcli.spec.task import BodySpec, FrameSpec, TaskSpec
 
 BODIES: dict[str, Any] = {

@@ -15,10 +15,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.model.description import read_description
-from manipcli.model.packages import Packages
-from manipcli.model.robot import Box, Cylinder, Mesh, Mimic, Sphere
-from manipcli.model.urdf import Parts, read_parts
+from manipcli.description.description import read_description
+from manipcli.description.elements import Mimic
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.urdf import Parts, read_parts
+from manipcli.shapes.primitives import Box, Cylinder, Mesh, Sphere
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial>'
 LINK_A = f'<link name="a">{INERTIAL}</link>'

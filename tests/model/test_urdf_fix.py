@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.model.description import read_description
-from manipcli.model.packages import Packages
-from manipcli.model.urdf import read_parts
-from manipcli.model.urdf_fix import mended
+from manipcli.description.description import read_description
+from manipcli.description.lint.fix import mended
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.urdf import read_parts
 
 TEXT = """<?xml version="1.0"?>
 <!-- é: a remark -->

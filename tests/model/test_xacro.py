@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from manipcli.core.errors import InvalidInput
-from manipcli.model import xacro
-from manipcli.model.description import Description, read_description
-from manipcli.model.examine import examine
-from manipcli.model.packages import Packages
+from manipcli.description.description import Description, read_description
+from manipcli.description.lint.examine import examine
+from manipcli.description.packages import Packages
+from manipcli.description.xacro import expand as xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
 

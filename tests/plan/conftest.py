@@ -8,28 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from manipcli.task.task import Task
 from scipy.spatial.transform import Rotation
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.flow.load import Task, load_task
-from manipcli.flow.plan import start_position
-from manipcli.model.robot import (
-    Box,
-    Cylinder,
-    Geometry,
-    Group,
-    Joint,
-    JointLimits,
-    Link,
-    RobotModel,
-    Shape,
-)
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import Group, RobotModel
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Shape
 from manipcli.spec.controllers import GripperSpec
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import start_position
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 _LENGTHS = (0.16, 0.2, 0.22, 0.2, 0.2, 0.2, 0.1)  # from joint k to joint k + 1, along z

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from manipcli.core.geometry import Transform
-from manipcli.model.robot import Mimic, RobotModel, Tool
+from manipcli.description.elements import Mimic
+from manipcli.model.robot import RobotModel, Tool
 from manipcli.plan.claims import arm_joints
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import NotPlannable
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import plan_task
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
 
 Follow = Callable[[str], np.ndarray]
 

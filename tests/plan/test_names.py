@@ -3,7 +3,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from manipcli.model.condition import unknown_body
+from manipcli.conditions.condition import unknown_body
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 
 Make = Callable[..., Any]  # fixture of conftest.py: a Bench of a robot and a scene

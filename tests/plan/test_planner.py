@@ -13,7 +13,7 @@ import pytest
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform, frozen
 from manipcli.model.collision import Carried, CollisionHit
-from manipcli.model.posture import with_mimics
+from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.draft import Draft
 from manipcli.plan.hand import fingers, moved_links, ramp

@@ -11,23 +11,13 @@ import pytest
 
 from manipcli.control.controller import ControllerOutput
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.robot import (
-    Box,
-    Cylinder,
-    Geometry,
-    Joint,
-    JointLimits,
-    Link,
-    Mesh,
-    Mimic,
-    RobotModel,
-    Sphere,
-    TransmissionTag,
-)
-from manipcli.model.scene import Body, Frame, Scene
+from manipcli.description.elements import Joint, JointLimits, Link, Mimic, TransmissionTag
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.recorder import Recorder
+from manipcli.scene.scene import Body, Frame, Scene
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 
 PERIOD = 0.001
 CONTROLLERS = (

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.flow.look import load_sight
-from manipcli.model.robot import Geometry, Link, Mesh, RobotModel
+from manipcli.description.elements import Link
+from manipcli.model.robot import RobotModel
 from manipcli.replay.bones import bones
 from manipcli.replay.drawing import draw
+from manipcli.shapes.primitives import Geometry, Mesh
+from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]
 GONE = Mesh("package://gone/link.stl", Path("/nowhere/link.stl"))

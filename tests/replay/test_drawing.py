@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.flow.look import Sight, load_sight
+from manipcli.description.elements import Inertial
+from manipcli.model.configuration import posture, with_mimics, zero_posture
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.posture import posture, with_mimics, zero_posture
-from manipcli.model.robot import Box, Inertial, Mesh
 from manipcli.replay.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
 from manipcli.replay.placing import Placing
+from manipcli.shapes.primitives import Box, Mesh
+from manipcli.task.viewed import Sight, load_sight
 
 ROOT = Path(__file__).parents[2]
 

@@ -12,13 +12,13 @@ import pytest
 from PIL import Image as PillowImage
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Box, Geometry, Sphere
-from manipcli.model.scene import Body, Scene
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import draw
 from manipcli.replay.image import png_bytes, sky
 from manipcli.replay.picture import Studio
 from manipcli.replay.placing import Placing
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Sphere
 
 
 def _body(name: str, shape: Box | Sphere, rgba: tuple[float, float, float, float], at: tuple[float, ...]) -> Body:

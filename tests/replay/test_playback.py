@@ -15,12 +15,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import matrix_from_quat
-from manipcli.flow.chart import open_chart
-from manipcli.flow.mesh_search import MeshSearch
-from manipcli.flow.moment import moment
-from manipcli.flow.replay import open_playback
 from manipcli.judge.verdict import StepOutcome, Verdict
-from manipcli.model.robot import Mesh
+from manipcli.logs.chart import open_chart
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.moment import moment
+from manipcli.logs.replay import open_playback
 from manipcli.model.state import Contact
 from manipcli.pipeline import run_task
 from manipcli.record.reading import read_recording
@@ -29,6 +28,7 @@ from manipcli.record.schemas import schema_text
 from manipcli.replay.drawing import draw
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.sampling import _Contacts, sampled
+from manipcli.shapes.primitives import Mesh
 
 ROOT = Path(__file__).parents[2]
 TYPES = get_typestore(Stores.ROS2_HUMBLE)

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel, Sphere, Tool
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact
 from manipcli.replay.curves_panel import binned, with_cursor
 from manipcli.replay.drawing import draw
@@ -25,6 +25,8 @@ from manipcli.replay.forces import Forces
 from manipcli.replay.playback import Phase, Playback, PlaybackStep
 from manipcli.replay.player import player_html, player_page
 from manipcli.replay.timeline import Clock
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Sphere
 
 HOSTILE = "</script><script>alert(1)</script><!-- \u2028 & 'x' \"y\""
 

@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from manipcli.core.geometry import matrix_from_quat
-from manipcli.flow.replay import open_playback
+from manipcli.logs.replay import open_playback
 from manipcli.pipeline import run_task
 from manipcli.replay.drawing import draw
 from manipcli.replay.playback import Playback

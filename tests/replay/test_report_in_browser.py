@@ -7,7 +7,7 @@ from typing import Protocol
 
 import pytest
 
-from manipcli.flow.report import log_page
+from manipcli.logs.report import log_page
 from manipcli.pipeline import run_task
 from manipcli.report.html import render_page
 

@@ -15,8 +15,6 @@ from PIL import Image
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
 from manipcli.judge.verdict import StepOutcome, Verdict
-from manipcli.model.robot import Box, Geometry, Sphere
-from manipcli.model.scene import Body, Scene
 from manipcli.replay import film as films
 from manipcli.replay import sheet as sheets
 from manipcli.replay.camera import VIEWS, Camera, direction
@@ -27,6 +25,8 @@ from manipcli.replay.picture import Studio
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
 from manipcli.replay.shots import Shots, moment, parse_size, telling
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Sphere
 
 SIZE = (192, 144)
 

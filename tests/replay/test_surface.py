@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.robot import Box, Cylinder, Sphere
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
+from manipcli.shapes.primitives import Box, Cylinder, Sphere
 
 
 def _volume(surface: Surface) -> float:

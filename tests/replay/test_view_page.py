@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manipcli.flow.look import load_sight
 from manipcli.replay.view import View
+from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]
 CLICK = """(label => {

@@ -17,11 +17,11 @@ from websockets.typing import Origin, Subprotocol
 
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
-from manipcli.flow.look import load_sight
-from manipcli.model.robot import Joint, JointLimits
+from manipcli.description.elements import Joint, JointLimits
 from manipcli.replay.panel import pose_text, slider_range
 from manipcli.replay.server import is_meant_for
 from manipcli.replay.view import View
+from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]
 ROBOT = """<robot name="two">

@@ -12,10 +12,10 @@ import pytest
 
 from manipcli.cli.app import main
 from manipcli.core.errors import Finding, Place
-from manipcli.flow import chart
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
+from manipcli.logs import chart
 from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Suite, Trouble

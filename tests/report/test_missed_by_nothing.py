@@ -8,10 +8,10 @@ from xml.etree.ElementTree import fromstring
 import numpy as np
 import pytest
 
-from manipcli.flow.log import verdict_metadata
+from manipcli.conditions.robustness import EDGE, Measured, Reading, never, opposite, reading
 from manipcli.judge.expectation import outcome
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.model.reading import EDGE, Measured, Reading, never, opposite, reading
+from manipcli.logs.log import verdict_metadata
 from manipcli.report.html_parts import signed
 from manipcli.report.json import render_verdict
 from manipcli.report.junit import render_junit

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.report.plan import limiting
 

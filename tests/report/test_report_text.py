@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from manipcli.conditions.robustness import EDGE
 from manipcli.core.errors import Finding, Place
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.model.reading import EDGE
 from manipcli.report.quantity import quantity
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.table import table

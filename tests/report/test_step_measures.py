@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array, Transform
+from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.judge.verdict import StepOutcome
-from manipcli.model.robot import Joint, JointLimits, Link, RobotModel, Tool
+from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, Recording, Span
 from manipcli.report.step_measures import step_measures

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from manipcli import pipeline
-from manipcli.flow import execute
 from manipcli.judge.verdict import Verdict
 from manipcli.record.reading import read_recording
+from manipcli.run import execute
 from manipcli.simulate.engines import ENGINES
 
 pytestmark = pytest.mark.slow

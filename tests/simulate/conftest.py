@@ -14,9 +14,11 @@ from manipcli.control.controllers.gripper import GripperController
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array, Transform, frozen
-from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
 from manipcli.simulate.session import Session

@@ -20,13 +20,13 @@ import pytest
 
 from manipcli.control.action import GripperGoal
 from manipcli.control.roles import is_follower, is_hand
-from manipcli.flow.execute import controllers
-from manipcli.flow.load import load_task
-from manipcli.flow.plan import plan_task
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.run.execute import controllers
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import plan_task
 
 HOME = Path(__file__).parents[2] / "tasks" / "home.yaml"
 COUNT = "\nvoluntary_ctxt_switches:"

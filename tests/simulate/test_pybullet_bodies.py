@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import ManipcliError
-from manipcli.model.build_scene import build_scene
-from manipcli.model.scene import Body
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Body
 from manipcli.simulate.engines import pybullet_world
 from manipcli.simulate.engines.pybullet_world import add_body
 from manipcli.spec.task import BodySpec, TaskSpec

@@ -16,9 +16,11 @@ from manipcli.control.motors import MotorLimits
 from manipcli.control.stability import largest_velocity_gain
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, Mimic, RobotModel
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link, Mimic
+from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry
 from manipcli.simulate.engine import Engine, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.engines.pybullet_motors import POSITION_TIME

@@ -14,7 +14,8 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Actuator, Inertial, Mimic, TransmissionTag
+from manipcli.description.elements import Inertial, Mimic, TransmissionTag
+from manipcli.model.robot import Actuator
 from manipcli.model.state import Contact
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.simulate.session import BODY_SPEED, FALLEN, RUNAWAY_SPEED, SLOW, Session

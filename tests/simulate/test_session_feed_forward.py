@@ -7,10 +7,11 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Transform, frozen
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import Inertial, Joint, JointLimits, Link, RobotModel
-from manipcli.model.scene import Scene
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
+from manipcli.scene.scene import Scene
 from manipcli.simulate.session import Session
 
 RATE, ACCELERATION = np.array([0.7, -0.3]), np.array([2.0, 1.0])

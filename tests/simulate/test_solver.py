@@ -8,8 +8,10 @@ import pytest
 
 from manipcli.control.command import JointCommand
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Box, Geometry, Inertial, Joint, JointLimits, Link, RobotModel
-from manipcli.model.scene import Body, Scene
+from manipcli.description.elements import Inertial, Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 

@@ -13,22 +13,11 @@ from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBro
 from manipcli.control.controllers.forward_command import ForwardCommandController
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array, Transform, cross, frozen
+from manipcli.description.elements import Inertial, Joint, JointLimits, JointType, Link, Mimic, TransmissionTag
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import (
-    Actuator,
-    Box,
-    Geometry,
-    Inertial,
-    Joint,
-    JointLimits,
-    JointType,
-    Link,
-    Mimic,
-    RobotModel,
-    Sphere,
-    TransmissionTag,
-)
-from manipcli.model.scene import Body, Scene
+from manipcli.model.robot import Actuator, RobotModel
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Box, Geometry, Sphere
 from manipcli.simulate.engine import Engine, EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session

@@ -6,9 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.load import load_task_text
+from manipcli.task.vocabulary import task_spec
 
 TASK = """\
 task: t

@@ -7,9 +7,9 @@ import re
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
-from manipcli.spec.yaml import parse
+from manipcli.spec.source.yaml import parse
+from manipcli.task.vocabulary import task_spec
 
 ROBOT = "robot: r\ndescription: r.urdf\n"
 

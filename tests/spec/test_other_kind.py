@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.flow.load import load_task
+from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "panda" / "robot.yaml"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.load import load_task_text
 from manipcli.spec.task import TaskSpec
+from manipcli.task.vocabulary import task_spec
 
 TASK = "task: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: [{wait: 1 s}]\n"
 

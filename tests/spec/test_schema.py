@@ -10,10 +10,10 @@ from jsonschema import Draft202012Validator
 
 from manipcli import pipeline
 from manipcli.core.errors import InvalidInput
-from manipcli.flow.vocabulary import task_spec
 from manipcli.spec.load import FileKind, kind_of, load_task_text, read_bytes
-from manipcli.spec.tree import plain
-from manipcli.spec.yaml import parse
+from manipcli.spec.source.tree import plain
+from manipcli.spec.source.yaml import parse
+from manipcli.task.vocabulary import task_spec
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("tasks", "robots", "controllers", "examples", "manipcli/cli/project")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from manipcli.spec.shape import is_of_fixed_length
+from manipcli.spec.source.shape import is_of_fixed_length
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.spec import yaml as ours
-from manipcli.spec.tree import MappingNode, key_place_at, node_at, plain
-from manipcli.spec.yaml import parse
+from manipcli.spec.source import yaml as ours
+from manipcli.spec.source.tree import MappingNode, key_place_at, node_at, plain
+from manipcli.spec.source.yaml import parse
 
 
 def read(text: str | bytes) -> object:

@@ -32,6 +32,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
@@ -40,9 +41,9 @@ from manipcli.control.trajectory_goal import TrajectoryGoal
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import did_you_mean, listed
-from manipcli.model.condition import Problem
+from manipcli.description.elements import JointLimits, JointType
 from manipcli.model.kinematics import Kinematics
-from manipcli.model.robot import JointLimits, JointType, RobotModel
+from manipcli.model.robot import RobotModel
 from manipcli.model.transmission import Compat
 from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory

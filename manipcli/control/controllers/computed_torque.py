@@ -24,14 +24,15 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.condition import Problem
-from manipcli.model.robot import JointLimits, JointType, RobotModel
+from manipcli.description.elements import JointLimits, JointType
+from manipcli.model.robot import RobotModel
 from manipcli.model.transmission import Compat
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role

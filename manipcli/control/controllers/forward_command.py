@@ -18,10 +18,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, distinct
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.other_controllers import ForwardCommandSpec

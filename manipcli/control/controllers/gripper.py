@@ -27,13 +27,14 @@ from typing import Final
 
 import numpy as np
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.action import GripperGoal
 from manipcli.control.controller import ControllerMember, Fit
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.gripper_controller import GripperController
 from manipcli.core.geometry import Array
-from manipcli.model.condition import Problem
-from manipcli.model.robot import Joint, RobotModel
+from manipcli.description.elements import Joint
+from manipcli.model.robot import RobotModel
 from manipcli.plan.hand import closing_speed, fingers
 from manipcli.spec.controllers import GripperSpec
 

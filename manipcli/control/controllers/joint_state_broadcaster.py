@@ -17,10 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.other_controllers import JointStateBroadcasterSpec

@@ -23,6 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.conditions.condition import Problem
 from manipcli.control.controller import (
     ControllerMember,
     ControllerOutput,
@@ -36,8 +37,8 @@ from manipcli.control.controllers.forward_command import finite_values
 from manipcli.control.gains import build_pid, gains_of, own_joints, strangers
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.condition import Problem
-from manipcli.model.robot import JointType, RobotModel
+from manipcli.description.elements import JointType
+from manipcli.model.robot import RobotModel
 from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.other_controllers import PidGainsSpec, PidSpec

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from manipcli.model.robot import TransmissionTag
+from manipcli.description.elements import TransmissionTag
 from manipcli.model.transmission import Compat, Maps, Transmission, TransmissionMember, finite, nonzero
 
 

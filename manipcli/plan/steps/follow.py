@@ -15,10 +15,9 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
+from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
-from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unfollowed
 from manipcli.plan.draft import Draft
 from manipcli.plan.limits import MotionLimits
@@ -27,6 +26,7 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
 from manipcli.plan.verify import verify_written
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointAcceleration, JointValue, JointVelocity, Time
 

@@ -9,14 +9,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from manipcli.model.condition import Problem, unknown_body
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
 

@@ -9,17 +9,17 @@ from typing import Annotated
 
 from pydantic import Field
 
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
-from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
 _LESS = "lift it less, `by: ...`; or take it in another way: `approach: {yaw: ...}` of its `pick`"

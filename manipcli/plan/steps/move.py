@@ -18,10 +18,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.geometry import Transform
-from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.inverse_kinematics import Open, pointed
@@ -30,6 +29,7 @@ from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Share
 from manipcli.spec.robot import PoseSpec, Vector3

@@ -14,11 +14,10 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field
 
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
@@ -28,6 +27,7 @@ from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import Speed
 from manipcli.plan.tool_axes import misplaced, too_wide
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 

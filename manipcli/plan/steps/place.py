@@ -15,12 +15,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
-from manipcli.model.condition import Problem, unknown_body
-from manipcli.model.landing import FORMED, landing
-from manipcli.model.robot import Cylinder, RobotModel
-from manipcli.model.scene import Body, Scene
+from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
@@ -30,6 +28,9 @@ from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.plan.steps.pick import backed_off, slopes
+from manipcli.scene.drop_test import FORMED, landing
+from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.primitives import Cylinder
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Length, Turn
 

@@ -22,17 +22,17 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
-from manipcli.model.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_tool
 from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
+from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle, Pause
 

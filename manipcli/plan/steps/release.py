@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from manipcli.model.condition import Problem
+from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unmoved_hand
 from manipcli.plan.draft import Draft
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
 

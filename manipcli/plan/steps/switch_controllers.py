@@ -14,12 +14,12 @@ from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, TypeAdapter, 
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.model.condition import Problem
+from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims, unknown_controller
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepMember, StepPlan, Strictness, Switch
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
 
 Names = str | tuple[str, ...]

@@ -12,13 +12,13 @@ from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.model.condition import Problem
+from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims
 from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Pause, Time
 

@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.normalise import MASSLESS, inside_triangle
-from manipcli.model.robot import Inertial, RobotModel
-from manipcli.model.scene import Body
+from manipcli.description.elements import Inertial
+from manipcli.description.normalised_urdf import MASSLESS, inside_triangle
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Body
 
 RELATIVE: Final = 1e-4
 """Of masses, lengths and moments; these as Bullet was given them, which is inside of what can be."""

@@ -11,10 +11,12 @@ import numpy as np
 
 from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Transform
-from manipcli.model.mesh_files import clean_mesh
-from manipcli.model.normalise import MASSLESS, body_urdf
-from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Mesh, Mimic, RobotModel, Sphere
-from manipcli.model.scene import Body
+from manipcli.description.elements import Inertial, Mimic
+from manipcli.description.normalised_urdf import MASSLESS, body_urdf
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Body
+from manipcli.shapes.mesh_files import clean_mesh
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 from manipcli.simulate.engines.pybullet_contacts import Vector
 from manipcli.simulate.engines.pybullet_readback import body_differences
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from manipcli.core.errors import Place
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode
 
 PARAMETERS = "ros__parameters"
 MANAGER = "controller_manager"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
 
 
 def joint_trajectory(node: MappingNode) -> MappingNode:

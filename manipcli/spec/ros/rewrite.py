@@ -16,7 +16,7 @@ from manipcli.spec.ros.table import Block, Table, model_below, models, value
 from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, INTERFACES, OTHER_NODES, PACKAGES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, plain
 
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 

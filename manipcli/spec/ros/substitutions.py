@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from manipcli.core.errors import Finding, Place
-from manipcli.spec.tree import MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _SUBSTITUTION = re.compile(r"\$\([a-z][^()]*\)")
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import AnyController
-from manipcli.spec.tree import MappingNode, Plain, Scalar
+from manipcli.spec.source.tree import MappingNode, Plain, Scalar
 
 Words = Mapping[str, str]
 """What a type of ROS implies: our key -> its value; several values are separated by blanks."""

@@ -12,7 +12,7 @@ from manipcli.spec.fields import bounds_of
 from manipcli.spec.quantity import JointTolerance
 from manipcli.spec.ros.reshape import joint_trajectory, one_joint, pid
 from manipcli.spec.ros.table import Block, Table
-from manipcli.spec.tree import Plain
+from manipcli.spec.source.tree import Plain
 
 _EVERYWHERE: Final = frozenset({"use_sim_time", "publish_state", "state_publish_rate", "publish_rate"})
 """About publishing and clocks: every log has every tick, and simulated time is the only one."""

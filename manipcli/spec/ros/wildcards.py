@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.ros.nodes import Found, has_type, mapping, merged
 from manipcli.spec.ros.tables import BY_TYPE, MANAGER
-from manipcli.spec.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
 
 _BY_JOINT = ("gains", "constraints")
 """Blocks with one block a joint, of which a controller reads those of its own joints."""

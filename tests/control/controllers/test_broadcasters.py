@@ -10,7 +10,8 @@ from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.spec.load import load_controllers_text
 

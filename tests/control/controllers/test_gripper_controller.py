@@ -8,7 +8,8 @@ from manipcli.control.controller import Fit, JointState
 from manipcli.control.controllers.gripper import GripperController, GripperGoal, build
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
-from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import GainsSpec, GripperSpec
 
 JOINTS = ("thumb_1", "thumb_2", "finger_1", "finger_2")

@@ -9,7 +9,7 @@ from manipcli.control.action import ErrorCode, GoalRejected
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
-from manipcli.model.robot import JointLimits
+from manipcli.description.elements import JointLimits
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, JointConstraintSpec
 

@@ -19,7 +19,7 @@ from manipcli.control import (
     TrajectoryPoint,
 )
 from manipcli.core.errors import InvalidArgument
-from manipcli.model.robot import JointLimits
+from manipcli.description.elements import JointLimits
 
 PERIOD = 0.01
 

@@ -1,0 +1,35 @@
+"""The conditions: one file a family. `CONDITIONS` is the registry that the pipeline hands to the loader."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from manipcli.conditions.condition import Condition
+from manipcli.conditions.members.above import ABOVE
+from manipcli.conditions.members.at_pose import AT_POSE
+from manipcli.conditions.members.at_rest import AT_REST
+from manipcli.conditions.members.collision import COLLISION, NO_COLLISION
+from manipcli.conditions.members.contact_force import CONTACT_FORCE
+from manipcli.conditions.members.duration import DURATION
+from manipcli.conditions.members.energy import ENERGY
+from manipcli.conditions.members.grasped import GRASPED
+from manipcli.conditions.members.inside import INSIDE, OUTSIDE
+from manipcli.conditions.members.limits import LIMITS
+from manipcli.conditions.members.moved import MOVED, UNMOVED
+from manipcli.conditions.members.near import NEAR
+from manipcli.conditions.members.rests_on import RESTS_ON
+from manipcli.conditions.members.slip import SLIP
+from manipcli.conditions.members.step_done import STEP_DONE
+from manipcli.conditions.members.tool_speed import TOOL_SPEED
+from manipcli.conditions.members.tracking import TRACKING
+from manipcli.conditions.members.upright import UPRIGHT
+from manipcli.core.registry import Seam
+
+# Any: a seam holds members of different specs; each is only ever called with its own.
+CONDITIONS: Seam[Condition[Any]] = Seam(
+    kind="condition",
+    members=(
+        INSIDE, OUTSIDE, UPRIGHT, NEAR, ABOVE, RESTS_ON, AT_REST, MOVED, UNMOVED, GRASPED, SLIP, CONTACT_FORCE,
+        COLLISION, NO_COLLISION, AT_POSE, TRACKING, LIMITS, TOOL_SPEED, ENERGY, DURATION, STEP_DONE,
+    ),
+)  # fmt: skip

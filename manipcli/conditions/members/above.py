@@ -1,0 +1,92 @@
+"""`above`: an object is over another, with air between."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.body_poses import centres, highest, lowest
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Reading, least, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import rotate_inverse
+from manipcli.core.units import readable
+from manipcli.model.state import body_pose
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Length
+
+
+class AboveSpec(Model):
+    """The object is over `of`: higher by at least `by`, and its centre over the other's bounding box."""
+
+    object: str = Field(description="A body of the scene.")
+    of: str = Field(description="The body that it is over.")
+    by: Annotated[Length, Field(ge=0)] = Field(
+        default=0.0,
+        description="Least gap between the two, along the world's z [m]. Default 0; what rests on it sinks in a "
+        "little and is asked for by `rests_on`.",
+    )
+
+
+def gauge(spec: AboveSpec, world: World) -> Gauge:
+    """The lesser of two lengths [m]: how much the gap exceeds `by`, and how far inside the edge the centre is.
+
+    The gap is from the highest corner of the bounding box of `of` to the lowest of the object's. The edge is that of
+    the bounding box of `of` along its own x and y; of several the worst counts, and beyond it the length is negative.
+    Where units differ, both are compared to half of the lesser side of that box.
+    """
+    scene = world.scene
+    body = scene.body(spec.of)
+    half = np.array(body.size[:2]) / 2.0
+    scale = float(np.min(half))
+
+    def look(moments: Moments) -> Reading:
+        states, T = moments.states, np.shape(moments.times)
+        gap = np.broadcast_to(lowest(scene, states, spec.object) - highest(scene, states, spec.of), T)
+        X_WB = body_pose(scene, states, spec.of)
+        p_B = rotate_inverse(X_WB.quat_xyzw, centres(scene, states, spec.object) - X_WB.position) - body.centre
+        over = np.broadcast_to(np.min(half - np.abs(p_B[..., :2]), axis=-1), T)
+
+        def high(k: int) -> str:
+            word = "above" if gap[k] >= 0.0 else "below"
+            at_least = f"; at least {readable(spec.by, 'm')}" if spec.by else ""
+            return f"'{spec.object}' is {readable(abs(float(gap[k])), 'm')} {word} the top of '{spec.of}'{at_least}"
+
+        def within(k: int) -> str:
+            word = "inside" if over[k] >= 0.0 else "beyond"
+            return (
+                f"the centre of '{spec.object}' is {readable(abs(float(over[k])), 'm')} {word} the edge of '{spec.of}'"
+            )
+
+        return least(
+            [
+                reading(gap - spec.by, moments.times, unit="m", scale=scale, say=high),
+                reading(over, moments.times, unit="m", scale=scale, say=within),
+            ]
+        )
+
+    return look
+
+
+def check(spec: AboveSpec, setting: Setting) -> tuple[Problem, ...]:
+    """Both bodies exist and differ."""
+    problems = (
+        *unknown_body(setting.scene, spec.object, ("object",)),
+        *unknown_body(setting.scene, spec.of, ("of",)),
+    )
+    if not problems and spec.object == spec.of:
+        return (Problem(("of",), f"'{spec.of}' cannot be above itself"),)
+    return problems
+
+
+ABOVE = Condition(
+    name="above",
+    spec=AboveSpec,
+    units=("m",),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    example="above: {object: cup, of: tray, by: 5 cm}",
+)

@@ -1,0 +1,122 @@
+"""`at_pose`: the robot is in one of its named poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_group
+from manipcli.conditions.robustness import Reading, least, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import wrapped
+from manipcli.core.text import did_you_mean
+from manipcli.core.units import readable
+from manipcli.description.elements import Joint
+from manipcli.model.robot import RobotModel
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import AngleTolerance, Length
+
+SLIDE: Final = 0.005
+"""[m] within which a joint that slides is to be where nobody says it."""
+
+
+class AtPoseSpec(Model):
+    """Every joint of the pose (of its `group`, when one is given) is at most `within` from its value there, or `slide`
+    where it slides."""
+
+    pose: str = Field(description="A named pose of the robot.")
+    group: str | None = Field(default=None, description="Only this group's joints; default: all that the pose names.")
+    within: AngleTolerance = Field(default=0.02, description="Largest difference [rad], to pi. Default 0.02.")
+    slide: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None,
+        description="Largest difference of joints that slide [m]. Default: 5 mm of those that carry the tool; of "
+        "others, as fingers, any.",
+    )
+
+
+def gauge(spec: AtPoseSpec, world: World) -> Gauge:
+    """`within` minus the largest |q - q_pose| [rad], or `slide` minus that of the joints that slide [m]; the lesser.
+
+    A joint without limits is off by the short way round.
+    """
+    turning, sliding = _targets(spec, world.robot)
+    bounds = (("rad", spec.within, turning), ("m", spec.slide or SLIDE, sliding))
+    parts = [_part(spec.pose, world.robot, *bound) for bound in bounds if bound[-1]]
+
+    def look(moments: Moments) -> Reading:
+        return least([part(moments) for part in parts])
+
+    return look
+
+
+def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[str, float]) -> Gauge:
+    """Of joints of one unit."""
+    joints, goal = tuple(wanted), np.array(list(wanted.values()))
+    columns = robot.indices(joints)
+    endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
+
+    def look(moments: Moments) -> Reading:
+        off = moments.states.position[:, columns] - goal
+        off[:, endless] = wrapped(off[:, endless])
+        away = np.abs(off)
+
+        def say(k: int) -> str:
+            worst = int(np.argmax(away[k]))
+            far = readable(float(away[k, worst]), unit)
+            return f"joint '{joints[worst]}' is {far} from pose '{pose}'; within {readable(most, unit)}"
+
+        return reading(most - np.max(away, axis=-1), moments.times, unit=unit, scale=most, say=say)
+
+    return look
+
+
+def _targets(spec: AtPoseSpec, robot: RobotModel) -> tuple[dict[str, float], dict[str, float]]:
+    """The joints that are compared, and their values in the pose: those that turn, those that slide."""
+    pose = robot.pose(spec.pose)
+    asked = pose.joints if spec.group is None else robot.group(spec.group).joints
+    turning, sliding = {}, {}
+    for name, value in zip(pose.joints, pose.positions, strict=True):
+        joint = robot.joint(name)
+        if name in asked and joint.type != "prismatic":
+            turning[name] = value
+        elif name in asked and (spec.slide is not None or _carries_tool(robot, joint)):
+            sliding[name] = value
+    return turning, sliding
+
+
+def _carries_tool(robot: RobotModel, joint: Joint) -> bool:
+    return robot.tool is not None and robot.tool.link in robot.descendants(joint.child)
+
+
+def check(spec: AtPoseSpec, setting: Setting) -> tuple[Problem, ...]:
+    """Pose and group exist, and have joints in common."""
+    robot = setting.robot
+    problems = []
+    poses = [pose.name for pose in robot.poses]
+    if spec.pose not in poses:
+        message = f"'{spec.pose}' is not a pose of robot '{robot.name}'"
+        problems.append(Problem(("pose",), message, did_you_mean(spec.pose, poses)))
+    problems += unknown_group(robot, spec.group, ("group",))
+    if problems:
+        return tuple(problems)
+    if not any(_targets(spec, robot)):
+        of, loc = ("", "pose") if spec.group is None else (f" of group '{spec.group}'", "group")
+        slides = any(_targets(spec.model_copy(update={"slide": SLIDE}), robot))
+        hint = "of joints that slide say how near: `slide: 2 mm`" if slides else None
+        kind = "rotating joint" if slides else "joint"
+        problems.append(Problem((loc,), f"pose '{spec.pose}' names no {kind}{of}", hint))
+    return tuple(problems)
+
+
+AT_POSE = Condition(
+    name="at_pose",
+    spec=AtPoseSpec,
+    units=("rad", "m"),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: None,
+    example="at_pose: {pose: home, within: 2 deg}",
+)

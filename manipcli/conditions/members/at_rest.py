@@ -1,0 +1,59 @@
+"""`at_rest`: an object does not move."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Reading, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import cross, rotate
+from manipcli.core.units import readable
+from manipcli.model.state import body_pose
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Speed
+
+
+class AtRestSpec(Model):
+    """The object's centre moves slower than `below`."""
+
+    object: str = Field(description="A body of the scene.")
+    below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s]. Default 1 mm/s.")
+
+
+def gauge(spec: AtRestSpec, world: World) -> Gauge:
+    """`below` minus the speed [m/s] of the object's centre C over the last tick: |v_O + w x R_WO p_OC|."""
+    body = world.scene.body(spec.object)
+
+    def look(moments: Moments) -> Reading:
+        speed = np.zeros(len(moments.times))
+        if not body.fixed:
+            linear, angular = moments.body_velocity(world.scene.movable.index(body))
+            arm = rotate(body_pose(world.scene, moments.states, spec.object).quat_xyzw, body.centre)
+            speed = np.linalg.norm(linear + cross(angular, arm), axis=-1)
+
+        def say(k: int) -> str:
+            return f"'{spec.object}' moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
+
+        return reading(spec.below - speed, moments.times, unit="m/s", scale=spec.below, say=say)
+
+    return look
+
+
+def check(spec: AtRestSpec, setting: Setting) -> tuple[Problem, ...]:
+    """The body exists."""
+    return unknown_body(setting.scene, spec.object, ("object",))
+
+
+AT_REST = Condition(
+    name="at_rest",
+    spec=AtRestSpec,
+    units=("m/s",),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object,)),
+    example="at_rest: {object: cup}",
+)

@@ -1,0 +1,76 @@
+"""`energy`: the mechanical work that the joints do."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
+from manipcli.conditions.robustness import Reading, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import Array
+from manipcli.core.units import readable
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Energy
+
+
+class EnergySpec(Model):
+    """The joints have done less work than `below` since the time that is looked at began."""
+
+    below: Annotated[Energy, Field(gt=0)] = Field(description="Largest work [J].")
+    group: str | None = Field(default=None, description="Only this group's joints. Default: all that move.")
+
+
+def gauge(spec: EnergySpec, world: World) -> Gauge:
+    """`below` minus W [J], the work that the joints have done.
+
+        W = sum over joints of the integral of max(tau_j qd_j, 0) dt
+
+    by trapezoids over the control ticks, of measured efforts and velocities. Braking takes nothing from it: a drive
+    that does not recuperate gets nothing back.
+    """
+    robot = world.robot
+    columns = robot.indices(robot.joint_names if spec.group is None else robot.group(spec.group).joints)
+    done: list[tuple[float, float, float]] = []
+    """Time, power and work at the last tick."""
+
+    def look(moments: Moments) -> Reading:
+        states = moments.states
+        power = np.maximum(states.effort[:, columns] * states.velocity[:, columns], 0.0).sum(axis=-1)
+        work = _work(states.time, power, *(done[-1] if done else (float(states.time[0]), 0.0, 0.0)))
+        done[:] = [(float(states.time[-1]), float(power[-1]), float(work[-1]))]
+
+        def say(k: int) -> str:
+            return f"{readable(float(work[k]), 'J')} of {readable(spec.below, 'J')}"
+
+        return reading(spec.below - work, moments.times, unit="J", scale=spec.below, say=say)
+
+    return look
+
+
+def _work(times: Array, power: Array, time: float, last_power: float, work: float) -> Array:
+    """(T,) the integral of power since the start, going on from the last tick.
+
+    Summed one after the other, so that it does not matter where a run is cut into pieces.
+    """
+    passed = np.diff(times, prepend=time)
+    mean = (power + np.concatenate([[last_power], power[:-1]])) / 2.0
+    return np.cumsum(np.concatenate([[work], passed * mean]))[1:]
+
+
+def check(spec: EnergySpec, setting: Setting) -> tuple[Problem, ...]:
+    """The robot has the group."""
+    return unknown_group(setting.robot, spec.group, ("group",))
+
+
+ENERGY = Condition(
+    name="energy",
+    spec=EnergySpec,
+    units=("J",),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: effortless(world),
+    example="energy: {below: 50 J}",
+)

@@ -1,0 +1,139 @@
+"""`inside`, `outside`: an object is in the hollow of a container, or not."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.body_poses import centres, point_text
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Reading, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import Array, rotate_inverse
+from manipcli.core.text import did_you_mean
+from manipcli.core.units import readable
+from manipcli.model.state import WorldState, body_pose
+from manipcli.scene.scene import Interior, Scene
+from manipcli.shapes.primitives import Box, Cylinder
+from manipcli.spec.base import Model
+
+
+class InsideSpec(Model):
+    """The object's centre is inside the hollow of the container `of` (a cup, a tray), below its rim."""
+
+    object: str = Field(description="A body of the scene; its centre is what counts.")
+    of: str = Field(description="A body with a hollow: a cup or a tray.")
+
+
+class OutsideSpec(Model):
+    """The object's centre is not inside the hollow of the container `of` (a cup, a tray)."""
+
+    object: str = Field(description="A body of the scene; its centre is what counts.")
+    of: str = Field(description="A body with a hollow: a cup or a tray.")
+
+
+Spec = InsideSpec | OutsideSpec
+
+
+def gauge(spec: Spec, world: World, *, sign: float) -> Gauge:
+    """Depth [m] of the object's centre in the hollow: the distance to its nearest face, negative outside.
+
+    The faces are the hollow's walls, its floor and the plane of its rim. Outside it is minus the distance to the
+    hollow. The centre of the object's bounding box is taken, for every shape: a ball that lies on the floor of a
+    deep tray has the margin of its radius, and touching a wall takes nothing away. `outside` is the opposite. It is
+    compared, where units differ, to the greatest depth that the hollow has.
+    """
+    shape = _interior(world.scene, spec.of).shape
+    deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
+
+    def look(moments: Moments) -> Reading:
+        p_S = _in_hollow(world.scene, moments.states, spec)
+        depth = np.broadcast_to(_depth(shape, p_S), np.shape(moments.states.time))
+
+        def say(k: int) -> str:
+            far = readable(abs(float(depth[k])), "m")
+            where = f"{far} deep in '{spec.of}'" if depth[k] >= 0.0 else f"{far} outside '{spec.of}'"
+            if depth[k] < 0.0 and _over(shape, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
+                where += ", above its rim"
+            at = point_text(centres(world.scene, moments.states, spec.object), k)
+            return f"'{spec.object}' is {where}, its centre at {at}"
+
+        return reading(sign * depth, moments.times, unit="m", scale=deepest, say=say)
+
+    return look
+
+
+def _interior(scene: Scene, name: str) -> Interior:
+    interior = scene.body(name).interior
+    if interior is None:
+        raise ValueError(f"'{name}' has no inside")
+    return interior
+
+
+def _in_hollow(scene: Scene, states: WorldState, spec: Spec) -> Array:
+    """p_SC (..., 3): the object's centre in the frame in the middle of the hollow."""
+    interior = _interior(scene, spec.of)
+    X_WO = body_pose(scene, states, spec.of)
+    p_O = rotate_inverse(X_WO.quat_xyzw, centres(scene, states, spec.object) - X_WO.position)
+    return np.asarray((p_O - interior.X_OS.p) @ interior.X_OS.R)
+
+
+def _depth(shape: Cylinder | Box, p_S: Array) -> Array:
+    """Minus the signed distance of points (..., 3) to a box or cylinder centred at S.
+
+    With d the distances beyond each pair of faces: distance = |max(d, 0)| + min(max_i d_i, 0).
+    """
+    d = _beyond(shape, p_S)
+    outside = np.linalg.norm(np.maximum(d, 0.0), axis=-1)
+    return np.asarray(-(outside + np.minimum(np.max(d, axis=-1), 0.0)))
+
+
+def _beyond(shape: Cylinder | Box, p_S: Array) -> Array:
+    """How far points (..., 3) are beyond each pair of faces [m], the last of which are floor and rim."""
+    if isinstance(shape, Cylinder):
+        radial = np.hypot(p_S[..., 0], p_S[..., 1]) - shape.radius
+        return np.stack([radial, np.abs(p_S[..., 2]) - shape.length / 2.0], axis=-1)
+    return np.asarray(np.abs(p_S) - np.array(shape.size) / 2.0)
+
+
+def _over(shape: Cylinder | Box, p_S: Array) -> bool:
+    """Whether a point (3,) outside is between the walls, as one that would be inside were the container deeper."""
+    return bool(p_S[2] > 0.0 and (_beyond(shape, p_S)[:-1] <= 0.0).all())
+
+
+def check(spec: Spec, setting: Setting) -> tuple[Problem, ...]:
+    """Both bodies exist, differ, and the container has a hollow."""
+    scene = setting.scene
+    problems = [*unknown_body(scene, spec.object, ("object",)), *unknown_body(scene, spec.of, ("of",))]
+    if problems:
+        return tuple(problems)
+    container = scene.body(spec.of)
+    if container.interior is None:
+        hollow = [body.name for body in scene.bodies if body.interior is not None]
+        message = f"'{spec.of}' is a {container.kind} and has no inside"
+        problems.append(Problem(("of",), message, did_you_mean(spec.of, hollow)))
+    elif spec.of == spec.object:
+        problems.append(Problem(("of",), f"'{spec.of}' cannot be inside itself"))
+    return tuple(problems)
+
+
+INSIDE = Condition(
+    name="inside",
+    spec=InsideSpec,
+    units=("m",),
+    open=partial(gauge, sign=1.0),
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    example="inside: {object: ball, of: tray}",
+)
+OUTSIDE = Condition(
+    name="outside",
+    spec=OutsideSpec,
+    units=("m",),
+    open=partial(gauge, sign=-1.0),
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
+    example="outside: {object: ball, of: cup}",
+)

@@ -1,0 +1,153 @@
+"""`limits`: joints keep their limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
+from manipcli.conditions.robustness import Measured, Reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Share
+
+SLACK: Final = 1e-4
+"""[rad or m] An engine meets a stop at the end of a step only: 50 um behind it at 5 cm/s and 1 ms."""
+MOST_DIGITS: Final = 9
+"""With which a value and its limit are told, where they do not differ in fewer."""
+
+Quantity = Literal["position", "velocity", "effort"]
+ALL: tuple[Quantity, ...] = ("position", "velocity", "effort")
+_UNITS = {
+    "position": ("rad", "m"),
+    "velocity": ("rad/s", "m/s"),
+    "effort": ("N m", "N"),
+}
+"""Of a joint that turns, and of one that slides."""
+
+
+class LimitsSpec(Model):
+    """Measured positions, velocities and efforts stay inside the limits of the joints."""
+
+    group: str | None = Field(default=None, description="Only this group's joints. Default: all that move.")
+    of: tuple[Quantity, ...] = Field(
+        default=ALL, min_length=1, description="Which limits. Default [position, velocity, effort]."
+    )
+    spare: Annotated[Share, Field(ge=0, lt=1)] = Field(
+        default=0.0, description="Share of each limit (of half of its range, for positions) to be left. Default 0."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Bound:
+    """One limit of one joint: |value - middle| is at most `half`; `column` of position, velocity, effort abreast."""
+
+    joint: str
+    what: Quantity
+    unit: str
+    column: int
+    middle: float
+    half: float
+
+
+def gauge(spec: LimitsSpec, world: World) -> Gauge:
+    """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
+
+    The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
+    A position up to 0.1 mm or 1e-4 rad beyond its limit is at its limit, with a margin of 0: a joint that leans on its
+    stop keeps it, and engines find a stop at the end of a step only.
+    Where the engine has no physics there are no efforts: say `of: [position, velocity]`.
+    """
+    bounds = _bounds(spec, world.robot)
+    columns = [bound.column for bound in bounds]
+    middle, half = np.array([bound.middle for bound in bounds]), np.array([bound.half for bound in bounds])
+    allowed, scale = half * (1.0 - spec.spare), np.where(half > 0.0, half, 1.0)
+    slack = np.array([SLACK if bound.what == "position" and not spec.spare else 0.0 for bound in bounds])
+    units = tuple(sorted({bound.unit for bound in bounds}))
+
+    def look(moments: Moments) -> Reading:
+        states = moments.states
+        values = np.concatenate((states.position, states.velocity, states.effort), axis=1)[:, columns]
+        margins = allowed - np.abs(values - middle)
+        margins[(margins < 0.0) & (margins >= -slack)] = 0.0
+        relative = margins / scale
+        worst = np.argmin(margins if len(units) == 1 else relative, axis=1)
+        ticks = np.arange(len(worst))
+
+        def found(k: int) -> Measured:
+            j = int(worst[k])
+            one = bounds[j]
+            least, most = one.middle - float(allowed[j]), one.middle + float(allowed[j])
+            value, low, high = _apart((float(values[k, j]), least, most), one.unit)
+            text = f"{one.what} of joint '{one.joint}' is {value}; allowed {low} to {high}"
+            return Measured(float(margins[k, j]), one.unit, float(moments.times[k]), text)
+
+        everywhere = np.ones(len(ticks), dtype=bool)
+        return Reading(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
+
+    return look
+
+
+def _apart(values: tuple[float, float, float], unit: str) -> tuple[str, str, str]:
+    """A value and the two ends of what is allowed, with as many digits as it takes to see that it is at neither."""
+    value, low, high = (readable(one, unit) for one in values)
+    for digits in range(4, MOST_DIGITS + 1):
+        if value not in (low, high):
+            break
+        value, low, high = (readable(one, unit, digits=digits) for one in values)
+    return value, low, high
+
+
+def _bounds(spec: LimitsSpec, robot: RobotModel) -> list[_Bound]:
+    names = robot.joint_names if spec.group is None else robot.group(spec.group).joints
+    found = []
+    for name in names:
+        joint = robot.joint(name)
+        limits, n = joint.limits, len(robot.joint_names)
+        (column,) = robot.indices((name,))
+        symmetric = {"velocity": limits.velocity, "effort": limits.effort}
+        for k, what in enumerate(ALL):
+            unit = _UNITS[what][1 if joint.type == "prismatic" else 0]
+            if what not in spec.of:
+                continue
+            if what == "position" and limits.lower is not None and limits.upper is not None:
+                middle, half = (limits.lower + limits.upper) / 2.0, (limits.upper - limits.lower) / 2.0
+                found.append(_Bound(name, what, unit, column, middle, half))
+            most = symmetric.get(what)
+            if most is not None:
+                found.append(_Bound(name, what, unit, k * n + column, 0.0, most))
+    return found
+
+
+def check(spec: LimitsSpec, setting: Setting) -> tuple[Problem, ...]:
+    """The group exists, and one of its joints has a limit."""
+    unknown = unknown_group(setting.robot, spec.group, ("group",))
+    if not unknown and not _bounds(spec, setting.robot):
+        return (Problem((), f"no joint has a limit of its {' or '.join(spec.of)}"),)
+    return unknown
+
+
+def absent(spec: LimitsSpec, world: World) -> str | None:
+    """A limit of an effort is asked for, and nothing has efforts."""
+    reason = effortless(world)
+    if reason is None or all(bound.what != "effort" for bound in _bounds(spec, world.robot)):
+        return None
+    others = [what for what in spec.of if what != "effort"]
+    return f"{reason}; `of: [{', '.join(others)}]` asks for the rest" if others else reason
+
+
+LIMITS = Condition(
+    name="limits",
+    spec=LimitsSpec,
+    units=("rad", "m", "rad/s", "m/s", "N m", "N"),
+    open=gauge,
+    check=check,
+    absent=absent,
+    scope="always",
+    example="limits: {group: arm, of: [velocity, effort], spare: 10 %}",
+)

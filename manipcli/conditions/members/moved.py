@@ -1,0 +1,127 @@
+"""`moved`, `unmoved`: an object was displaced, or stayed, since the time that is looked at began."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from manipcli.conditions.body_poses import centres
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Reading, least, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import Array, rotation_between
+from manipcli.core.units import readable
+from manipcli.spec.base import Model, problem
+from manipcli.spec.quantity import AngleTolerance, Length
+
+
+class MovedSpec(Model):
+    """The object's centre is at least `by` away from where it was, or the object turned by at least `turn`; both where
+    both are given."""
+
+    object: str = Field(description="A body of the scene that can move.")
+    by: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="Least distance [m].")
+    turn: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
+
+    @model_validator(mode="after")
+    def _something(self) -> MovedSpec:
+        if self.by is None and self.turn is None:
+            raise problem("conflict", "say how far: `by` (a length), `turn` (an angle), or both")
+        return self
+
+
+class UnmovedSpec(Model):
+    """The object's centre is at most `within` away from where it was, and the object turned by at most `turn`."""
+
+    object: str = Field(description="A body of the scene that can move.")
+    within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
+    turn: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
+
+
+Change = tuple[Array, Array]
+"""(T,) how far the centre moved [m], and by how much the body turned [rad]."""
+
+
+def since_first(world: World, name: str) -> Callable[[Moments], Change]:
+    """How a body was displaced since the first tick that is shown."""
+    scene = world.scene
+    k = scene.movable.index(scene.body(name))
+    first: list[Change] = []
+
+    def changed(moments: Moments) -> Change:
+        centre, quat = centres(scene, moments.states, name), moments.states.body_quat_xyzw[:, k]
+        if not first:
+            first.append((centre[0].copy(), quat[0].copy()))
+        p, q = first[0]
+        return np.linalg.norm(centre - p, axis=-1), np.linalg.norm(rotation_between(q, quat), axis=-1)
+
+    return changed
+
+
+def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
+    """How far the centre is from where it was, minus `by` [m]; how far it turned, minus `turn` [rad]; the lesser."""
+    changed = since_first(world, spec.object)
+
+    def look(moments: Moments) -> Reading:
+        far, turned = changed(moments)
+        readings = []
+        if spec.by is not None:
+            text = f"at least {readable(spec.by, 'm')}"
+            say = _say(spec.object, "moved by", far, "m", text)
+            readings.append(reading(far - spec.by, moments.times, unit="m", scale=spec.by, say=say))
+        if spec.turn is not None:
+            text = f"at least {readable(spec.turn, 'rad')}"
+            say = _say(spec.object, "turned by", turned, "rad", text)
+            readings.append(reading(turned - spec.turn, moments.times, unit="rad", scale=spec.turn, say=say))
+        return least(readings)
+
+    return look
+
+
+def gauge_unmoved(spec: UnmovedSpec, world: World) -> Gauge:
+    """`within` minus the distance of the centre from where it was [m]; `turn` minus the angle of the rotation [rad]."""
+    changed = since_first(world, spec.object)
+
+    def look(moments: Moments) -> Reading:
+        far, turned = changed(moments)
+        say = _say(spec.object, "moved by", far, "m", f"at most {readable(spec.within, 'm')}")
+        readings = [reading(spec.within - far, moments.times, unit="m", scale=spec.within, say=say)]
+        if spec.turn is not None:
+            say = _say(spec.object, "turned by", turned, "rad", f"at most {readable(spec.turn, 'rad')}")
+            readings.append(reading(spec.turn - turned, moments.times, unit="rad", scale=spec.turn, say=say))
+        return least(readings)
+
+    return look
+
+
+def _say(name: str, verb: str, values: Array, unit: str, limit: str) -> Callable[[int], str]:
+    return lambda k: f"'{name}' {verb} {readable(float(values[k]), unit)}; {limit}"
+
+
+def check(spec: MovedSpec | UnmovedSpec, setting: Setting) -> tuple[Problem, ...]:
+    """The body exists and can move."""
+    return unknown_body(setting.scene, spec.object, ("object",), movable=True)
+
+
+MOVED = Condition(
+    name="moved",
+    spec=MovedSpec,
+    units=("m", "rad"),
+    open=gauge_moved,
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object,)),
+    example="moved: {object: block, by: 5 cm}",
+)
+UNMOVED = Condition(
+    name="unmoved",
+    spec=UnmovedSpec,
+    units=("m", "rad"),
+    open=gauge_unmoved,
+    check=check,
+    absent=lambda spec, world: unmoving(world, (spec.object,)),
+    scope="always",
+    example="unmoved: {object: vase, within: 2 mm, turn: 1 deg}",
+)

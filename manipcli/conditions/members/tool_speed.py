@@ -1,0 +1,75 @@
+"""`tool_speed`: the tool, or another link, moves slowly enough."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World
+from manipcli.conditions.robustness import Reading, reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import Transform
+from manipcli.core.text import did_you_mean
+from manipcli.core.units import readable
+from manipcli.model.robot import RobotModel
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import Speed
+
+
+class ToolSpeedSpec(Model):
+    """The origin of the tool frame (or of `link`) moves slower than `below`."""
+
+    below: Annotated[Speed, Field(gt=0)] = Field(description="Largest speed in the world [m/s].")
+    link: str | None = Field(default=None, description="Another link than the tool's; its origin counts.")
+
+
+def gauge(spec: ToolSpeedSpec, world: World) -> Gauge:
+    """`below` minus the speed [m/s] of the point in the world, from measured positions and velocities of the joints."""
+    link, X_LT = _frame(spec, world.robot)
+    name = "the tool" if spec.link is None else f"link '{link}'"
+
+    def look(moments: Moments) -> Reading:
+        q, v = moments.states.position, moments.states.velocity
+        velocity = world.kinematics.point_velocity
+        speed = np.linalg.norm([velocity(q[k], v[k], link, X_LT) for k in range(len(q))], axis=-1)
+
+        def say(k: int) -> str:
+            return f"{name} moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
+
+        return reading(spec.below - speed, moments.times, unit="m/s", scale=spec.below, say=say)
+
+    return look
+
+
+def _frame(spec: ToolSpeedSpec, robot: RobotModel) -> tuple[str, Transform | None]:
+    """The link, and the frame in it."""
+    if spec.link is not None:
+        return spec.link, None
+    return (robot.root, None) if robot.tool is None else (robot.tool.link, robot.tool.X_LT)
+
+
+def check(spec: ToolSpeedSpec, setting: Setting) -> tuple[Problem, ...]:
+    """The link exists; without one, the robot has a tool."""
+    robot = setting.robot
+    links = [link.name for link in robot.links]
+    if spec.link is not None and spec.link not in links:
+        message = f"'{spec.link}' is not a link of robot '{robot.name}'"
+        return (Problem(("link",), message, did_you_mean(spec.link, links)),)
+    if spec.link is None and robot.tool is None:
+        message = f"robot '{robot.name}' has no tool"
+        return (Problem((), message, "name a `link` here, or a `tool` in the robot file"),)
+    return ()
+
+
+TOOL_SPEED = Condition(
+    name="tool_speed",
+    spec=ToolSpeedSpec,
+    units=("m/s",),
+    open=gauge,
+    check=check,
+    absent=lambda spec, world: None,
+    scope="always",
+    example="tool_speed: {below: 1.5 m/s}",
+)

@@ -1,0 +1,96 @@
+"""`tracking`: the joints of a group follow their references."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_group
+from manipcli.conditions.robustness import Measured, Reading
+from manipcli.conditions.state_window import Moments
+from manipcli.core.geometry import Array, wrapped
+from manipcli.core.units import readable
+from manipcli.spec.base import Model
+from manipcli.spec.quantity import JointTolerance
+
+
+class TrackingSpec(Model):
+    """No joint of the group is further than `within` from its controller's reference."""
+
+    group: str = Field(description="A group of the robot; each of its joints must have a controller.")
+    within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
+
+
+def gauge(spec: TrackingSpec, world: World) -> Gauge:
+    """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of the joints.
+
+    A joint without limits errs the short way round. While no controller of a joint is active, nothing is said.
+    """
+    robot = world.robot
+    joints = robot.group(spec.group).joints
+    columns = robot.indices(joints)
+    endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
+    unit_of = [robot.joint(name).unit for name in joints]
+    units = tuple(sorted(set(unit_of)))
+
+    def look(moments: Moments) -> Reading:
+        reference = _references(moments, joints)
+        error = reference - moments.states.position[:, columns]
+        error[:, endless] = wrapped(error[:, endless])
+        error = np.abs(error)
+        known = ~np.isnan(reference)
+        worst = np.argmax(error, axis=1)
+        margins = spec.within - error[np.arange(len(worst)), worst]
+
+        def found(k: int) -> Measured:
+            name, unit = joints[worst[k]], unit_of[worst[k]]
+            off, within = readable(float(error[k, worst[k]]), unit), readable(spec.within, unit)
+            text = f"joint '{name}' is {off} from its reference; within {within}"
+            return Measured(float(margins[k]), unit, float(moments.times[k]), text)
+
+        idle = [f"no controller of joint '{name}' was active" for name, there in zip(joints, known.T, strict=True)
+                if not there.all()]  # fmt: skip
+        return Reading(margins, margins / spec.within, units, np.asarray(known.all(axis=1)), "".join(idle[:1]), found)
+
+    return look
+
+
+def _references(moments: Moments, joints: tuple[str, ...]) -> Array:
+    """(T, k) what the joints should follow: of each, that of the controller that is active."""
+    found = np.full((len(moments.times), len(joints)), np.nan)
+    for one in moments.references:
+        for k, name in enumerate(joints):
+            if name in one.joints:
+                position = one.position[:, one.joints.index(name)]
+                found[:, k] = np.where(np.isnan(found[:, k]), position, found[:, k])
+    return found
+
+
+def check(spec: TrackingSpec, setting: Setting) -> tuple[Problem, ...]:
+    """The robot has the group, and the group has joints."""
+    unknown = unknown_group(setting.robot, spec.group, ("group",))
+    if not unknown and not setting.robot.group(spec.group).joints:
+        return (Problem(("group",), f"group '{spec.group}' has no joints"),)
+    return unknown
+
+
+def absent(spec: TrackingSpec, world: World) -> str | None:
+    """References come true by definition, or none of one of the joints is recorded."""
+    if not world.physics:
+        return "the engine has no physics, so every reference comes true at once"
+    for name in world.robot.group(spec.group).joints:
+        if name not in world.referenced:
+            return world.unrecorded.get("references") or f"the recording holds no reference of joint '{name}'"
+    return None
+
+
+TRACKING = Condition(
+    name="tracking",
+    spec=TrackingSpec,
+    units=("rad", "m"),
+    open=gauge,
+    check=check,
+    absent=absent,
+    scope="always",
+    example="tracking: {group: arm, within: 0.05 rad}",
+)

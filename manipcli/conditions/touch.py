@@ -1,0 +1,71 @@
+"""Parts that touch, as files name them: a body, `robot` (any of its links), `robot/LINK`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manipcli.conditions.condition import Problem, Setting
+from manipcli.core.errors import Loc
+from manipcli.core.text import did_you_mean
+from manipcli.model.batch_kinematics import still_links
+from manipcli.model.state import Contact
+
+ROBOT = "robot"
+
+
+def between(pair: tuple[str, str], contact: Contact) -> bool:
+    """Whether the contact is one of the two with each other."""
+    first, second = pair
+    a, b = contact.a, contact.b
+    return (is_part(first, a) and is_part(second, b)) or (is_part(first, b) and is_part(second, a))
+
+
+def is_part(written: str, part: str) -> bool:
+    """Whether `part` of a contact is what was written, or one of its links."""
+    return written == part or (written == ROBOT and part.startswith(f"{ROBOT}/"))
+
+
+def grips(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
+    """How hard each link of the robot presses on a body [N], the hardest first."""
+    found: dict[str, float] = {}
+    for contact in contacts:
+        other = contact.b if contact.a == body else contact.a if contact.b == body else ""
+        if other.startswith(f"{ROBOT}/"):
+            found[other] = found.get(other, 0.0) + contact.force
+    return sorted(((force, link) for link, force in found.items()), reverse=True)
+
+
+def held_force(contacts: Sequence[Contact], body: str) -> float:
+    """The force [N] of the second hardest link on a body: what holds it between two; 0 where fewer touch."""
+    found = grips(contacts, body)
+    return found[1][0] if len(found) > 1 else 0.0
+
+
+def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:
+    """Empty if `name` is a body, the robot, or one of its links."""
+    bodies = tuple(body.name for body in setting.scene.bodies)
+    links = tuple(f"{ROBOT}/{link.name}" for link in setting.robot.links)
+    if name == ROBOT or name in bodies or name in links:
+        return ()
+    message = f"'{name}' is neither a body of the scene nor a part of the robot"
+    if f"{ROBOT}/{name}" in links:
+        return (Problem(loc, message, f"links are written with the robot: '{ROBOT}/{name}'"),)
+    known = links if name.startswith(f"{ROBOT}/") else (ROBOT, *bodies)
+    return (Problem(loc, message, did_you_mean(name, known)),)
+
+
+def impossible_pair(setting: Setting, pair: tuple[str, str], loc: Loc) -> tuple[Problem, ...]:
+    """Empty if both parts exist and the simulation lets them touch each other."""
+    unknown = tuple(found for k, name in enumerate(pair) for found in unknown_part(setting, name, (*loc, k)))
+    if unknown:
+        return unknown
+    if all(name.partition("/")[0] == ROBOT for name in pair):
+        message = "the robot does not collide with itself in the simulation, so nothing can be said of that"
+        return (Problem(loc, message, "leave the pair out: the planner keeps the robot off itself"),)
+    if pair[0] == pair[1]:
+        return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)
+    fixed = {body.name for body in setting.scene.bodies if body.fixed}
+    fixed |= {f"{ROBOT}/{link}" for link in still_links(setting.robot)}
+    if fixed.issuperset(pair):
+        return (Problem(loc, f"'{pair[0]}' and '{pair[1]}' are both fixed, so nothing can be said of their contact"),)
+    return ()

@@ -1,0 +1,104 @@
+"""A description file, URDF or xacro, as one expanded tree of located elements."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.text import did_you_mean, shorten
+from manipcli.description.located_xml import Element, element_of, invalid, parse_document, read_document
+from manipcli.description.packages import Packages, Unread
+
+XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro", "http://wiki.ros.org/xacro")
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """`root` is the <robot> element, expanded; `packages` finds what it names; `findings` are warnings.
+
+    `expanded`: the file is xacro, and its elements come from macros and other files.
+    """
+
+    path: Path
+    root: Element
+    packages: Packages
+    findings: tuple[Finding, ...]
+    expanded: bool = False
+
+
+def read_description(
+    path: Path,
+    *,
+    packages: Packages,
+    arguments: Mapping[str, str | int | float | bool] = {},
+    allow_env: Collection[str] = (),
+) -> Description:
+    """Reads and expands a description.
+
+    Args:
+        path: URDF or xacro; xacro is told by its name or by the namespace on its root element.
+        packages: finds the packages and files it names.
+        arguments: for `<xacro:arg>`.
+        allow_env: environment variables that `$(env NAME)` and `$(optenv NAME)` may read.
+
+    Raises:
+        InvalidInput: with file, line and column.
+    """
+    document = read_document(path)
+    top = document.documentElement
+    declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
+    findings: tuple[Finding, ...] = ()
+    expanded = path.suffix == ".xacro" or declared
+    if expanded:
+        from manipcli.description.xacro.expand import expand
+
+        words = {name: argument_text(value) for name, value in arguments.items()}
+        document, findings = expand(path, words, packages, allow_env=allow_env)
+    elif arguments:
+        names = ", ".join(arguments)
+        raise invalid("XACRO003", f"'{path.name}' is plain URDF and has no arguments; given: {names}")
+    assert document.documentElement is not None  # a document without a root element is not well-formed
+    root = element_of(document.documentElement)
+    if root.tag != "robot":
+        raise _other_format(root)
+    return Description(path=path, root=root, packages=packages, findings=findings, expanded=expanded)
+
+
+def unread_description(urdf: bytes, name: str) -> Description:
+    """An expanded description whose files nobody will read, as that in a log; messages call it `name`.
+
+    Raises:
+        InvalidInput: it is no XML.
+    """
+    root = parse_document(urdf, name).documentElement
+    assert root is not None  # a document without a root element is not well-formed
+    return Description(path=Path(name), root=element_of(root), packages=Unread(), findings=())
+
+
+_FORMATS = {
+    "sdf": "SDF",
+    "world": "SDF",
+    "model": "SDF",
+    "mujoco": "MJCF",
+    "mujocoinclude": "MJCF",
+    "COLLADA": "a Collada mesh",
+    "package": "the manifest of a ROS package",
+    "launch": "a launch file",
+}
+"""What is given in place of a URDF, by its root element."""
+
+
+def _other_format(root: Element) -> InvalidInput:
+    known = _FORMATS.get(root.tag)
+    if known is None:
+        message = f"the root element is <{shorten(root.tag)}>; a description begins with <robot>"
+        return invalid("URDF002", message, root.place, did_you_mean(root.tag, ["robot"]))
+    hint = "convert it to URDF first: its elements mean other things" if known in {"SDF", "MJCF"} else None
+    return invalid("URDF002", f"this is {known}, not URDF: the root element is <{shorten(root.tag)}>", root.place, hint)
+
+
+def argument_text(value: str | int | float | bool) -> str:
+    """An argument as xacro gets it: `true`, `0.1`, text as it is."""
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,255 @@
+"""Components of <ros2_control> that its controller manager would refuse."""
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import Final
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import did_you_mean
+from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.control_tags import ControlledJoint, controlled_joints
+from manipcli.description.lint.rigid import elements_by_name
+from manipcli.description.lint.samples import INERTIAL, LIMIT, one_joint
+from manipcli.description.located_xml import Element
+
+TYPES: Final = ("system", "actuator", "sensor")
+INTERFACES: Final = ("position", "velocity", "effort", "acceleration", "torque", "force", "current", "temperature")
+OTHER_INTERFACES: Final = (
+    "absolute_position",
+    "feedforward",
+    "proportional",
+    "integral",
+    "derivative",
+    "integral_clamp_max",
+)
+ELEMENTS: Final = ("hardware", "joint", "sensor", "gpio", "transmission")
+PARTS: Final = ("command_interface", "state_interface", "param", "limits")
+"""Of a joint, a sensor or a gpio."""
+
+
+def _joint(subject: Subject) -> Iterator[Finding]:
+    """Joints of ros2_control that are not there or do not move."""
+    written = elements_by_name(subject.description.root, "joint")
+    for joint in controlled_joints(subject):
+        if joint.name not in written:
+            message = f"ros2_control '{joint.component}': joint '{joint.name}' is not in the description"
+            yield Finding("URDF320", message, joint.element.place, did_you_mean(joint.name, list(written)))
+        elif written[joint.name].attributes.get("type") == "fixed":
+            message = f"ros2_control '{joint.component}': joint '{joint.name}' is fixed"
+            yield Finding("URDF320", message, joint.element.place, "take it out, or make the joint move")
+    for component in subject.description.root.all("ros2_control"):
+        own = [joint.attributes.get("name", "").strip() for joint in component.all("joint")]
+        for transmission in component.all("transmission"):
+            for element in transmission.all("joint"):
+                name = element.attributes.get("name", "").strip()
+                if name not in own:
+                    what = f"ros2_control '{component.attributes.get('name', '')}': joint '{name}' of transmission "
+                    message = f"{what}'{transmission.attributes.get('name', '')}' is not one of its joints"
+                    yield Finding("URDF320", message, element.place, did_you_mean(name, own))
+
+
+def _mimic(subject: Subject) -> Iterator[Finding]:
+    """`mimic="false"` at the joint of the component makes it independent there."""
+    written = elements_by_name(subject.description.root, "joint")
+    together = [(joint.component, joint.name) for joint in controlled_joints(subject)]
+    for joint in controlled_joints(subject):
+        mimic = written[joint.name].first("mimic") if joint.name in written else None
+        said = joint.element.attributes.get("mimic", "").strip()
+        what = f"ros2_control '{joint.component}': joint '{joint.name}'"
+        if mimic is None and said == "true" and joint.name in written:
+            message = f"{what} shall follow another (mimic), but the description has no <mimic> for it"
+            yield Finding("URDF321", message, joint.element.place, None)
+        if mimic is None or said == "false":
+            continue
+        target = mimic.attributes.get("joint", "").strip()
+        if joint.commands:
+            message = f"{what} follows '{target}' and has a command interface"
+            yield Finding("URDF321", message, joint.commands[0].place, "keep its state interfaces only")
+        if target in written and (joint.component, target) not in together:
+            message = f"{what} follows '{target}', which is not one of this ros2_control"
+            yield Finding("URDF321", message, joint.element.place, f"put '{target}' there too, or take it out")
+
+
+def _plugin(subject: Subject) -> Iterator[Finding]:
+    """Components of ros2_control without a plugin, name or type."""
+    for component in subject.description.root.all("ros2_control"):
+        name = component.attributes.get("name", "").strip()
+        hardware = component.first("hardware")
+        plugin = hardware.first("plugin") if hardware is not None else None
+        if not name:
+            yield Finding("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
+        if component.attributes.get("type", "").strip() not in TYPES:
+            kind = component.attributes.get("type", "")
+            message = f"ros2_control '{name}' is of type '{kind}'; expected {', '.join(TYPES)}"
+            yield Finding("URDF322", message, component.place, 'type="system"')
+        if plugin is None or not plugin.text.strip():
+            message = f"ros2_control '{name}' has no <hardware> with a <plugin>"
+            hint = "<hardware><plugin>mock_components/GenericSystem</plugin></hardware>"
+            yield Finding("URDF322", message, (hardware or component).place, hint)
+
+
+def _interface(subject: Subject) -> Iterator[Finding]:
+    """A name far from all that are known is somebody's own, which is allowed."""
+    for joint in controlled_joints(subject):
+        for interface in (*joint.commands, *joint.element.all("state_interface")):
+            name = interface.attributes.get("name", "").strip()
+            near = get_close_matches(name, INTERFACES, n=1, cutoff=0.8) if name else ["position"]
+            if name in INTERFACES or name in OTHER_INTERFACES or not near:
+                continue
+            what = f"'{name}'" if name else "no name"
+            message = f"ros2_control '{joint.component}': an interface of joint '{joint.name}' has {what}"
+            yield Finding("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
+
+
+def _element(subject: Subject) -> Iterator[Finding]:
+    """Elements that <ros2_control> does not have, and such that it has once."""
+    names: set[str] = set()
+    for component in subject.description.root.all("ros2_control"):
+        name = component.attributes.get("name", "")
+        if name.strip() and name.strip() in names:
+            yield Finding("URDF325", f"ros2_control '{name}' is there twice", component.place, "name them apart")
+        names.add(name.strip())
+        seen: set[str] = set()
+        for child in component.children:
+            if child.tag not in ELEMENTS:
+                message = f"ros2_control '{name}' has an element <{child.tag}>; expected {', '.join(ELEMENTS)}"
+                yield Finding("URDF325", message, child.place, None)
+            own = child.attributes.get("name", "").strip()
+            if child.tag == "joint" and own in seen:
+                yield Finding("URDF325", f"ros2_control '{name}' has joint '{own}' twice", child.place, None)
+            if child.tag in ("sensor", "gpio") and not own:
+                yield Finding(
+                    "URDF325", f"ros2_control '{name}': a <{child.tag}> has no name", child.place, 'name="..."'
+                )
+            seen |= {own} if child.tag == "joint" else set()
+            yield from _within(child, name)
+        if component.attributes.get("type", "").strip() == "actuator" and len(component.all("joint")) > 1:
+            message = f"ros2_control '{name}' is an actuator and has {len(component.all('joint'))} joints; expected one"
+            yield Finding("URDF325", message, component.all("joint")[1].place, 'type="system" may have several')
+        for parameter in _parameters(component):
+            if not parameter.attributes.get("name", "").strip():
+                yield Finding("URDF325", f"ros2_control '{name}': a <param> has no name", parameter.place, None)
+    yield from _commanded_twice(subject)
+
+
+def _within(element: Element, component: str) -> Iterator[Finding]:
+    """What a joint, a sensor or a gpio holds: elements that nobody reads, and interfaces that are there twice."""
+    if element.tag not in ("joint", "sensor", "gpio"):
+        return
+    what = f"ros2_control '{component}': {element.tag} '{element.attributes.get('name', '')}'"
+    seen: set[tuple[str, str]] = set()
+    for child in element.children:
+        if child.tag not in PARTS and ":" not in child.tag:
+            message = f"{what} has an element <{child.tag}>, which is ignored"
+            yield Finding("URDF325", message, child.place, did_you_mean(child.tag, PARTS, kind="known"), "warning")
+        interface = child.tag, child.attributes.get("name", "").strip()
+        if child.tag.endswith("_interface") and interface[1] and interface in seen:
+            yield Finding("URDF325", f"{what} has <{child.tag}> '{interface[1]}' twice", child.place, None)
+        seen.add(interface)
+
+
+def _commanded_twice(subject: Subject) -> Iterator[Finding]:
+    """Command interfaces of one joint in two components, and any in one that is a sensor."""
+    sensors = {
+        component.attributes.get("name", "")
+        for component in subject.description.root.all("ros2_control")
+        if component.attributes.get("type", "").strip() == "sensor"
+    }
+    owners: dict[tuple[str, str], ControlledJoint] = {}
+    for joint in controlled_joints(subject):
+        for interface in joint.commands:
+            name = interface.attributes.get("name", "").strip()
+            what = f"ros2_control '{joint.component}': command interface '{name}' of joint '{joint.name}'"
+            if joint.component in sensors:
+                hint = 'a sensor has state interfaces only; type="system" may have both'
+                yield Finding("URDF325", f"{what}, but it is a sensor", interface.place, hint)
+            owner = owners.setdefault((joint.name, name), joint)
+            if name and owner.component != joint.component:
+                message = f"{what} belongs to ros2_control '{owner.component}' already"
+                yield Finding("URDF325", message, interface.place, "one hardware commands a joint")
+
+
+def _parameters(element: Element) -> Iterator[Element]:
+    for child in element.children:
+        if child.tag == "param":
+            yield child
+        yield from _parameters(child)
+
+
+CONTROL_CHECKS: tuple[Check, ...] = (
+    Check(
+        code="URDF320",
+        name="control-joint",
+        tier="readiness",
+        severity="error",
+        summary=(
+            "A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have"
+        ),
+        reason="The controller manager refuses the whole description at start-up.",
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
+        ),
+        find=_joint,
+    ),
+    Check(
+        code="URDF321",
+        name="control-mimic",
+        tier="readiness",
+        severity="error",
+        summary="A mimic joint has a command interface of its own, or nothing to follow",
+        reason="It has no position of its own: two commands for one degree of freedom. ros2_control refuses it.",
+        bad=one_joint(
+            more='<link name="other">'
+            + INERTIAL
+            + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
+            + LIMIT
+            + '<mimic joint="j"/></joint><ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
+        ),
+        find=_mimic,
+    ),
+    Check(
+        code="URDF322",
+        name="control-plugin",
+        tier="readiness",
+        severity="error",
+        summary="A <ros2_control> states no plugin, no name, or no known type",
+        reason="The controller manager does not start with it.",
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><joint name="j"><command_interface name="position"/></joint>'
+            "</ros2_control>"
+        ),
+        find=_plugin,
+    ),
+    Check(
+        code="URDF323",
+        name="control-interface",
+        tier="readiness",
+        severity="warning",
+        summary="An interface of ros2_control has a name that no controller asks for, or none",
+        reason="Controllers ask for position, velocity, effort or acceleration by exactly these names.",
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="j"><command_interface name="postion"/></joint></ros2_control>'
+        ),
+        find=_interface,
+    ),
+    Check(
+        code="URDF325",
+        name="control-element",
+        tier="readiness",
+        severity="error",
+        summary="A <ros2_control> has an element, joint, interface or parameter that may not be there as it is",
+        reason=(
+            "Its parser knows hardware, joint, sensor, gpio and transmission, and throws at any other; what it does "
+            "not know below a joint it leaves out. A joint and an interface stand there once, an actuator has one "
+            "joint, a sensor commands nothing, and a parameter has a name."
+        ),
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="j"/><joint name="j"/></ros2_control>'
+        ),
+        find=_element,
+    ),
+)

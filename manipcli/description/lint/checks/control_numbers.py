@@ -1,0 +1,131 @@
+"""Numbers and switches of <ros2_control> that are none."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from manipcli.core.errors import Finding
+from manipcli.core.text import shorten
+from manipcli.description.elements import JointLimits
+from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.control_tags import controlled_joints
+from manipcli.description.lint.samples import one_joint
+from manipcli.description.located_xml import Element
+from manipcli.description.urdf.numbers import finite
+
+SWITCH: Final = ("true", "false", "True", "False")
+TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", "uint16", "uint32")
+
+
+def _find(subject: Subject) -> Iterator[Finding]:
+    """Numbers and switches of ros2_control that are none."""
+    for component in subject.description.root.all("ros2_control"):
+        rate = component.attributes.get("rw_rate", "1").strip()
+        if not _whole(rate):
+            message = (
+                f"ros2_control '{component.attributes.get('name', '')}': rw_rate is '{rate}'; expected a whole number"
+            )
+            yield Finding("URDF324", message, component.place, None)
+        yield from _switch(component, "is_async")
+    limits = {joint.name: joint.limits for joint in subject.parts.joints}
+    for joint in controlled_joints(subject):
+        for each in joint.element.all("limits"):
+            yield from _switch(each, "enable")
+        yield from _legacy(joint.element)
+        for interface in (*joint.commands, *joint.element.all("state_interface")):
+            yield from _interface(f"joint '{joint.name}'", interface, limits.get(joint.name, JointLimits()))
+
+
+def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[Finding]:
+    kind = interface.attributes.get("data_type", "double").strip()
+    if kind not in TYPES:
+        message = f"{joint}: an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
+        yield Finding("URDF324", message, interface.place, None, "warning")
+    for each in interface.all("limits"):
+        yield from _switch(each, "enable")
+    size = interface.attributes.get("size", "1").strip()
+    if not _whole(size):
+        message = f"{joint}: the size of an interface is '{size}'; expected a whole number"
+        yield Finding("URDF324", message, interface.place, None)
+    values, wrong = _parameters(joint, interface)
+    yield from wrong
+    if "min" in values and "max" in values and values["min"] > values["max"]:
+        message = f"{joint}: min {values['min']:g} is above max {values['max']:g}"
+        yield Finding("URDF324", message, interface.place, None)
+    if interface.attributes.get("name") != "position":
+        return
+    lower, upper = limits.range
+    for key, beyond in (("min", values.get("min", lower) > upper), ("max", values.get("max", upper) < lower)):
+        if beyond and interface.tag == "command_interface":
+            message = f"{joint}: {key} {values[key]:g} leaves nothing of its limits {lower:g} to {upper:g}"
+            yield Finding("URDF324", message, interface.place, "it narrows those of <limit>, in rad or m")
+    start = values.get("initial_value")
+    if start is None:
+        return
+    if not lower - 1e-9 <= start <= upper + 1e-9:
+        message = f"{joint}: the initial position {start:g} is outside of its limits"
+        hint = f"limits: {lower:g} to {upper:g}" if None not in (limits.lower, limits.upper) else None
+        yield Finding("URDF324", message, interface.place, hint, "warning")
+
+
+def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[Finding]]:
+    """The numbers that an interface states, and what is wrong with the others."""
+    values: dict[str, float] = {}
+    wrong = []
+    for parameter in interface.all("param"):
+        key, text = parameter.attributes.get("name", ""), parameter.text.strip()
+        value = finite(text)
+        if key not in ("min", "max", "initial_value"):
+            continue
+        if value is not None:
+            values[key] = value
+        elif text:
+            message = f"{joint}: '{shorten(text)}' is no finite number for {key}"
+            wrong.append(Finding("URDF324", message, parameter.place, None))
+        elif key != "initial_value":  # an empty one is common, and counts as none
+            message = f'{joint}: <param name="{key}"> is empty; expected a number'
+            wrong.append(Finding("URDF324", message, parameter.place, "state it, or take it out"))
+    return values, wrong
+
+
+def _switch(element: Element, attribute: str) -> Iterator[Finding]:
+    said = element.attributes.get(attribute, "true").strip()
+    if said not in SWITCH:
+        message = f"<{element.tag}>: {attribute} is '{shorten(said)}'; expected true or false"
+        yield Finding("URDF324", message, element.place, None)
+
+
+def _legacy(joint: Element) -> Iterator[Finding]:
+    """<param name="multiplier"> and "offset" of a joint that follows another by <param name="mimic">."""
+    for parameter in joint.all("param"):
+        key, said = parameter.attributes.get("name", "").strip(), parameter.text.strip()
+        if key in ("multiplier", "offset") and finite(said) is None:
+            name = joint.attributes.get("name", "").strip()
+            message = f"joint '{name}': '{shorten(said)}' is no finite number for {key}"
+            yield Finding("URDF324", message, parameter.place, None)
+
+
+def _whole(text: str) -> bool:
+    """Of digits alone and above 0, whatever the locale."""
+    return text.isascii() and text.isdigit() and int(text) > 0
+
+
+CONTROL_NUMBER_CHECKS: tuple[Check, ...] = (
+    Check(
+        code="URDF324",
+        name="control-number",
+        tier="readiness",
+        severity="error",
+        summary="A number or switch in <ros2_control> cannot be read, or contradicts the limits",
+        reason=(
+            "ros2_control takes its default instead, without a word; an initial position outside of the limits "
+            "starts the robot where it cannot be."
+        ),
+        bad=one_joint(
+            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
+            '<joint name="j">'
+            '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
+            "</ros2_control>"
+        ),
+        find=_find,
+    ),
+)

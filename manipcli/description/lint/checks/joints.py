@@ -1,0 +1,225 @@
+"""Axes, limits and mimics of joints that do not say what was meant."""
+
+from collections.abc import Iterator
+from math import radians
+from typing import Final
+
+from manipcli.core.errors import Finding
+from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.rigid import elements_by_name
+from manipcli.description.lint.samples import INERTIAL, LIMIT, one_joint
+from manipcli.description.urdf.numbers import finite
+
+MANY_TURNS: Final = 20.0
+"""[rad]: more than three turns."""
+FAR_SLIDE: Final = 20.0
+"""[m]"""
+MIMIC_TOLERANCE: Final = 0.02
+"""Of the range: descriptions round their numbers."""
+
+
+def _fixed_axis(subject: Subject) -> Iterator[Finding]:
+    """Axes and mimics of fixed joints."""
+    for joint in subject.description.root.all("joint"):
+        if joint.attributes.get("type") != "fixed":
+            continue
+        what = f"joint '{joint.attributes.get('name', '')}' is fixed; its"
+        axis, mimic = joint.first("axis"), joint.first("mimic")
+        if axis is not None:
+            yield Finding("URDF104", f"{what} axis means nothing", axis.place, None, "note")
+        if mimic is not None:
+            message = f"{what} <mimic> of '{mimic.attributes.get('joint', '')}' means nothing"
+            yield Finding("URDF104", message, mimic.place, "make the joint move, or delete <mimic>", "warning")
+
+
+def _default_axis(subject: Subject) -> Iterator[Finding]:
+    """Moving joints without an axis."""
+    for joint in subject.description.root.all("joint"):
+        axis = joint.first("axis")
+        if joint.attributes.get("type") in ("revolute", "continuous", "prismatic") and (
+            axis is None or "xyz" not in axis.attributes
+        ):
+            message = f"joint '{joint.attributes.get('name', '')}' states no axis: it moves about or along x"
+            yield Finding("URDF105", message, joint.place, '<axis xyz="..."/>', "note")
+
+
+def _continuous_limits(subject: Subject) -> Iterator[Finding]:
+    """Limits of position on continuous joints."""
+    for joint in subject.description.root.all("joint"):
+        limit = joint.first("limit")
+        if limit is None or joint.attributes.get("type") != "continuous":
+            continue
+        stated = [
+            key for key in ("lower", "upper") if finite(limit.attributes.get(key, "0").strip()) not in (0.0, None)
+        ]
+        if stated:
+            shown = " and ".join(f"{key}={limit.attributes[key].strip()}" for key in stated)
+            message = f"joint '{joint.attributes.get('name', '')}' is continuous; {shown} is ignored"
+            yield Finding("URDF106", message, limit.place, "make it revolute where the limits are meant", "note")
+
+
+def _safety_limits(subject: Subject) -> Iterator[Finding]:
+    """Soft limits that do not fit the limits."""
+    written = elements_by_name(subject.description.root, "joint")
+    for joint in subject.parts.joints:
+        safety = written[joint.name].first("safety_controller") if joint.name in written else None
+        if safety is None or joint.type not in ("revolute", "prismatic"):
+            continue
+        soft = [finite(safety.attributes.get(f"soft_{side}_limit", "0").strip()) for side in ("lower", "upper")]
+        lower, upper = soft
+        limits = joint.limits
+        if lower is None or upper is None or limits.lower is None or limits.upper is None or lower == upper == 0.0:
+            continue
+        if lower > upper:
+            message = f"joint '{joint.name}': the soft lower limit {lower:g} is above the soft upper limit {upper:g}"
+        elif lower < limits.lower - 1e-9 or upper > limits.upper + 1e-9:
+            message = (
+                f"joint '{joint.name}': the soft limits {lower:g} to {upper:g} are not inside of the limits "
+                f"{limits.lower:g} to {limits.upper:g}"
+            )
+        else:
+            continue
+        yield Finding("URDF107", message, safety.place, "soft limits lie inside of the limits", "warning")
+
+
+def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
+    """Limits of angle that look like degrees, and of way that look like millimetres."""
+    written = elements_by_name(subject.description.root, "joint")
+    for joint in subject.parts.joints:
+        lower, upper = joint.limits.lower or 0.0, joint.limits.upper or 0.0
+        element = written[joint.name]
+        place = (element.first("limit") or element).place
+        most = max(abs(lower), abs(upper))
+        if joint.type == "prismatic" and most > FAR_SLIDE:
+            message = f"joint '{joint.name}' slides from {lower:g} to {upper:g} m: are these millimetres?"
+            hint = f'lower="{lower / 1000.0:g}" upper="{upper / 1000.0:g}"'
+            yield Finding("URDF109", message, place, hint, "warning")
+        if joint.type != "revolute" or most <= MANY_TURNS or most > 720.0:
+            continue
+        message = f"joint '{joint.name}' turns from {lower:g} to {upper:g} rad: are these degrees?"
+        hint = f'lower="{radians(lower):.4f}" upper="{radians(upper):.4f}"; many turns: type continuous'
+        yield Finding("URDF109", message, place, hint, "warning")
+
+
+def _zero_outside(subject: Subject) -> Iterator[Finding]:
+    """Joints for which zero is outside of the limits."""
+    written = elements_by_name(subject.description.root, "joint")
+    for joint in subject.parts.joints:
+        lower, upper = joint.limits.lower, joint.limits.upper
+        if joint.independent and lower is not None and upper is not None and not lower <= 0.0 <= upper:
+            message = f"joint '{joint.name}' moves from {lower:g} to {upper:g}: zero is outside"
+            element = written[joint.name]
+            place = (element.first("limit") or element).place
+            yield Finding("URDF334", message, place, "state a named pose in the robot file", "note")
+
+
+def _mimic_limits(subject: Subject) -> Iterator[Finding]:
+    """Mimic joints that cannot follow."""
+    joints = {joint.name: joint for joint in subject.parts.joints}
+    written = elements_by_name(subject.description.root, "joint")
+    for joint in subject.parts.joints:
+        mimic, own = joint.mimic, joint.limits
+        if mimic is None or mimic.joint not in joints or own.lower is None or own.upper is None:
+            continue
+        leader = joints[mimic.joint].limits
+        if leader.lower is None or leader.upper is None:
+            continue
+        ends = sorted(mimic.multiplier * end + mimic.offset for end in (leader.lower, leader.upper))
+        slack = MIMIC_TOLERANCE * max(own.upper - own.lower, ends[1] - ends[0])
+        if ends[0] >= own.lower - slack and ends[1] <= own.upper + slack:
+            continue
+        message = (
+            f"joint '{joint.name}' follows '{mimic.joint}' from {ends[0]:.4g} to {ends[1]:.4g} "
+            f"and has limits {own.lower:.4g} to {own.upper:.4g}"
+        )
+        element = written[joint.name]
+        yield Finding("URDF335", message, (element.first("limit") or element).place, "widen them", "warning")
+
+
+JOINT_CHECKS: tuple[Check, ...] = (
+    Check(
+        code="URDF104",
+        name="fixed-axis",
+        tier="physics",
+        severity="warning",
+        summary="A fixed joint has an axis, or follows another",
+        reason="It means nothing; mostly the joint moved once. What should follow another joint stands still.",
+        bad=one_joint('<axis xyz="0 0 1"/><mimic joint="k"/>', kind="fixed"),
+        find=_fixed_axis,
+    ),
+    Check(
+        code="URDF105",
+        name="default-axis",
+        tier="physics",
+        severity="note",
+        summary="A moving joint has no axis; x is used",
+        reason="URDF says x; whoever meant z does not see it before the robot moves.",
+        bad=one_joint(),
+        find=_default_axis,
+    ),
+    Check(
+        code="URDF106",
+        name="continuous-limits",
+        tier="physics",
+        severity="note",
+        summary="A continuous joint states lower and upper limits",
+        reason="They are ignored: a joint with limits is revolute.",
+        bad=one_joint(kind="continuous"),
+        find=_continuous_limits,
+    ),
+    Check(
+        code="URDF107",
+        name="safety-limits",
+        tier="physics",
+        severity="warning",
+        summary="The soft limits of a safety_controller lie outside of the limits, or cross",
+        reason=(
+            "Soft limits are there to slow a joint before its end; outside of the limits they never act, and the joint "
+            "meets its hard limit at full speed."
+        ),
+        bad=one_joint(LIMIT + '<safety_controller soft_lower_limit="-2" soft_upper_limit="0.9" k_velocity="1"/>'),
+        find=_safety_limits,
+    ),
+    Check(
+        code="URDF109",
+        name="limits-in-degrees",
+        tier="physics",
+        severity="warning",
+        summary="A joint has limits that look like degrees, or like millimetres",
+        reason="URDF counts in radians and metres: a limit of 180 lets a joint turn 28 times, or slide 180 m.",
+        bad=one_joint('<limit lower="-180" upper="180" velocity="1" effort="1"/>'),
+        find=_limits_in_degrees,
+    ),
+    Check(
+        code="URDF334",
+        name="zero-outside",
+        tier="readiness",
+        severity="note",
+        summary="Zero is outside of the limits of a joint",
+        reason=(
+            "Programs that start a robot with all joints at zero start it where it cannot be; a pose `home` in the "
+            "robot file says where to start."
+        ),
+        bad=one_joint('<limit lower="0.5" upper="1" velocity="1" effort="1"/>'),
+        find=_zero_outside,
+    ),
+    Check(
+        code="URDF335",
+        name="mimic-limits",
+        tier="readiness",
+        severity="warning",
+        summary="A mimic joint cannot follow its joint all the way: its own limits are narrower",
+        reason=(
+            "Either the coupling breaks at the limit or the limit does; a plan for the leading joint does not know of "
+            "it."
+        ),
+        bad=one_joint(
+            more='<link name="other">'
+            + INERTIAL
+            + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
+            + LIMIT
+            + '<mimic joint="j" multiplier="2"/></joint>'
+        ),
+        find=_mimic_limits,
+    ),
+)

@@ -1,0 +1,113 @@
+"""The one door for descriptions: read, then looked at by every check; whatever is wrong becomes a finding."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+from manipcli.core.errors import Finding, InvalidInput, Place, Severity
+from manipcli.description.description import Description, read_description
+from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.located_xml import shown_path
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.urdf import Parts, read_parts
+
+MOST_OF_A_CODE: Final = 100
+MOST: Final = 1000
+_RANK: Final[dict[Severity, int]] = {"error": 0, "warning": 1, "note": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """What is wrong with a description.
+
+    Attributes:
+        findings: in the order of files and lines; at most `MOST_OF_A_CODE` of a code and `MOST` in all.
+        left_out: how many more there are of each code, ((code, number), ...); no check tells more than `MOST`.
+        description: the expanded tree; None where there is no such tree: not XML, not a description, not expandable.
+        parts: links, joints and transmissions as far as they could be read; None where there is no tree.
+    """
+
+    findings: tuple[Finding, ...]
+    left_out: tuple[tuple[str, int], ...]
+    description: Description | None
+    parts: Parts | None
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        return tuple(finding for finding in self.findings if finding.severity == "error")
+
+
+def examine(
+    path: Path,
+    *,
+    packages: Packages,
+    arguments: Mapping[str, str | int | float | bool] = {},
+    allow_env: Collection[str] = (),
+    checks: Iterable[Check] = CHECKS,
+) -> Examination:
+    """Reads a description and makes every check. Never raises, whatever the file holds.
+
+    Args:
+        path: URDF or xacro.
+        packages: finds the packages and files it names.
+        arguments: for `<xacro:arg>`.
+        allow_env: environment variables that `$(env NAME)` and `$(optenv NAME)` may read.
+        checks: those to make; what reading finds is told in any case.
+    """
+    try:
+        description = read_description(path, packages=packages, arguments=arguments, allow_env=allow_env)
+        parts = read_parts(description)
+    except InvalidInput as error:
+        return _examination(error.findings, None, None)
+    except (RecursionError, MemoryError):
+        message = "the description is nested too deep, or too large, for this machine; this cannot be raised"
+        return _examination([Finding("URDF052", message, Place(shown_path(path), 0, 0))], None, None)
+    subject = Subject(description, parts, packages)
+    found = list(parts.findings)
+    for check in checks:
+        found += _made(check, subject)
+    return _examination(found, description, parts)
+
+
+def _made(check: Check, subject: Subject) -> list[Finding]:
+    """What a check finds. One that fails on what it is given has not let it pass."""
+    found: list[Finding] = []
+    try:
+        found.extend(islice(check.find(subject), MOST))
+    except InvalidInput as error:
+        found += error.findings
+    except Exception as error:  # noqa: BLE001  (a check that breaks must not let the file pass)
+        message = f"the check '{check.name}' came to no end: {type(error).__name__}: {error}"
+        found.append(Finding(check.code, message.replace("\n", " "), severity="error"))
+    return found
+
+
+def _examination(found: Iterable[Finding], description: Description | None, parts: Parts | None) -> Examination:
+    """Each finding once, in the order of the file, and not more than somebody reads; errors are kept first."""
+    unique = list({(finding.code, finding.message, finding.place): finding for finding in found}.values())
+    kept: list[Finding] = []
+    of_code: Counter[str] = Counter()
+    for finding in sorted(unique, key=lambda each: _RANK[each.severity]):
+        of_code[finding.code] += 1
+        if of_code[finding.code] <= MOST_OF_A_CODE and len(kept) < MOST:
+            kept.append(finding)
+    told = Counter(finding.code for finding in kept)
+    left_out = tuple((code, number - told[code]) for code, number in sorted(of_code.items()) if number > told[code])
+    main = str(description.root.place.file) if description is not None and description.root.place is not None else ""
+    kept.sort(key=lambda finding: _order(finding, main))
+    return Examination(tuple(kept), left_out, description, parts)
+
+
+def _order(finding: Finding, main: str) -> tuple[bool, bool, str, int, int, int, str]:
+    """The file itself first, then those it includes; what has no place, before all."""
+    place = finding.place
+    rank = _RANK[finding.severity]
+    if place is None:
+        return (False, False, "", 0, 0, rank, finding.code)
+    return (True, place.file != main, place.file, place.line, place.column, rank, finding.code)

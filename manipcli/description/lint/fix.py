@@ -1,0 +1,130 @@
+"""Mends what has one right answer, in the text itself: everything else in the file stays as it was written."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from xml.sax.saxutils import escape, quoteattr
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.text import shorten
+from manipcli.description.description import Description
+from manipcli.description.located_xml import Element
+from manipcli.description.packages import NotFound, Packages
+from manipcli.description.urdf.numbers import finite
+from manipcli.description.urdf.schema_table import known_elements
+from manipcli.spec.robot import UNIT_TOLERANCE
+
+_NAMES: Final = frozenset({"name", "link", "joint", "filename", "type"})
+_TAG: Final = re.compile(r"<[^\s/>]+")
+_ATTRIBUTE: Final = re.compile(r"""\s*([^\s=/>"']+)\s*=\s*("[^"]*"|'[^']*')""")
+_LINE_END: Final = re.compile("\r\n|\r|\n")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """`attribute` of the element at `place` gets `value`, for a reason."""
+
+    place: Place
+    attribute: str
+    value: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.reason}: {self.attribute}={quoteattr(shorten(self.value))}"
+
+
+def mended(path: Path, description: Description) -> tuple[bytes, tuple[Change, ...]]:
+    """The bytes of a plain URDF file with everything mended that is safe to mend, and what that was.
+
+    Axes get unit length; a robot without a name gets that of the file; blanks around names and numbers go; a mesh
+    named by an absolute path is named by its package, where that leads to the same file.
+
+    Raises:
+        InvalidInput: the file is not UTF-8.
+    """
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InvalidInput([Finding("USE042", f"'{path}' is not UTF-8; only such files are mended")]) from None
+    starts = [0, *(match.end() for match in _LINE_END.finditer(text))]
+    changes = tuple(_changes(path, description))
+    done = []
+    edits: list[tuple[int, int, str]] = []
+    for change in changes:
+        edit = _edit(text, starts, change)
+        if edit is not None:
+            edits.append(edit)
+            done.append(change)
+    for start, end, new in sorted(edits, reverse=True):
+        text = text[:start] + new + text[end:]
+    return text.encode("utf-8"), tuple(done)
+
+
+def _changes(path: Path, description: Description) -> Iterator[Change]:
+    packages = Packages(path)
+    for element, _ in known_elements(description.root):
+        place = element.place
+        if place is None:
+            continue
+        if element.tag == "robot" and not element.attributes.get("name", "").strip():
+            yield Change(place, "name", path.stem.partition(".")[0] or "robot", "the robot gets the name of the file")
+        for attribute, value in element.attributes.items():
+            new, reason = _better(element, attribute, value, packages)
+            if new != value and new:
+                yield Change(place, attribute, new, reason)
+
+
+def _better(element: Element, attribute: str, value: str, packages: Packages) -> tuple[str, str]:
+    if (element.tag, attribute) == ("axis", "xyz"):
+        return _unit(value), "the axis gets length 1"
+    if (element.tag, attribute) == ("mesh", "filename"):
+        return _portable(value.strip(), packages), "the mesh is named by its package"
+    if attribute in _NAMES:
+        return value.strip(), "blanks around a name go"
+    words = value.split()
+    return (" ".join(words) if all(finite(word) is not None for word in words) else value), "blanks go"
+
+
+def _unit(text: str) -> str:
+    values = [finite(word) for word in text.split()[:4]]
+    if len(values) != 3 or None in values:
+        return text
+    numbers = [value for value in values if value is not None]
+    length = math.hypot(*numbers)
+    if not 1e-9 < length < 1e9 or abs(length - 1.0) <= UNIT_TOLERANCE:
+        return " ".join(text.split())
+    return " ".join(f"{value / length + 0.0:.15g}" for value in numbers)
+
+
+def _portable(uri: str, packages: Packages) -> str:
+    if not (uri.startswith("file://") or Path(uri).is_absolute()):
+        return uri
+    try:
+        path = packages.resolve(uri)
+        new = packages.portable(path)
+        return new if packages.resolve(new) == path else uri
+    except NotFound:
+        return uri
+
+
+def _edit(text: str, starts: list[int], change: Change) -> tuple[int, int, str] | None:
+    """Where the value stands in the text, and what to put there; None where it cannot be told for sure."""
+    if not 0 < change.place.line <= len(starts):
+        return None
+    at = starts[change.place.line - 1] + change.place.column - 1
+    tag = _TAG.match(text, at)
+    if tag is None:
+        return None
+    at = tag.end()
+    while (found := _ATTRIBUTE.match(text, at)) is not None:
+        if found[1] == change.attribute:
+            return found.start(2) + 1, found.end(2) - 1, escape(change.value, {'"': "&quot;", "'": "&apos;"})
+        at = found.end()
+    new = f" {change.attribute}={quoteattr(change.value)}"
+    return tag.end(), tag.end(), new

@@ -1,0 +1,85 @@
+"""What moves as one: links joined by fixed joints; and how far the shapes of a link reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.description.elements import Joint, Link
+from manipcli.description.located_xml import Element
+from manipcli.description.urdf.urdf import Parts
+from manipcli.shapes.mesh_facts import mesh_facts, scaled_box
+from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape
+
+LARGEST = 1e9
+"""[m]: a shape beyond is not measured."""
+
+
+def moved_bodies(parts: Parts) -> Iterator[tuple[Joint, tuple[str, ...]]]:
+    """Each moving joint with the names of the links that it moves as one: its child and what is fixed to it."""
+    fixed: dict[str, list[str]] = {}
+    for joint in parts.joints:
+        if not joint.moves:
+            fixed.setdefault(joint.parent, []).append(joint.child)
+    for joint in parts.joints:
+        if joint.moves:
+            body = [joint.child]
+            for link in body:
+                body += [child for child in fixed.get(link, ()) if child not in body]
+            yield joint, tuple(body)
+
+
+def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
+    """The elements of a tag directly below <robot>, by name; the first of several."""
+    found: dict[str, Element] = {}
+    for element in root.all(tag):
+        found.setdefault(element.attributes.get("name", "").strip(), element)
+    return found
+
+
+def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
+    """Lowest and highest corner (3,) [m] of a box about a link's collision shapes, else its visuals, in the link.
+
+    None where `element`, which describes the link, has neither, or one that could not be read, or is beyond all bounds.
+    """
+    for tag, shapes in (("collision", link.collisions), ("visual", link.visuals)):
+        written = len(element.all(tag))
+        if written:
+            box = box_about(shapes) if len(shapes) >= written else None
+            return box if box is not None and max(map(abs, (*box[0], *box[1]))) < LARGEST else None
+    return None
+
+
+@np.errstate(all="ignore")
+def box_about(geometries: Sequence[Geometry]) -> tuple[Array, Array] | None:
+    """A box about shapes, along the axes of the frame they are placed in: of each shape's own box, so not tight."""
+    boxes = []
+    for geometry in geometries:
+        own = _box(geometry.shape)
+        if own is None:
+            return None
+        low, high = own
+        centre, half = geometry.X_LS.apply((low + high) / 2.0), np.abs(geometry.X_LS.R) @ ((high - low) / 2.0)
+        boxes.append((centre - half, centre + half))
+    if not boxes:
+        return None
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def _box(shape: Shape) -> tuple[Array, Array] | None:
+    if isinstance(shape, Mesh):
+        try:
+            facts = mesh_facts(shape.path)
+        except UnusableMesh:
+            return None
+        return scaled_box(facts.low, facts.high, shape.scale)
+    if isinstance(shape, Box):
+        half = np.array(shape.size) / 2.0
+    elif isinstance(shape, Cylinder):
+        half = np.array([shape.radius, shape.radius, shape.length / 2.0])
+    else:
+        half = np.full(3, shape.radius)
+    return -half, half

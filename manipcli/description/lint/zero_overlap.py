@@ -1,0 +1,135 @@
+"""Which links of a description overlap with every joint at zero, or at its limit nearest to zero."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.description.elements import Joint
+from manipcli.description.lint.rigid import box_about, moved_bodies
+from manipcli.description.urdf.urdf import Parts
+from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.mesh import read_mesh
+from manipcli.shapes.primitives import Geometry, Mesh
+
+if TYPE_CHECKING:
+    import coal
+
+TOLERANCE: Final = 0.002
+"""Depth [m] up to which shapes count as touching: descriptions are drawn without a gap."""
+MOST_SHAPES: Final = 400
+MOST_TRIANGLES: Final = 100_000
+"""A mesh of more is not looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A collision shape in the frame of the root; `body`: number of the links that move as one."""
+
+    link: str
+    body: int
+    X_WS: Transform
+    geometry: Geometry
+    low: Array
+    high: Array
+
+
+def overlaps_at_zero(parts: Parts) -> Iterator[tuple[str, str, float]]:
+    """Pairs of links that no joint joins directly, and the depth [m] of their overlap; each pair once.
+
+    Shapes are compared exactly: where the hulls of meshes overlap, their triangles must meet, too.
+    """
+    if not parts.root or parts.errors:
+        return
+    bodies = dict.fromkeys((link.name for link in parts.links), 0)
+    for number, (_, links) in enumerate(moved_bodies(parts), start=1):
+        bodies.update(dict.fromkeys(links, number))
+    near = {frozenset((bodies[joint.parent], bodies[joint.child])) for joint in parts.joints}
+    shapes = _placed(parts, bodies)
+    if len(shapes) > MOST_SHAPES:
+        return
+    told: set[frozenset[str]] = set()
+    for i, a in enumerate(shapes):
+        for b in shapes[i + 1 :]:
+            pair = frozenset((a.link, b.link))
+            if a.body == b.body or frozenset((a.body, b.body)) in near or pair in told:
+                continue
+            if bool(np.any(np.minimum(a.high, b.high) - np.maximum(a.low, b.low) < TOLERANCE)):
+                continue
+            depth = _depth(a, b)
+            if depth > TOLERANCE:
+                told.add(pair)
+                yield a.link, b.link, depth
+
+
+def _placed(parts: Parts, bodies: dict[str, int]) -> list[_Placed]:
+    X_WL = {parts.root: Transform.identity()}
+    for joint in parts.joints:
+        X_WL[joint.child] = X_WL[joint.parent] @ joint.X_PJ @ _at_zero(joint)
+    found = []
+    for link in parts.links:
+        for geometry in link.collisions:
+            X_WS = X_WL[link.name] @ geometry.X_LS
+            box = box_about([Geometry(X_LS=X_WS, shape=geometry.shape)])
+            if box is not None:
+                found.append(_Placed(link.name, bodies[link.name], X_WS, geometry, *box))
+    return found
+
+
+def _at_zero(joint: Joint) -> Transform:
+    """How far the joint has moved, (joint frame to child): not at all, but where zero is outside of its limits."""
+    if not joint.independent:
+        return Transform.identity()
+    q = joint.limits.nearest(0.0)
+    if q == 0.0:
+        return Transform.identity()
+    if joint.type == "prismatic":
+        return Transform.of(xyz=joint.axis * q)
+    return Transform.of(quat_xyzw=[*(joint.axis * np.sin(q / 2.0)), np.cos(q / 2.0)])
+
+
+def _depth(a: _Placed, b: _Placed) -> float:
+    """How deep two shapes are in each other [m]; 0 when apart."""
+    import coal
+
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    placed = [coal.Transform3s(np.array(each.X_WS.R), np.array(each.X_WS.p)) for each in (a, b)]
+    try:
+        shapes = [coal_shape(each.geometry.shape) for each in (a, b)]
+    except ValueError:
+        return 0.0
+    coal.distance(shapes[0], placed[0], shapes[1], placed[1], request, result)
+    depth = -float(result.min_distance)
+    if depth <= TOLERANCE or not any(isinstance(each.geometry.shape, Mesh) for each in (a, b)):
+        return max(0.0, depth)
+    exact = [_triangles(each.geometry) for each in (a, b)]
+    if any(shape is None for shape in exact):
+        return 0.0
+    met = coal.CollisionResult()
+    coal.collide(exact[0], placed[0], exact[1], placed[1], coal.CollisionRequest(), met)
+    return depth if met.isCollision() else 0.0
+
+
+def _triangles(geometry: Geometry) -> coal.CollisionGeometry | None:
+    """The surface of a mesh as it is, not its hull; None for one of too many triangles."""
+    import coal
+
+    shape = geometry.shape
+    if not isinstance(shape, Mesh):
+        return coal_shape(shape)
+    mesh = read_mesh(shape.path)
+    if len(mesh.faces) > MOST_TRIANGLES:
+        return None
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(mesh.faces), len(mesh.vertices))
+    points = coal.StdVec_Vec3s()
+    points.extend(list(mesh.vertices * np.array(shape.scale)))
+    triangles = coal.StdVec_Triangle()
+    triangles.extend([coal.Triangle(*row) for row in mesh.faces.tolist()])
+    model.addSubModel(points, triangles)
+    model.endModel()
+    return model

@@ -1,0 +1,225 @@
+"""URDF that we write ourselves: numbers printed exactly, short lines, nothing but what is understood.
+
+PyBullet cuts lines at 8191 bytes without a word, reads what is no number as 0, and gives a link without an inertial
+a mass of 1 kg; a text of ours holds none of that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Array, Transform
+from manipcli.description.elements import Inertial, Joint, Link, TransmissionTag
+from manipcli.description.urdf.joint import UNBOUNDED
+from manipcli.model.robot import RobotModel
+from manipcli.shapes.mesh_files import clean_mesh
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
+
+MAX_LINE = 4096
+"""Bytes; no line that is written is longer."""
+NUDGE = 1e-6
+"""Relative: how far an engine's inertia is moved inside of the triangle inequality where rounding left it outside."""
+
+
+def portable_urdf(
+    name: str, links: Sequence[Link], joints: Sequence[Joint], transmissions: Sequence[TransmissionTag]
+) -> str:
+    """The whole description as text with `package://` meshes; reading it again gives the same links and joints."""
+    lines = _head(name)
+    for link in links:
+        lines += _link(link, lambda mesh: mesh.uri)
+    for joint in joints:
+        lines += _joint(joint)
+    for tag in transmissions:
+        lines += _transmission(tag)
+    return _text(lines)
+
+
+def engine_urdf(robot: RobotModel, folder: Path) -> str:
+    """What a physics engine reads: inertials, collision shapes, joints; meshes as files of ours, never those of users.
+
+    A link without an inertial is written with mass 0. Limits are those of the model, robot file included; a mimic joint
+    is an ordinary joint here.
+
+    Args:
+        robot: the robot.
+        folder: takes the files of its meshes; to be kept until the engine has read them.
+
+    Raises:
+        InvalidInput: a joint moves a link without mass, a line would be too long, or a collision mesh is damaged.
+    """
+    massless = massless_links(robot, "URDF040")
+    if massless:
+        raise InvalidInput(massless)
+    lines = _head(robot.name)
+    for link in robot.links:
+        inertial = link.inertial or MASSLESS
+        inertial = dataclasses.replace(inertial, inertia=inside_triangle(inertial.inertia))
+        simulated = dataclasses.replace(link, inertial=inertial, visuals=())
+        lines += _link(simulated, lambda mesh: str(clean_mesh(mesh, folder)))
+    for joint in robot.joints:
+        # Bullet would take greatest numbers for limits.
+        free = joint.type == "revolute" and joint.limits.lower is None and joint.limits.upper is None
+        lines += _joint(dataclasses.replace(joint, type="continuous") if free else joint)
+    return _text(lines)
+
+
+def body_urdf(shapes: Sequence[Geometry], inertial: Inertial, folder: Path) -> str:
+    """What a physics engine reads of one rigid body: its shapes and its inertia; `folder` as in `engine_urdf`."""
+    link = Link(name="body", inertial=inertial, visuals=(), collisions=tuple(shapes))
+    return _text([*_head("body"), *_link(link, lambda mesh: str(clean_mesh(mesh, folder)))])
+
+
+MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)))
+
+
+def massless_joints(robot: RobotModel) -> tuple[str, ...]:
+    """Moving joints whose child link, with all that is fixed to it, has no mass."""
+    massive = {link.name for link in robot.links if link.inertial is not None}
+    for joint in reversed(robot.joints):  # children come after parents
+        if joint.type == "fixed" and joint.child in massive:
+            massive.add(joint.parent)
+    return tuple(joint.name for joint in robot.moving_joints if joint.child not in massive)
+
+
+def massless_links(robot: RobotModel, code: str) -> tuple[Finding, ...]:
+    """What `massless_joints` move, each at its place in the description: no engine with physics can hold it."""
+    found = []
+    for name in massless_joints(robot):
+        link = robot.link(robot.joint(name).child)
+        message = f"link '{link.name}', which joint '{name}' moves, has no mass, nor has what is fixed to it"
+        hint = "give it an <inertial> with a mass, or use an engine without physics"
+        found.append(Finding(code, message, link.place, hint))
+    return tuple(found)
+
+
+def _head(name: str) -> list[str]:
+    return ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(name)}>"]
+
+
+def _text(lines: list[str]) -> str:
+    lines.append("</robot>")
+    for line in lines:
+        if len(line.encode()) > MAX_LINE:
+            message = f"a name or path is too long: {line.strip()[:120]}..."
+            raise InvalidInput([Finding(code="URDF041", message=message)])
+    return "\n".join(lines) + "\n"
+
+
+@functools.lru_cache(maxsize=4096)
+def number(value: float) -> str:
+    """Shortest text that reads back as the same double; no '-0.0'."""
+    return repr(float(value) + 0.0)
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    return " ".join(number(float(value)) for value in values)
+
+
+def _origin(X: Transform, indent: str) -> list[str]:
+    xyz, rpy = X.p, X.rpy
+    if not xyz.any() and not rpy.any():
+        return []
+    return [f'{indent}<origin xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"/>']
+
+
+FileOf = Callable[[Mesh], str]
+"""What stands in the description for the file of a mesh."""
+
+
+def _link(link: Link, file_of: FileOf) -> list[str]:
+    lines = [f"  <link name={quoteattr(link.name)}>"]
+    inertial = link.inertial
+    if inertial is not None:
+        I = inertial.inertia  # noqa: E741  (the inertia matrix)
+        lines += ["    <inertial>", *_origin(inertial.X_LI, "      ")]
+        lines.append(f'      <mass value="{number(inertial.mass)}"/>')
+        moments = {"ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2]}
+        pairs = " ".join(f'{key}="{number(float(value))}"' for key, value in moments.items())
+        lines += [f"      <inertia {pairs}/>", "    </inertial>"]
+    for tag, geometries in (("visual", link.visuals), ("collision", link.collisions)):
+        for geometry in geometries:
+            lines += _geometry(tag, geometry, file_of)
+    return [*lines, "  </link>"]
+
+
+def inside_triangle(inertia: Array) -> Array:
+    """`inertia` (3, 3), or where a principal moment exceeds the sum of the others by rounding, one just inside.
+
+    Bullet takes a link whose moments break the inequality by one bit for one without inertia.
+    """
+    principal, R = np.linalg.eigh(inertia)
+    excess = principal[2] - (principal[0] + principal[1]) * (1.0 - NUDGE)
+    if excess <= 0.0:
+        return inertia
+    principal[:2] += excess / 2.0 + NUDGE * principal[2]
+    return np.asarray(R @ np.diag(principal) @ R.T)
+
+
+def _geometry(tag: str, geometry: Geometry, file_of: FileOf) -> list[str]:
+    lines = [f"    <{tag}>", *_origin(geometry.X_LS, "      ")]
+    lines.append(f"      <geometry>{_shape(geometry.shape, file_of)}</geometry>")
+    if geometry.rgba is not None:
+        # PyBullet gives every material of one name the first one's colour, so the name says the colour.
+        name = "rgba_" + "_".join(number(value) for value in geometry.rgba)
+        lines.append(f'      <material name="{name}"><color rgba="{_numbers(geometry.rgba)}"/></material>')
+    return [*lines, f"    </{tag}>"]
+
+
+def _shape(shape: Shape, file_of: FileOf) -> str:
+    match shape:
+        case Box(size):
+            return f'<box size="{_numbers(size)}"/>'
+        case Sphere(radius):
+            return f'<sphere radius="{number(radius)}"/>'
+        case Cylinder(radius, length):
+            return f'<cylinder radius="{number(radius)}" length="{number(length)}"/>'
+        case Mesh(scale=scale):
+            return f'<mesh filename={quoteattr(file_of(shape))} scale="{_numbers(scale)}"/>'
+
+
+def _joint(joint: Joint) -> list[str]:
+    lines = [f'  <joint name={quoteattr(joint.name)} type="{joint.type}">', *_origin(joint.X_PJ, "    ")]
+    lines.append(f"    <parent link={quoteattr(joint.parent)}/><child link={quoteattr(joint.child)}/>")
+    if joint.moves:
+        lines.append(f'    <axis xyz="{_numbers(joint.axis)}"/>')
+        limits = joint.limits
+        lower, upper = limits.lower, limits.upper
+        if joint.type != "continuous":
+            lower, upper = (-UNBOUNDED if lower is None else lower), (UNBOUNDED if upper is None else upper)
+        stated = {"lower": lower, "upper": upper, "velocity": limits.velocity, "effort": limits.effort}
+        written = " ".join(f'{key}="{number(value)}"' for key, value in stated.items() if value is not None)
+        lines += [f"    <limit {written}/>"] if written else []
+        if joint.damping or joint.friction:
+            lines.append(f'    <dynamics damping="{number(joint.damping)}" friction="{number(joint.friction)}"/>')
+        if limits.soft is not None:
+            soft = limits.soft
+            ends = {"soft_lower_limit": soft.lower, "soft_upper_limit": soft.upper}
+            gains = {"k_position": soft.k_position, "k_velocity": soft.k_velocity}
+            written = " ".join(f'{key}="{number(value)}"' for key, value in (ends | gains).items() if value is not None)
+            lines.append(f"    <safety_controller {written}/>")
+        if joint.mimic is not None:
+            mimic = joint.mimic
+            ratio = f'multiplier="{number(mimic.multiplier)}" offset="{number(mimic.offset)}"'
+            lines.append(f"    <mimic joint={quoteattr(mimic.joint)} {ratio}/>")
+    return [*lines, "  </joint>"]
+
+
+def _transmission(tag: TransmissionTag) -> list[str]:
+    lines = [f"  <transmission name={quoteattr(tag.name)}>", f"    <type>transmission_interface/{tag.type}</type>"]
+    for k, (name, reduction, offset) in enumerate(
+        zip(tag.joints, tag.joint_reductions, tag.joint_offsets, strict=True), start=1
+    ):
+        numbers = f"<offset>{number(offset)}</offset><mechanicalReduction>{number(reduction)}</mechanicalReduction>"
+        lines.append(f"    <joint name={quoteattr(name)}><role>joint{k}</role>{numbers}</joint>")
+    for k, (name, reduction) in enumerate(zip(tag.actuators, tag.actuator_reductions, strict=True), start=1):
+        numbers = f"<mechanicalReduction>{number(reduction)}</mechanicalReduction>"
+        lines.append(f"    <actuator name={quoteattr(name)}><role>actuator{k}</role>{numbers}</actuator>")
+    return [*lines, "  </transmission>"]

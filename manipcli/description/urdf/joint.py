@@ -1,0 +1,247 @@
+"""<joint> and <transmission>."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+from collections.abc import Collection
+from typing import Final, Literal
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.core.text import shorten
+from manipcli.description.elements import Joint, JointLimits, JointType, Mimic, SoftLimits, TransmissionTag
+from manipcli.description.located_xml import Element
+from manipcli.description.urdf.numbers import FARTHEST, LARGEST, Reader
+from manipcli.spec.robot import UNIT_TOLERANCE
+
+_TYPES: dict[str, JointType] = {
+    "revolute": "revolute",
+    "continuous": "continuous",
+    "prismatic": "prismatic",
+    "fixed": "fixed",
+    "floating": "fixed",
+    "planar": "fixed",
+}
+_HELD = frozenset({"floating", "planar"})
+"""Types of several degrees of freedom: where such a joint stands, the link is held."""
+UNBOUNDED: Final = sys.float_info.max
+"""Limits of a joint that has none, where URDF asks for some."""
+
+
+def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
+    """The joint that `element` describes; None, with findings, where it does not say which links it joins.
+
+    Its links and its mimic are not looked up here.
+    """
+    text = element.attributes.get("type")
+    kind = _TYPES.get(text or "")
+    if kind is None:
+        what = f"the unknown type '{shorten(text)}'" if text else "no attribute 'type'"
+        reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=reader.near(text or "", _TYPES))
+    if text in _HELD:
+        message = f"joint '{name}' is {text}, which is not supported: its link is held where it is"
+        hint = "use joints of one degree of freedom, or place the robot with `mount:` in the robot file"
+        reader.report("URDF065", message, element.place, hint=hint, severity="warning")
+    ends = [_end(reader, element, name, tag) for tag in ("parent", "child")]
+    X_PJ = reader.origin(element)
+    dynamics = element.first("dynamics")
+    damping = friction = 0.0
+    if dynamics is not None:
+        damping, friction = (
+            _not_negative(reader, dynamics, key, name, most=LARGEST) or 0.0 for key in ("damping", "friction")
+        )
+    if ends[0] is None or ends[1] is None:
+        return None
+    moves = kind != "fixed"
+    # What is wrong is told; what stands in for it lets the rest of the description be looked at.
+    return Joint(
+        name=name,
+        type=kind or "continuous",
+        parent=ends[0],
+        child=ends[1],
+        X_PJ=X_PJ,
+        axis=_axis(reader, element, name) if moves else frozen([1.0, 0.0, 0.0]),
+        limits=_with_soft(reader, element, name, kind) if moves and kind is not None else JointLimits(),
+        mimic=_mimic(reader, element) if moves else None,
+        damping=damping if moves else 0.0,
+        friction=friction if moves else 0.0,
+    )
+
+
+def _end(reader: Reader, element: Element, name: str, tag: Literal["parent", "child"]) -> str | None:
+    end = element.first(tag)
+    if end is None:
+        reader.report("URDF060", f"joint '{name}' has no <{tag} link=\"...\"/>", element.place)
+        return None
+    return reader.name(end, "link")
+
+
+def _axis(reader: Reader, element: Element, name: str) -> Array:
+    """Unit axis; x where none, or none that can be used, is written."""
+    axis = element.first("axis")
+    if axis is None or "xyz" not in axis.attributes:
+        return frozen([1.0, 0.0, 0.0])
+    values = reader.numbers(axis, "xyz", 3)
+    if values is None:
+        return frozen([1.0, 0.0, 0.0])
+    length = math.hypot(*values)
+    if not 1e-9 < length < 1e9:
+        what = "the axis 0 0 0" if length < 1e-9 else f"an axis of length {length:g}"
+        reader.report("URDF009", f"joint '{name}' has {what}; expected a direction", axis.place)
+        return frozen([1.0, 0.0, 0.0])
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        message = f"joint '{name}': the axis has length {length:g}; its direction is used"
+        reader.report("URDF034", message, axis.place, severity="warning")
+    unit = np.array(values)
+    # An axis as near to unit length as numbers can say stays as written: reading what we wrote changes nothing.
+    return frozen(unit if abs(length - 1.0) < 1e-15 else unit / length)
+
+
+def _not_negative(
+    reader: Reader, element: Element, attribute: str, joint: str, *, most: float = math.inf
+) -> float | None:
+    value = reader.number(element, attribute, most=most)
+    if value is not None and value < 0.0:
+        message = f"joint '{joint}': {attribute} is {value:g}; expected 0 or more"
+        reader.report("URDF010", message, element.place)
+        return None
+    return value
+
+
+def _with_soft(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
+    """The limits, and the soft ones of a <safety_controller>; soft positions that are both 0 are none."""
+    limits = _limits(reader, element, name, kind)
+    safety = element.first("safety_controller")
+    if safety is None:
+        return limits
+    lower, upper = (reader.number(safety, f"soft_{side}_limit", 0.0) or 0.0 for side in ("lower", "upper"))
+    k_position, k_velocity = (_not_negative(reader, safety, key, name) or 0.0 for key in ("k_position", "k_velocity"))
+    positions = k_position > 0.0 and lower < upper and kind != "continuous"
+    if not positions and k_velocity == 0.0:
+        return limits
+    soft = SoftLimits(
+        lower=lower if positions else None,
+        upper=upper if positions else None,
+        k_position=k_position if positions else 0.0,
+        k_velocity=k_velocity,
+    )
+    return dataclasses.replace(limits, soft=soft)
+
+
+def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
+    limit = element.first("limit")
+    if limit is None:
+        if kind == "continuous":
+            return JointLimits()
+        hint = '<limit lower="..." upper="..." velocity="..." effort="..."/>'
+        reader.report("URDF010", f"joint '{name}' is {kind} and has no <limit>", element.place, hint=hint)
+        return JointLimits()
+    lower, upper = (reader.number(limit, side) if side in limit.attributes else 0.0 for side in ("lower", "upper"))
+    for side, other in (("lower", "upper"), ("upper", "lower")):
+        if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
+            message = f"joint '{name}': the {side} limit is missing; it counts as 0"
+            reader.report("URDF036", message, limit.place, hint=f'write {side}="0" if it is', severity="note")
+    velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
+    if kind == "continuous" or lower is None or upper is None or (lower == -UNBOUNDED and upper == UNBOUNDED):
+        return JointLimits(velocity=velocity, effort=effort)
+    if lower > upper:
+        message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"
+        reader.report("URDF010", message, limit.place)
+        return JointLimits(velocity=velocity, effort=effort)
+    if lower == upper:
+        message = f"joint '{name}' cannot move: lower and upper are both {lower:g}"
+        reader.report("URDF035", message, limit.place, severity="warning")
+    return JointLimits(lower=lower, upper=upper, velocity=velocity, effort=effort)
+
+
+def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float | None:
+    """A limit of velocity or effort; 0 and nothing both count as not stated."""
+    value = _not_negative(reader, limit, attribute, joint)
+    if value:
+        return value
+    if value == 0.0 or attribute not in limit.attributes:
+        how = "is 0" if value == 0.0 else "is missing"
+        message = f"joint '{joint}': the {attribute} limit {how}; it counts as not stated"
+        hint = f"state it in the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
+        reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
+    return None
+
+
+def _mimic(reader: Reader, element: Element) -> Mimic | None:
+    mimic = element.first("mimic")
+    if mimic is None:
+        return None
+    joint = reader.name(mimic, "joint")
+    multiplier = reader.number(mimic, "multiplier", 1.0, most=FARTHEST)
+    offset = reader.number(mimic, "offset", 0.0, most=FARTHEST)
+    if joint is None or multiplier is None or offset is None:
+        return None
+    return Mimic(joint=joint, multiplier=multiplier, offset=offset)
+
+
+def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -> tuple[TransmissionTag, ...]:
+    """Every <transmission>, of ROS 1 (below <robot>) and of ros2_control (below <ros2_control>)."""
+    elements = [*root.all("transmission")]
+    for control in root.all("ros2_control"):
+        elements += control.all("transmission")
+    found = (_transmission(reader, element, joints) for element in elements)
+    return tuple(tag for tag in found if tag is not None)
+
+
+def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
+    name = element.attributes.get("name", "").strip() or "(without a name)"
+    kind = element.first("type") or element.first("plugin")
+    if kind is None or not kind.text:
+        message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
+        reader.report("URDF015", message, element.place)
+        return None
+    joint_elements = _by_role(element.all("joint"))
+    actuator_elements = _by_role(element.all("actuator"))
+    joint_names = [reader.name(joint) for joint in joint_elements]
+    actuator_names = [reader.name(actuator) for actuator in actuator_elements]
+    for joint, joint_name in zip(joint_elements, joint_names, strict=True):
+        if joint_name is not None and joint_name not in joints:
+            message = f"transmission '{name}' names joint '{joint_name}', which is not in the description"
+            reader.report("URDF015", message, joint.place, hint=reader.near(joint_name, joints))
+    if not joint_elements:
+        reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
+    joint_reductions = [_reduction(reader, each, name) for each in joint_elements]
+    actuator_reductions = [_reduction(reader, each, name) for each in actuator_elements]
+    kind_name = kind.text.strip().rpartition("/")[2]
+    if kind_name == "SimpleTransmission" and len(joint_elements) == 1 and len(actuator_elements) <= 1:
+        ros1 = kind.tag == "type"  # ros_control reads that of the actuator, ros2_control that of the joint
+        actuator_names = actuator_names or [name]
+        actuator_reductions = (actuator_reductions or [1.0]) if ros1 else joint_reductions
+        joint_reductions = [1.0]
+    return TransmissionTag(
+        name=name,
+        type=kind_name,
+        joints=tuple(joint or "" for joint in joint_names),
+        joint_reductions=tuple(joint_reductions),
+        joint_offsets=tuple(reader.text_number(joint.first("offset"), 0.0) for joint in joint_elements),
+        actuators=tuple(actuator or "" for actuator in actuator_names),
+        actuator_reductions=tuple(actuator_reductions),
+    )
+
+
+def _by_role(elements: tuple[Element, ...]) -> list[Element]:
+    """In the order of their roles (joint1, joint2, ...) where they have roles, else as written."""
+
+    def role(element: Element) -> str:
+        child = element.first("role")
+        return child.text if child is not None else element.attributes.get("role", "")
+
+    return sorted(elements, key=role)
+
+
+def _reduction(reader: Reader, element: Element, transmission: str) -> float:
+    child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
+    value = reader.text_number(child, 1.0)
+    if value == 0.0:
+        message = f"transmission '{transmission}': a reduction of 0 is not possible"
+        reader.report("URDF015", message, (child or element).place)
+        return 1.0
+    return value

@@ -1,0 +1,190 @@
+"""<link>: inertial, visuals, collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.description.elements import Inertial, Link
+from manipcli.description.located_xml import Element
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.mesh_element import read_mesh_element
+from manipcli.description.urdf.numbers import FARTHEST, LARGEST, Reader
+from manipcli.description.urdf.schema_table import is_foreign
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
+
+TRIANGLE_TOLERANCE = 1e-2
+"""By which share one principal moment may exceed the sum of the others: descriptions are written with 2-3 digits."""
+_SHAPES = ("box", "sphere", "cylinder", "mesh")
+_ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
+"""Shapes of other formats and of other programs' URDF."""
+
+
+def read_link(reader: Reader, element: Element, name: str, packages: Packages, materials: Mapping[str, Rgba]) -> Link:
+    """The link that `element` describes; what cannot be read is left out, with a finding."""
+    return Link(
+        name=name,
+        inertial=_inertial(reader, element, name),
+        visuals=tuple(_geometries(reader, element, "visual", packages, materials)),
+        collisions=tuple(_geometries(reader, element, "collision", packages, materials)),
+        place=element.place,
+    )
+
+
+def read_materials(reader: Reader, root: Element) -> dict[str, Rgba]:
+    """Colours by the name of the material, wherever it is defined."""
+    found: dict[str, Rgba] = {}
+    visuals = [visual for link in root.all("link") for visual in link.all("visual")]
+    for parent in (root, *visuals):
+        for material in parent.all("material"):
+            colour = material.first("color")
+            if colour is None:
+                continue
+            rgba = reader.numbers(colour, "rgba", 4)
+            if rgba is not None and material.attributes.get("name"):
+                found.setdefault(material.attributes["name"], (rgba[0], rgba[1], rgba[2], rgba[3]))
+    return found
+
+
+def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
+    element = link.first("inertial")
+    if element is None:
+        return None
+    mass_element, moments = element.first("mass"), element.first("inertia")
+    if mass_element is None:
+        reader.report("URDF011", f"link '{name}': <inertial> has no <mass>", element.place)
+        return None
+    X_LI = reader.origin(element)
+    mass = reader.required(mass_element, "value", most=LARGEST)
+    if mass is None:
+        return None
+    if mass < 0.0:
+        reader.report("URDF011", f"link '{name}' has mass {mass:g} kg; expected a positive number", mass_element.place)
+        return None
+    if mass == 0.0:
+        message = f"link '{name}' has mass 0: it counts as having no inertia at all"
+        reader.report("URDF031", message, mass_element.place, severity="note")
+        return None
+    if moments is None:
+        reader.report("URDF011", f"link '{name}': <inertial> has no <inertia>", element.place)
+        return None
+    xx, yy, zz = (reader.required(moments, key, most=LARGEST) for key in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (_product(reader, moments, key) for key in ("ixy", "ixz", "iyz"))
+    if xx is None or yy is None or zz is None:
+        return None
+    I = frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # noqa: E741  (the inertia matrix)
+    if not _plausible(reader, I, name, moments):
+        return None
+    return Inertial(mass=mass, X_LI=X_LI, inertia=I)
+
+
+def _product(reader: Reader, moments: Element, key: str) -> float:
+    """A product of inertia; 0 where it is not written, which other programs refuse."""
+    if key not in moments.attributes:
+        message = f"<inertia> has no attribute '{key}'; it counts as 0"
+        reader.report("URDF059", message, moments.place, severity="warning")
+    return reader.number(moments, key, 0.0) or 0.0
+
+
+def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741  (the inertia matrix)
+    if not I.any():
+        return True  # a point mass: `read_parts` refuses it where a joint moves it
+    principal = np.linalg.eigvalsh(I)
+    shown = ", ".join(f"{value:.4g}" for value in principal)
+    if principal[0] <= 0.0:
+        message = f"link '{name}': the inertia is not positive definite (principal moments {shown} kg m2)"
+        reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
+        return False
+    if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE_TOLERANCE):
+        message = f"link '{name}': no body has the principal moments {shown} kg m2: one is larger than the others' sum"
+        reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
+        return False
+    return True
+
+
+def _geometries(
+    reader: Reader, link: Element, tag: str, packages: Packages, materials: Mapping[str, Rgba]
+) -> list[Geometry]:
+    found = []
+    for element in link.all(tag):
+        X_LS = reader.origin(element)
+        rgba = _colour(reader, element, materials)
+        holder = element.first("geometry")
+        shapes = [child for child in holder.children if not is_foreign(child.tag)] if holder is not None else []
+        if not shapes:
+            expected = " or ".join(f"<{shape}>" for shape in _SHAPES)
+            message = f"<{tag}> needs a <geometry> with one shape: {expected}"
+            reader.report("URDF012", message, (holder or element).place)
+            continue
+        if len(shapes) > 1:
+            message = f"<geometry> holds {len(shapes)} shapes; only the first, <{shapes[0].tag}>, is used"
+            hint = f"give each shape a <{tag}> of its own"
+            reader.report("URDF061", message, shapes[1].place, hint=hint, severity="warning")
+        if shapes[0].tag == "capsule":
+            found += _capsule(reader, shapes[0], X_LS, rgba)
+            continue
+        shape = _shape(reader, shapes[0], tag, packages)
+        if shape is not None:
+            found.append(Geometry(X_LS=X_LS, shape=shape, rgba=rgba))
+    return found
+
+
+def _capsule(reader: Reader, element: Element, X_LS: Transform, rgba: Rgba | None) -> list[Geometry]:
+    """A cylinder of the capsule's `length` along z and a sphere at each of its ends: the same set of points."""
+    radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
+    if radius is None or length is None:
+        return []
+    message = "<capsule> is not understood by most programs; it is read as a cylinder and two spheres"
+    reader.report("URDF062", message, element.place, severity="warning")
+    ends = [X_LS @ Transform.of(xyz=(0.0, 0.0, side * length[0] / 2.0)) for side in (-1.0, 1.0)]
+    return [
+        Geometry(X_LS=X_LS, shape=Cylinder(radius=radius[0], length=length[0]), rgba=rgba),
+        *(Geometry(X_LS=X_LE, shape=Sphere(radius=radius[0]), rgba=rgba) for X_LE in ends),
+    ]
+
+
+def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Shape | None:
+    if element.tag == "box":
+        size = _sizes(reader, element, "size", 3)
+        return Box(size=(size[0], size[1], size[2])) if size else None
+    if element.tag == "sphere":
+        radius = _sizes(reader, element, "radius", 1)
+        return Sphere(radius=radius[0]) if radius else None
+    if element.tag == "cylinder":
+        radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
+        return Cylinder(radius=radius[0], length=length[0]) if radius and length else None
+    if element.tag == "mesh":
+        return read_mesh_element(reader, element, tag, packages)
+    if element.tag in _ELSEWHERE:
+        left_out = tag == "visual"
+        message = f"<{element.tag}> is no shape of URDF" + ("; it is left out" if left_out else "")
+        hint = "use " + " or ".join(f"<{shape}>" for shape in _SHAPES)
+        reader.report("URDF062", message, element.place, hint=hint, severity="warning" if left_out else "error")
+        return None
+    reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=reader.near(element.tag, _SHAPES))
+    return None
+
+
+def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tuple[float, ...] | None:
+    if attribute not in element.attributes:
+        reader.missing(element, attribute)
+        return None
+    values = reader.numbers(element, attribute, count, most=FARTHEST)
+    if values is not None and min(values) <= 0.0:
+        message = f'<{element.tag} {attribute}="{element.attributes[attribute]}">: expected positive lengths [m]'
+        reader.report("URDF012", message, element.place)
+        return None
+    return values
+
+
+def _colour(reader: Reader, element: Element, materials: Mapping[str, Rgba]) -> Rgba | None:
+    material = element.first("material")
+    if material is None:
+        return None
+    colour = material.first("color")
+    if colour is not None:
+        rgba = reader.numbers(colour, "rgba", 4)
+        return (rgba[0], rgba[1], rgba[2], rgba[3]) if rgba is not None else None
+    return materials.get(material.attributes.get("name", ""))

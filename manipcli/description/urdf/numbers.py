@@ -1,0 +1,131 @@
+"""Numbers, names and frames of URDF elements; what is wrong becomes a finding, and reading goes on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Final
+
+from manipcli.core.errors import Finding, Place, Severity
+from manipcli.core.geometry import Transform
+from manipcli.core.text import did_you_mean, shorten
+from manipcli.description.located_xml import Element
+
+MOST_HINTS: Final = 50
+MOST_NAMES: Final = 2000
+"""The nearest name is looked for this often and among this many: a file of errors may not cost minutes."""
+
+FARTHEST: Final = 1e6
+"""[m, rad] of what a description places or measures; beyond it engines, which count in single precision, break."""
+LARGEST: Final = 1e9
+"""Of masses, moments, damping and friction, in SI."""
+
+
+def finite(word: str) -> float | None:
+    """The finite number that a word is: digits as C reads them, no `1_000`, no other script's digits; else None."""
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and word.isascii() and "_" not in word else None
+
+
+class Reader:
+    """Gathers findings while a description is read."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+        self._hints = 0
+
+    def report(
+        self,
+        code: str,
+        message: str,
+        place: Place | None,
+        *,
+        hint: str | None = None,
+        severity: Severity = "error",
+    ) -> None:
+        self.findings.append(Finding(code=code, message=message, place=place, hint=hint, severity=severity))
+
+    def near(self, name: str, known: Collection[str]) -> str | None:
+        """The hint for an unknown name."""
+        self._hints += 1
+        if self._hints > MOST_HINTS or len(known) > MOST_NAMES or len(name) > 200:
+            return None
+        return did_you_mean(name, known)
+
+    def name(self, element: Element, attribute: str = "name") -> str | None:
+        """A name that is there and can be printed; else a finding and None."""
+        value = element.attributes.get(attribute, "").strip()
+        if not value:
+            how = "an empty" if attribute in element.attributes else "no"
+            self.report("URDF003", f"<{element.tag}> has {how} attribute '{attribute}'", element.place)
+            return None
+        if not value.isprintable() or len(value) > 200:
+            self.report("URDF003", f"<{element.tag}>: {value[:40]!r} is no usable name", element.place)
+            return None
+        return value
+
+    def numbers(
+        self, element: Element, attribute: str, count: int, *, most: float = math.inf
+    ) -> tuple[float, ...] | None:
+        """`count` finite numbers, none larger than `most`; None where it is missing or (with a finding) wrong."""
+        text = element.attributes.get(attribute)
+        if text is None:
+            return None
+        words = text.split() if len(text) < 10_000 else [text]
+        expected = "a number" if count == 1 else f"{count} numbers"
+        written = f'<{element.tag} {attribute}="{shorten(text)}">'
+        wrong = next((word for word in words if finite(word) is None), None)
+        if wrong is not None:
+            message = f"{written}: expected {expected}; '{shorten(wrong)}' is no finite number"
+            self.report("URDF004", message, element.place)
+            return None
+        if len(words) != count:
+            self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
+            return None
+        if any(abs(float(word)) > most for word in words):
+            self.report("URDF004", f"{written}: beyond all that is real; expected {most:g} or less", element.place)
+            return None
+        return tuple(float(word) + 0.0 for word in words)  # no -0.0: it would not be written again
+
+    def number(
+        self, element: Element, attribute: str, default: float | None = None, *, most: float = math.inf
+    ) -> float | None:
+        """One number; `default` where it is missing or (with a finding) wrong."""
+        values = self.numbers(element, attribute, 1, most=most)
+        return default if values is None else values[0]
+
+    def required(self, element: Element, attribute: str, *, most: float) -> float | None:
+        """One number that must be there; None with a finding otherwise."""
+        if attribute not in element.attributes:
+            self.missing(element, attribute)
+            return None
+        return self.number(element, attribute, most=most)
+
+    def missing(self, element: Element, attribute: str) -> None:
+        self.report("URDF059", f"<{element.tag}> has no attribute '{attribute}'", element.place)
+
+    def text_number(self, element: Element | None, default: float) -> float:
+        """A number that stands as the text of an element."""
+        if element is None:
+            return default
+        value = finite(element.text)
+        if value is None:
+            message = f"<{element.tag}>{shorten(element.text)}</{element.tag}>: expected a finite number"
+            self.report("URDF004", message, element.place)
+            return default
+        return value
+
+    def origin(self, parent: Element) -> Transform:
+        """The <origin> of an element; identity where it has none."""
+        element = parent.first("origin")
+        if element is None:
+            return Transform.identity()
+        xyz = self.numbers(element, "xyz", 3, most=FARTHEST) or (0.0, 0.0, 0.0)
+        quat = self.numbers(element, "quat_xyzw", 4)
+        if quat is not None and math.hypot(*quat) > 1e-6:
+            return Transform.of(xyz=xyz, quat_xyzw=quat).by_angles
+        rpy = self.numbers(element, "rpy", 3, most=FARTHEST)
+        return Transform.of(xyz=xyz, rpy=rpy) if rpy is not None and any(rpy) else Transform.of(xyz=xyz)

@@ -1,0 +1,405 @@
+"""Expands xacro with the library, but as data: no expression runs code, no environment is read, no file is far away.
+
+The library's module is loaded a second time for each expansion and its doors are replaced in that private copy: reading
+files, evaluating expressions and `$(...)`, loading YAML, warnings. The module that others import stays as it is.
+"""
+
+from __future__ import annotations
+
+import glob
+import importlib.util
+import os
+import re
+import threading
+import xml.dom.minidom
+from collections.abc import Callable, Collection, Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.dom.minidom import Document
+from xml.dom.minidom import Element as DomElement
+
+from manipcli.core.errors import EXPANDED, Finding, InvalidInput, Place
+from manipcli.description.bounds import bounds
+from manipcli.description.located_xml import called_from, invalid, place_of, read_document
+from manipcli.description.packages import Absent, NotFound, Packages
+from manipcli.description.xacro.expression import Evaluator
+from manipcli.description.xacro.expression_values import (
+    Beyond,
+    Clock,
+    Refused,
+    math_symbols,
+    python_symbols,
+    size_of,
+    too_large,
+)
+from manipcli.description.xacro.names import UnknownArgument, names_of, near_macro, near_name
+from manipcli.description.xacro.yaml_data import Mistyped, load_yaml
+
+_loading = threading.Lock()
+_ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "Invalid parameter", "unknown macro")
+# The library's own pattern for `name:=^|default` tries exponentially many ways where a quote is not closed. This one
+# reads the same, with one way to read each character.
+_MACRO_ARGUMENT = re.compile(
+    r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
+)
+ALLOW_ENV = "MANIPCLI_ALLOW_ENV"
+"""Names the variables that descriptions may read, `A B`; every command that reads descriptions heeds it."""
+_NODE = 16
+"""What an attribute, a text or an element counts besides its characters: they take memory when they are empty, too."""
+_DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
+
+
+def expand(
+    path: Path, arguments: Mapping[str, str], packages: Packages, *, allow_env: Collection[str] = ()
+) -> tuple[Document, tuple[Finding, ...]]:
+    """The document of a xacro file with everything expanded; its elements know where they were written.
+
+    Args:
+        path: the file.
+        arguments: values of `<xacro:arg>`.
+        packages: finds what it includes.
+        allow_env: environment variables that it may read.
+
+    Returns:
+        The document and the warnings that the description itself or the expansion gave.
+
+    Raises:
+        InvalidInput: with the place of the innermost element that was being expanded, and the macros around it.
+    """
+    return _Expansion(packages, frozenset(allow_env)).run(path, arguments)
+
+
+def _private_module() -> ModuleType:
+    """A copy of the xacro module of our own."""
+    with _loading:
+        # xacro replaces this method of the standard library when it is loaded; others keep the original.
+        original = xml.dom.minidom.Element.writexml
+        try:
+            spec = importlib.util.find_spec("xacro")
+            if spec is None or spec.loader is None:
+                raise invalid("XACRO001", "the Python package 'xacro' is not installed")
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+        finally:
+            xml.dom.minidom.Element.writexml = original  # type: ignore[method-assign]
+    return module
+
+
+class _Expansion:
+    """The doors of one private module, and what they count."""
+
+    def __init__(self, packages: Packages, allow_env: frozenset[str]) -> None:
+        self._packages = packages
+        self._allow_env = allow_env
+        self._module = _private_module()
+        self._clock = Clock()
+        self._evaluate = Evaluator(self._clock)
+        self._bounds = bounds()
+        self._characters = 0
+        self._findings: list[Finding] = []
+        self._current: DomElement | None = None
+        self._calls: list[DomElement] = []
+        self._expansions = 0
+        self._near: str | None = None
+        self._optional = False
+        self._macros: object = None
+        self._known_arguments: set[str] = set()
+        module = self._module
+        self._eval_all = module.eval_all
+        self._eval_text = module.eval_text
+        self._macro_call = module.handle_macro_call
+        self._check = module.check_attrs
+        self._required = module.reqd_attrs
+        doors: dict[str, Callable[..., object]] = {
+            "parse": self._door_parse,
+            "safe_eval": self._door_eval,
+            "eval_extension": self._door_extension,
+            "load_yaml": self._load_yaml,
+            "get_include_files": self._door_include_files,
+            "eval_all": self._door_eval_all,
+            "eval_text": self._door_eval_text,
+            "handle_macro_call": self._door_macro_call,
+            "check_attrs": self._door_check_attrs,
+            "reqd_attrs": self._door_reqd_attrs,
+            "warning": self._warn,
+            "error": self._warn,
+            "message": lambda *words, **options: "",
+            "print_location": lambda: None,
+        }
+        for name, door in doors.items():
+            setattr(module, name, door)
+        # Names of the private copy of the library, which a module's type does not list.
+        module.re_macro_arg = _MACRO_ARGUMENT  # type: ignore[attr-defined]
+        module._global_symbols = self._symbols()  # type: ignore[attr-defined]
+
+    def run(self, path: Path, arguments: Mapping[str, str]) -> tuple[Document, tuple[Finding, ...]]:
+        module = self._module
+        document = read_document(path)
+        self._current = document.documentElement
+        module.init_stacks(str(path.absolute()))
+        try:
+            module.process_doc(document, mappings=dict(arguments), verbosity=0)
+        except InvalidInput:
+            raise
+        except RecursionError as error:
+            message = "macros, properties or elements are nested too deep for the stack; this cannot be raised"
+            raise invalid("XACRO004", message, self._place()) from error
+        except MemoryError as error:
+            raise invalid("XACRO004", "the description needs more memory than there is", self._place()) from error
+        except Exception as error:
+            raise self._failed(error) from error
+        unknown = [name for name in arguments if name not in self._known_arguments]
+        if unknown:
+            known = ", ".join(sorted(self._known_arguments)) or "none"
+            raise invalid(
+                "XACRO003",
+                f"the description has no argument {', '.join(repr(name) for name in unknown)}; it has: {known}",
+                place_of(document.documentElement) if document.documentElement else None,
+            )
+        return document, tuple(self._findings)
+
+    def _place(self) -> Place | None:
+        return place_of(self._current) if self._current is not None else None
+
+    def _failed(self, error: Exception) -> InvalidInput:
+        cause: BaseException | None = error
+        code, own_hint, place = "XACRO001", None, self._place()
+        while cause is not None:
+            if isinstance(cause, Beyond):
+                code, own_hint = "XACRO004", cause.hint
+            elif isinstance(cause, Refused):
+                code, own_hint = "XACRO002", cause.hint or _DATA
+            elif isinstance(cause, UnknownArgument):
+                code, own_hint = "XACRO003", cause.hint
+            elif isinstance(cause, NotFound):
+                own_hint = cause.hint
+            elif isinstance(cause, Mistyped):
+                place, own_hint = cause.place, f"it is read at {self._place()}"
+            cause = getattr(cause, "exc", None) or cause.__cause__
+        lines = re.sub(r" \(<unknown>, line \d+\)", "", str(error)).splitlines()
+        message = "; ".join(line.strip() for line in lines if line.strip()) or repr(error)
+        if self._calls and message.startswith(_ABOUT_A_CALL):
+            place = place_of(self._calls[-1])
+        around = [f"{call.tagName} at {place_of(call)}" for call in reversed(self._calls) if place_of(call) is not None]
+        more = [f"{len(around) - 4} more"] if len(around) > 4 else []
+        hint = f"{EXPANDED} " + ", from ".join([*around[:4], *more]) if around else None
+        if message.startswith("unknown macro") and self._calls:
+            own_hint = near_macro(self._calls[-1].tagName, names_of(self._macros))
+        elif "is not defined" in message:
+            own_hint = own_hint or self._near
+        hints = [each for each in (own_hint, hint) if each]
+        return invalid(code, message, place, "; ".join(hints) or None)
+
+    def _warn(self, *words: object, **options: object) -> str:
+        message = " ".join(str(word) for word in words)
+        self._findings.append(Finding("XACRO010", message, self._place(), severity="warning"))
+        return ""
+
+    # --- the doors, in the library's signatures ---
+
+    def _door_parse(self, inp: object, filename: str | None = None) -> Document:
+        *around, own = [Path(str(each)) for each in self._module.filestack]
+        most = self._bounds.include_depth
+        if len(around) >= most:
+            if own in around:  # no bound helps
+                circle = around[len(around) - 1 - around[::-1].index(own) :]
+                names = " -> ".join(each.name for each in [*circle, own])
+                message, hint = f"files include each other without end: {names}", "take one of these includes out"
+                raise invalid("XACRO004", message, self._place(), hint)
+            raise Beyond(f"files include each other more than {most} deep", "include_depth")
+        return read_document(Path(str(filename)))
+
+    def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
+        self._clock.look()
+        try:
+            return self._evaluate(expr, globals)
+        except NameError as error:
+            self._near = near_name(error, names_of(globals))
+            raise
+
+    def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
+        value: object = self._eval_text(text, symbols)
+        size = size_of(value)
+        if size > self._bounds.value_size:
+            raise too_large("a value")
+        self._grow(size)
+        return value
+
+    def _door_eval_all(self, node: DomElement, macros: object, symbols: object) -> None:
+        self._count()
+        self._grow(_NODE * (len(node.childNodes) + len(node.attributes)))
+        self._current = node if place_of(node) is not None else self._current
+        if self._calls:
+            self._mark(node)
+        self._eval_all(node, macros, symbols)
+
+    def _mark(self, body: DomElement) -> None:
+        """Leaves with the elements of a macro's body who called it: first and last are enough to find the others."""
+        ends = self._calls[:1] + self._calls[1:][-1:]
+        calls = tuple(place for call in ends if (place := place_of(call)) is not None)
+        for child in body.childNodes:
+            if child.nodeType == child.ELEMENT_NODE:
+                called_from(child, calls)
+
+    def _door_macro_call(self, node: DomElement, macros: object, symbols: object) -> bool:
+        if not node.tagName.startswith("xacro:"):
+            return False
+        self._current = node
+        if node.tagName == "xacro:call":
+            return bool(self._macro_call(node, macros, symbols))
+        self._count()
+        if len(self._calls) >= self._bounds.macro_depth:
+            raise Beyond(f"macros call each other more than {self._bounds.macro_depth} deep", "macro_depth")
+        self._calls.append(node)
+        self._macros = macros
+        done = bool(self._macro_call(node, macros, symbols))
+        self._calls.pop()
+        return done
+
+    def _count(self) -> None:
+        self._expansions += 1
+        if self._expansions > self._bounds.expansions:
+            raise Beyond(f"more than {self._bounds.expansions} elements are expanded", "expansions")
+        self._clock.look()
+
+    def _grow(self, size: int) -> None:
+        self._characters += size
+        if self._characters > self._bounds.characters:
+            raise Beyond(f"the description expands to more than {self._bounds.characters} characters", "characters")
+
+    def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
+        self._current = tag
+        found: list[str | None] = self._check(tag, required, optional)
+        if tag.tagName == "xacro:include":
+            self._optional = found[optional.index("optional") + len(required)] in ("true", "True", "1")
+        if tag.tagName == "xacro:arg":
+            self._known_arguments.add(str(found[0]))
+        return found
+
+    def _door_reqd_attrs(self, tag: DomElement, names: list[str]) -> list[str]:
+        self._current = tag
+        found: list[str] = self._required(tag, names)
+        return found
+
+    def _door_include_files(self, filename_spec: str, symbols: Mapping[str, object]) -> Iterator[str]:
+        spec = str(self._door_eval_text(filename_spec, symbols))
+        if any(character in spec for character in "*[?"):
+            parent, folder = Path(spec).parent, self._folder() / Path(spec).parent
+            # As the library, unlike Path.glob: `**` is `*`, so that no tree of folders is walked; nothing hidden.
+            names = sorted(str(parent / name) for name in glob.glob(Path(spec).name, root_dir=folder))  # noqa: PTH207
+            if not names:
+                self._warn(f"'{spec}' matches no file")
+        else:
+            names = [spec]
+        for name in names:
+            try:
+                yield str(self._packages.resolve(name, relative_to=self._folder()))
+            except Absent as error:
+                if self._optional:
+                    continue
+                raise self._exception(error.message) from error
+            except NotFound as error:
+                raise self._exception(error.message) from error
+
+    def _exception(self, message: str, **details: object) -> Exception:
+        created: Exception = self._module.XacroException(message, **details)
+        return created
+
+    def _folder(self) -> Path:
+        return Path(str(self._module.filestack[-1])).parent
+
+    def _door_extension(self, text: str) -> object:
+        command, _, rest = text[2:-1].strip().partition(" ")
+        rest = rest.strip()
+        if command == "find":
+            return str(self._packages.root(rest))
+        if command == "arg":
+            return self._argument(rest)
+        if command == "dirname":
+            return str(self._folder())
+        if command == "eval":
+            names: dict[str, object] = {**math_symbols(), **python_symbols(), "true": True, "false": False}
+            names |= {name: _typed(value) for name, value in self._arguments().items()}
+            names["arg"] = lambda name: _typed(self._argument(name))
+            names["find"] = lambda name: str(self._packages.root(name))
+            return str(self._evaluate(rest, names))
+        if command in {"env", "optenv"}:
+            return self._environment(command, rest)
+        if command == "cwd":
+            hint = "$(dirname) is the folder of this file; $(find NAME), of a package"
+            raise Refused("$(cwd): a description may not depend on the working folder", hint=hint)
+        if command in {"command", "anon"}:
+            raise Refused(f"$({command} ...) is not allowed in a description; pass an argument ($(arg NAME)) instead")
+        raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
+
+    def _environment(self, command: str, rest: str) -> str:
+        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
+        name, _, default = rest.partition(" ")
+        if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
+            hint = f"allow it: {ALLOW_ENV}={name} before any command (check-urdf: --allow-env); or use $(arg NAME)"
+            raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
+        value = os.environ.get(name)
+        if value is None and command == "env":
+            raise NameError(f"environment variable '{name}' is not set")
+        return default.strip() if value is None else value
+
+    def _arguments(self) -> dict[str, str]:
+        found: dict[str, str] = self._module.substitution_args_context["arg"]
+        return found
+
+    def _argument(self, name: str) -> str:
+        self._known_arguments.add(name)
+        try:
+            return self._arguments()[name]
+        except KeyError:
+            raise UnknownArgument(name, self._arguments()) from None
+
+    def _load_yaml(self, name: str) -> object:
+        path = self._packages.resolve(name, relative_to=self._folder())
+        return self._module.YamlListWrapper.wrap(
+            load_yaml(path, lambda text: self._evaluate(text, math_symbols()), self._clock)
+        )
+
+    def _absolute(self, name: str) -> str:
+        return str(self._folder() / name)
+
+    def _fatal(self, *words: object) -> object:
+        raise self._exception(" ".join(str(word) for word in words))
+
+    def _symbols(self) -> dict[str, object]:
+        def namespace(symbols: dict[str, object]) -> Any:
+            created = self._module.NameSpace()
+            for name, value in symbols.items():
+                dict.__setitem__(created, name, value)
+            return created
+
+        own: dict[str, object] = {
+            "load_yaml": self._load_yaml,
+            "abs_filename": self._absolute,
+            "dotify": self._module.YamlDictWrapper,
+        }
+        speak = {"warning": self._warn, "error": self._warn, "message": lambda *words: "", "fatal": self._fatal}
+        plain = python_symbols()
+        everything: dict[str, object] = {**math_symbols(), **plain, **own}
+        return everything | {
+            "python": namespace(plain),
+            "math": namespace(math_symbols()),
+            "xacro": namespace({**own, **speak, "tokenize": _tokenize, "arg": self._argument}),
+        }
+
+
+def _typed(text: str) -> object:
+    """An argument as `$(eval)` sees it: a number or truth value where it is one."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)
+
+
+def _tokenize(text: str, sep: str = ",; ", skip_empty: bool = True) -> list[str]:
+    for character in sep:
+        text = text.replace(character, "\0")
+    return [token for token in text.split("\0") if token or not skip_empty]

@@ -1,0 +1,146 @@
+"""What expressions of xacro may hold and call: values of bounded size, functions whose cost that size bounds."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
+
+from manipcli.description.bounds import BoundName, bounds, raised
+
+MAX_INTEGER: Final = 2**1024
+
+Value = object
+
+
+class Refused(Exception):
+    """An expression asks for something that descriptions may not do; `hint` says what to do instead."""
+
+    def __init__(self, message: str, *, hint: str | None = None) -> None:
+        self.hint = hint
+        super().__init__(message)
+
+
+class Beyond(Refused):
+    """A bound is met; `hint` says which and how it is raised."""
+
+    def __init__(self, message: str, bound: BoundName) -> None:
+        super().__init__(message, hint=raised(bound))
+
+
+class Clock:
+    """The processor time of one expansion, looked at wherever something may be repeated."""
+
+    def __init__(self) -> None:
+        self._seconds = bounds().seconds
+        self._until = time.process_time() + self._seconds
+
+    def look(self) -> None:
+        """Raises Beyond when the time is over."""
+        if time.process_time() > self._until:
+            raise Beyond(f"the expansion takes more than {self._seconds} s", "seconds")
+
+
+class Held:
+    """The characters and items of several values that are held at the same time."""
+
+    def __init__(self) -> None:
+        self._held = 0
+
+    def add(self, value: Value) -> Value:
+        """`value`; raises Beyond when all together are too large for one value."""
+        self._held += size_of(value)
+        if self._held > bounds().value_size:
+            raise too_large("a value")
+        return value
+
+
+def size_of(value: Value) -> int:
+    """Characters and items in `value` through nesting, counted no further than the bound + 1."""
+    limit = bounds().value_size
+    total = 0
+    stack = [value]
+    while stack and total <= limit:
+        item = stack.pop()
+        total += 1
+        if isinstance(item, str):
+            total += len(item)
+        elif isinstance(item, dict):
+            stack.extend(list(dict.values(item))[: limit + 1])
+            stack.extend(list(dict.keys(item))[: limit + 1])
+        elif isinstance(item, list | tuple | set | frozenset):
+            stack.extend(list.__iter__(item) if isinstance(item, list) else item)
+    return total
+
+
+def bounded(value: Value) -> Value:
+    """`value`, if it is small enough.
+
+    Raises:
+        Refused: a result too large.
+    """
+    if isinstance(value, bool | float) or value is None:
+        return value
+    if isinstance(value, int):
+        if not -MAX_INTEGER < value < MAX_INTEGER:
+            raise Refused("an integer of this size is not allowed")
+    elif size_of(value) > bounds().value_size:
+        raise too_large("a value")
+    return value
+
+
+def too_large(what: str) -> Beyond:
+    return Beyond(f"{what} of more than {bounds().value_size} characters or items is not allowed", "value_size")
+
+
+def math_symbols() -> dict[str, Value]:
+    """The constants and functions of `math` whose cost does not grow with their argument."""
+    costly = {"factorial", "comb", "perm", "prod", "lcm", "gcd", "isqrt", "dist", "fsum", "sumprod"}
+    return {name: value for name, value in vars(math).items() if not name.startswith("_") and name not in costly}
+
+
+def python_symbols() -> dict[str, Value]:
+    """The built-in functions that expressions may call."""
+
+    def bounded_range(*ends: int) -> list[int]:
+        steps = range(*ends)
+        if len(steps) > bounds().value_size:
+            raise too_large("a range")
+        return list(steps)
+
+    def in_order(values: Iterable[Value], *, key: Callable[..., Value] | None = None, reverse: bool = False) -> Value:
+        # What cannot be compared is Python's to refuse: its TypeError becomes a finding.
+        return bounded(sorted(values, key=key, reverse=reverse))  # type: ignore[type-var,arg-type]
+
+    def total(values: Iterable[Value], start: Value = 0) -> Value:
+        items = list(values)
+        if size_of(start) * len(items) > bounds().value_size * 64:
+            raise too_large("a sum of lists")
+        # What cannot be added is Python's to refuse, too.
+        return sum(items, start)  # type: ignore[call-overload]
+
+    def text(value: Value = "") -> str:
+        return str(bounded(value))
+
+    def apply(function: Callable[..., Value], *values: Iterator[Value]) -> Value:
+        held = Held()
+        return [held.add(function(*items)) for items in zip(*values, strict=False)]
+
+    def listed(function: Callable[..., Value]) -> Callable[..., Value]:
+        # A Value may be a number; zip and its like answer that with the TypeError that becomes a finding.
+        def call(*values: Value) -> Value:
+            return bounded(list(function(*(bounded(value) for value in values))))  # type: ignore[call-overload]
+
+        return call
+
+    kept = (float, int, bool, len, min, max, round, abs, all, any, divmod, isinstance, ord, dict, tuple, set)
+    symbols: dict[str, Value] = {function.__name__: function for function in kept}
+    own: dict[str, Callable[..., Value]] = {function.__name__: listed(function) for function in _LISTED}
+    own |= {"range": bounded_range, "str": text, "map": apply, "sorted": in_order, "sum": total}
+    for name, function in own.items():
+        function.__name__ = function.__qualname__ = name  # how Python's own messages call it
+    return symbols | own | {"True": True, "False": False, "None": None}
+
+
+_LISTED: Final[tuple[Callable[..., Value], ...]] = (list, zip, enumerate, reversed)

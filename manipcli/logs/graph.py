@@ -1,0 +1,279 @@
+"""A task, or the log of one, to who feeds whom: planner, controllers, limits, drives, engine, sensors, topics.
+
+Everything is asked of what a run is made of: the controllers as they are built, the drivetrain, the engine's member,
+the table of channels. Of a log the topics are those that are in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from manipcli.control.actuation import Actuation
+from manipcli.control.controller import Controller
+from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
+from manipcli.control.factory import build_controllers
+from manipcli.control.roles import is_follower, is_hand
+from manipcli.logs.log import (
+    action_of,
+    recorded,
+    recorded_controllers_file,
+    recorded_robot,
+    recorded_scene,
+    recorded_task_file,
+)
+from manipcli.logs.other_log import is_own
+from manipcli.model.robot import RobotModel
+from manipcli.record import channels
+from manipcli.record.channels import channel_table
+from manipcli.record.reading import open_recording
+from manipcli.record.selection import PLOTTED, Selection, word
+from manipcli.record.topics import Topic, open_topics
+from manipcli.report.graph import Edge, Graph, Node
+from manipcli.scene.scene import Scene
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.task import JUDGED, TaskSpec
+from manipcli.task.load_task import load_task
+
+PRODUCERS: Final[Mapping[str, str]] = {
+    channels.ROBOT_DESCRIPTION: "robot",
+    channels.TF_STATIC: "robot",
+    channels.MARKERS: "scene",
+    channels.JOINT_STATES: "joints",
+    channels.TF: "engine",
+    channels.CONTACTS: "contacts",
+    channels.EVENTS: "task",
+    channels.ROSOUT: "task",
+    channels.ACTUATOR_STATES: "drives",
+}
+"""Which node publishes a topic that is no controller's."""
+BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, "wrench")
+MOST_NAMES: Final = 4
+
+
+def task_graph(path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False) -> Graph:
+    """Of a task file.
+
+    Raises:
+        InvalidInput: a file of the task cannot be used.
+    """
+    task = load_task(path, package_path=package_path, allow_outside=allow_outside)
+    return _Builder(task.spec, task.controllers, task.robot, task.scene, None).graph()
+
+
+def log_graph(path: Path) -> Graph:
+    """Of a log, with how much it holds of each topic; of a foreign one its topics alone.
+
+    Raises:
+        InvalidInput: it is no log, is damaged, or lacks its files.
+    """
+    topics = open_topics(path).all
+    if not is_own(path):
+        nodes = tuple(_topic_node(name, topic.type, _held(topic)) for name, topic in topics.items())
+        note = f"{path.name} tells of no task: what its topics are fed by is not known"
+        return Graph(path.name, nodes, (), (note,))
+    recording = open_recording(path)
+    spec = recorded_task_file(recording, path).spec
+    controllers = recorded_controllers_file(recording, path).spec
+    robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
+    version = recording.metadata.get("versions", {}).get(spec.simulation.engine, "")
+    notes = () if recording.lost is None else (recording.lost,)
+    return _Builder(spec, controllers, robot, scene, topics, version=version, notes=notes).graph()
+
+
+@dataclass(slots=True)
+class _Found:
+    """The graph on its way."""
+
+    nodes: dict[str, Node]
+    edges: list[Edge]
+
+    def add(self, node: Node) -> None:
+        self.nodes[node.id] = node
+
+    def join(self, source: str, target: str, label: str = "", *, idle: bool = False, back: bool = False) -> None:
+        self.edges.append(Edge(source, target, label, idle, back))
+
+
+class _Builder:
+    def __init__(
+        self,
+        spec: TaskSpec,
+        file: ControllersSpec,
+        robot: RobotModel,
+        scene: Scene,
+        topics: Mapping[str, Topic] | None,
+        *,
+        version: str = "",
+        notes: tuple[str, ...] = (),
+    ) -> None:
+        self._spec, self._file, self._robot, self._scene = spec, file, robot, scene
+        self._topics, self._notes = topics, notes
+        self._period = spec.simulation.control_period
+        self._member = ENGINES[spec.simulation.engine]
+        self._version = version or self._member.version()
+        manager = build_controllers(file, robot, self._period)
+        self._controllers = manager.controllers
+        self._found = _Found({}, [])
+
+    def graph(self) -> Graph:
+        self._task()
+        for controller in self._controllers:
+            self._controller(controller)
+        self._limits_and_drives()
+        self._engine()
+        self._feedback()
+        self._publish()
+        return Graph(self._spec.task, tuple(self._found.nodes.values()), tuple(self._found.edges), self._notes)
+
+    def _task(self) -> None:
+        spec, found = self._spec, self._found
+        steps = tuple(
+            f"{step.id}: {step.verb}{f', until {step.until.name}' if step.until is not None else ''}"
+            for step in spec.steps
+        )
+        found.add(Node("task", "task", spec.task, details=(_count(len(steps), "step"),), items=steps))
+        found.add(Node("planner", "planner", "planner", details=(f"seed {spec.simulation.seed}",)))
+        found.join("task", "planner", "steps")
+
+    def _controller(self, controller: Controller) -> None:
+        own = self._file.controllers[controller.name]
+        rate = own.update_rate or 1.0 / self._period
+        details = [own.type, f"{rate:g} Hz"]
+        if controller.feed_forward != "none":
+            details.append(f"adds {controller.feed_forward.replace('_', ' ')}")
+        details += [] if own.active else ["inactive at the start"]
+        found = self._found
+        found.add(Node(controller.name, "controller", controller.name, details=tuple(details), idle=not own.active))
+        if is_follower(controller) or is_hand(controller):
+            what = "trajectories" if is_follower(controller) else "grips"
+            found.join("planner", controller.name, f"{what} by {action_of(controller)}", idle=not own.active)
+        if controller.interfaces:
+            what = f"{', '.join(controller.interfaces)} of {_named(controller.joints)}"
+            found.join(controller.name, "limits", what, idle=not own.active)
+
+    def _limits_and_drives(self) -> None:
+        """Joint limits, then transmissions and actuators, where those change anything."""
+        robot, found = self._robot, self._found
+        limits = [joint.limits for joint in robot.moving_joints]
+        kinds = {
+            "position": any(one.lower is not None or one.upper is not None for one in limits),
+            "velocity": any(one.velocity is not None for one in limits),
+            "effort": any(one.effort is not None for one in limits),
+            "soft": any(one.soft is not None for one in limits),
+        }
+        held = [kind for kind, there in kinds.items() if there]
+        found.add(Node("limits", "limits", "joint limits", details=(_count(len(limits), "joint"), *held)))
+        actuation = Actuation(robot, self._period)
+        acts = bool(actuation.names) and not actuation.ideal and self._member.physics == "full"
+        by_effort = any("effort" in controller.interfaces for controller in self._controllers)
+        others = sorted({one for c in self._controllers for one in c.interfaces if one != "effort"})
+        if actuation.names:
+            found.add(self._drives(actuation, acts=acts))
+        if acts and by_effort:
+            found.join("limits", "drives", "effort")
+            found.join("drives", "engine", "effort at the joints")
+            if others:
+                found.join("limits", "engine", ", ".join(others))
+        else:
+            found.join("limits", "engine", ", ".join([*others, *(["effort"] if by_effort else [])]))
+        if actuation.names and not (acts and by_effort):
+            found.join("engine", "drives", "position, velocity, effort")
+
+    def _drives(self, actuation: Actuation, *, acts: bool) -> Node:
+        names = actuation.names
+        tags = [tag for tag in self._robot.transmissions if set(tag.actuators) <= set(names)]
+        kinds = dict.fromkeys(tag.type for tag in tags)
+        counts = [f"{sum(tag.type == kind for tag in tags)} {kind}" for kind in kinds]
+        details = (
+            f"transmissions: {', '.join(counts)}",
+            _count(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
+            "their limits, friction and latency act" if acts else "ideal: they change nothing",
+        )
+        return Node("drives", "drive", "transmissions and actuators", details=details)
+
+    def _engine(self) -> None:
+        simulation, found = self._spec.simulation, self._found
+        steps = round(simulation.control_period / simulation.step)
+        physics = f"{_count(steps, 'physics step')} of {1e3 * simulation.step:g} ms a tick"
+        if self._member.physics != "full":
+            physics = "no physics: references come true"
+        found.add(Node("engine", "engine", f"{self._member.name} {self._version}".strip(), details=(physics,)))
+        bodies = self._scene.bodies
+        free = sum(not body.fixed for body in bodies)
+        found.add(Node("robot", "robot", self._robot.name, details=(_count(len(self._robot.links), "link"),)))
+        found.add(Node("scene", "scene", _count(len(bodies), "body", "bodies"), details=(f"{free} free to move",)))
+        found.join("robot", "engine", "description")
+        found.join("scene", "engine", "bodies")
+
+    def _feedback(self) -> None:
+        """What is measured, and who reads it."""
+        found = self._found
+        found.add(Node("joints", "sensor", "measured joints"))
+        found.add(Node("contacts", "sensor", "contacts"))
+        found.join("engine", "joints")
+        found.join("engine", "contacts")
+        for controller in self._controllers:
+            idle = not self._file.controllers[controller.name].active
+            if isinstance(controller, ForceTorqueBroadcaster):
+                sensor = f"wrench {controller.name}"
+                found.add(Node(sensor, "sensor", f"wrench at {controller.joint}"))
+                found.join("engine", sensor)
+                found.join(sensor, controller.name, idle=idle, back=True)
+                continue
+            if controller.joints:
+                found.join("joints", controller.name, idle=idle, back=True)
+            if is_hand(controller):
+                found.join("contacts", controller.name, "forces", idle=idle, back=True)
+
+    def _publish(self) -> None:
+        """Topics, each by who publishes it."""
+        found, spec = self._found, self._spec
+        selection = Selection(spec.record.strides(self._period), spec.record.left_out)
+        common = {channel.topic for channel in channel_table([])}
+        rows = [(channel, PRODUCERS[channel.topic]) for channel in channel_table([])]
+        for controller in self._controllers:
+            mine = channel_table([recorded(controller)])
+            rows += [(channel, controller.name) for channel in mine if channel.topic not in common]
+        for channel, producer in rows:
+            if self._topics is None:
+                if not selection.holds(channel):
+                    continue
+                clock = word(channel.topic) in BY_THE_CLOCK
+                rate = 1.0 / (selection.stride(channel.topic, self._period) * self._period)
+                about = f"{rate:g} Hz" if clock else ""
+            elif channel.topic in self._topics:
+                about = _held(self._topics[channel.topic])
+            else:
+                continue
+            found.add(_topic_node(channel.topic, channel.type, about))
+            if producer in found.nodes:
+                found.join(producer, channel.topic)
+        known = {channel.topic for channel, _ in rows}
+        for name, topic in (self._topics or {}).items():
+            if name not in known:
+                found.add(_topic_node(name, topic.type, _held(topic)))
+
+
+def _topic_node(name: str, kind: str, about: str) -> Node:
+    return Node(name, "topic", name, kind, (about,) if about else ())
+
+
+def _held(topic: Topic) -> str:
+    """`14550 messages, 1000 Hz`."""
+    text = _count(topic.count, "message")
+    if topic.count > 2 and topic.last > topic.first:
+        text += f", {(topic.count - 1) / ((topic.last - topic.first) / 1e9):.4g} Hz"
+    return text
+
+
+def _named(names: Sequence[str]) -> str:
+    """The first few, and the last."""
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{names[0]}, {names[1]} … {names[-1]}"
+
+
+def _count(number: int, noun: str, nouns: str | None = None) -> str:
+    return f"{number} {noun if number == 1 else nouns or f'{noun}s'}"

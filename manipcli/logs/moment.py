@@ -1,0 +1,196 @@
+"""A log at one moment; also of logs that somebody else wrote, as far as they go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.conditions.state_window import ROUNDING
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Array, Transform
+from manipcli.judge.steps import step_outcomes
+from manipcli.logs.log import URDF, recorded_robot
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.state import Contact
+from manipcli.record.channels import CONTACTS, EVENTS, TF
+from manipcli.record.contents import RECORD
+from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
+from manipcli.record.inventory import Inventory, inventory
+from manipcli.record.messages import WORLD
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import Recording, Span, TaskEvent
+from manipcli.record.snapshot import snapshot
+from manipcli.record.units import joint_units
+from manipcli.replay.sampling import references
+from manipcli.report.moment import JointMoment, Moment, PoseMoment
+
+
+def moment(path: Path, time: float) -> Moment:
+    """What a log says of `time` [s from its beginning].
+
+    Raises:
+        InvalidInput: the file is no log, is damaged, or ends before.
+    """
+    found = inventory(path)
+    if not 0.0 <= time <= found.duration + ROUNDING:
+        message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
+        raise InvalidInput([Finding("LOG110", message)])
+    if RECORD not in found.metadata:
+        return _others(path, found, time, why="manipcli did not write it")
+    try:
+        return _ours(path, time)
+    except Thinned:
+        return _others(path, found, time, why=LEFT_OUT)
+
+
+def step_ends(path: Path) -> dict[str, float]:
+    """Until when [s] each step of a log is on: one tick before the next begins, or up to the end of the log.
+
+    Raises:
+        InvalidInput: the file is no log, or is damaged.
+    """
+    end = inventory(path).duration
+    try:
+        recording = open_recording(path)
+    except BadRecording:  # manipcli did not write it: it tells of no steps
+        return {}
+    return {
+        one.id: end if one.ended is None else max(one.started, round(one.ended - recording.period, 9))
+        for one in step_outcomes(recording, interrupted=False)
+        if one.started is not None
+    }
+
+
+def _ours(path: Path, time: float) -> Moment:
+    recording = open_recording(path)
+    missing = [] if recording.lost is None else [recording.lost]
+    missing += [recording.unknown(topic) for topic in (TF, CONTACTS, EVENTS) if recording.unknown(topic)]
+    span, k, touched, end = _at(recording.spans, time)
+    if span is None:
+        raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
+    states = span.states
+    now = float(states.time[k])
+    wanted = references(span.controllers, recording.joint_names, len(states.time))[k]
+    units = joint_units(recording.attachments.get(URDF, b""))
+    joints = tuple(
+        JointMoment(
+            name,
+            units.get(name, ""),
+            float(states.position[k, j]),
+            float(states.velocity[k, j]),
+            float(states.effort[k, j]),
+            None if np.isnan(wanted[j]) else float(wanted[j]),
+        )
+        for j, name in enumerate(recording.joint_names)
+    )
+    poses = tuple(
+        PoseMoment(
+            name,
+            WORLD,
+            _pose(states.body_position[k, j], states.body_quat_xyzw[k, j]),
+            float(np.linalg.norm(states.body_linear[k, j])),
+        )
+        for j, name in enumerate(recording.body_names)
+        if TF not in recording.absent
+    )
+    step, phase = active(recording.events, time)
+    return Moment(
+        log=str(path),
+        asked=time,
+        time=now,
+        end=end,
+        step="" if step is None else step.step,
+        verb="" if step is None else step.verb,
+        phase=phase,
+        joints=joints,
+        poses=poses,
+        contacts=None if recording.unknown(CONTACTS) else touched,
+        missing=tuple(missing),
+        tool=_tool(recording, path, states.position[k], states.velocity[k]),
+    )
+
+
+def _tool(recording: Recording, path: Path, q: Array, v: Array) -> PoseMoment | None:
+    """Where the tool frame of the robot is with its joints at `q` and `v` (n); None where the log lacks its files."""
+    try:
+        robot = recorded_robot(recording, path)
+    except InvalidInput:
+        return None
+    if robot.tool is None or not (np.isfinite(q).all() and np.isfinite(v).all()):
+        return None
+    link, X_LT = robot.tool.link, robot.tool.X_LT
+    kinematics = Kinematics(robot)
+    speed = float(np.linalg.norm(kinematics.point_velocity(q, v, link, X_LT)))
+    return PoseMoment("tool", WORLD, kinematics.forward(q, link) @ X_LT, speed)
+
+
+def _at(spans: Iterable[Span], time: float) -> tuple[Span | None, int, tuple[Contact, ...], float]:
+    """The span with the last state until `time`, its row there, what touched, and the time [s] of the last state."""
+    chosen, k, end = None, 0, 0.0
+    touched: tuple[Contact, ...] = ()
+    for span in spans:
+        if not len(span.states.time):
+            continue
+        end = float(span.states.time[-1])
+        if span.states.time[0] > time + ROUNDING:
+            continue
+        chosen = span
+        k = int(np.searchsorted(span.states.time, time + ROUNDING, side="right")) - 1
+        for change in span.contacts:
+            if change.time <= time + ROUNDING:
+                touched = change.contacts
+    return chosen, k, touched, end
+
+
+def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, str]:
+    """The step that is on at `time` [s], as the event that began it, and its phase; None between steps."""
+    step: TaskEvent | None = None
+    phase = ""
+    for event in events:
+        if event.time > time + ROUNDING:
+            break
+        if event.kind == "step_started":
+            step, phase = event, ""
+        elif event.kind == "phase_started":
+            phase = event.text
+        elif event.kind == "step_ended":
+            step, phase = None, ""
+    return step, phase
+
+
+def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
+    start = found.start or 0.0
+    taken = snapshot(path, found, start + time)
+    missing = [f"there is no {topic}" for topic in taken.lacks]
+    missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
+    units = {
+        before + name: unit for before, urdf in taken.urdf.items() for name, unit in joint_units(urdf.encode()).items()
+    }
+    newest = [sample.time for sample in taken.joints.values()] + [sample.time for sample in taken.frames.values()]
+    return Moment(
+        log=str(path),
+        asked=time,
+        time=max(newest, default=start) - start,
+        end=found.duration,
+        step="",
+        verb="",
+        phase="",
+        joints=tuple(
+            JointMoment(name, units.get(name, ""), one.position, one.velocity, one.effort)
+            for name, one in taken.joints.items()
+        ),
+        poses=tuple(
+            PoseMoment(name, one.parent, _pose(one.pose[:3], one.pose[3:])) for name, one in taken.frames.items()
+        ),
+        contacts=None,
+        missing=(*found.faults, *missing),
+        ours=False,
+    )
+
+
+def _pose(position: npt.ArrayLike, quat_xyzw: npt.ArrayLike) -> Transform:
+    """Others write quaternions of zeros."""
+    return Transform.of(xyz=position, quat_xyzw=quat_xyzw if np.any(quat_xyzw) else None)

@@ -1,0 +1,352 @@
+"""A ROS 2 log that manipcli did not write, as far as it can be shown: `/robot_description`, `/joint_states`, `/tf`.
+
+What is missing is said and done without: joints that no `/joint_states` names are taken from `/tf`, else shown at zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
+from manipcli.core.text import did_you_mean, listed
+from manipcli.description.description import unread_description
+from manipcli.description.elements import Joint
+from manipcli.description.urdf.urdf import read_parts
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.model.build_robot import bare_robot
+from manipcli.model.robot import RobotModel
+from manipcli.record import channels
+from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.columns import singly
+from manipcli.record.contents import RECORD
+from manipcli.record.faults import BadRecording
+from manipcli.record.namespaces import TYPES, meant, namespaces
+from manipcli.record.scan import METADATA, Scan
+from manipcli.record.snapshot import joint_state, transforms
+from manipcli.record.topics import Topics, open_topics
+from manipcli.replay.drawing import WORLD
+from manipcli.replay.playback import Playback
+from manipcli.scene.scene import Body, Scene
+
+LEAST_STEADY = 1e-6
+"""[m], and of a quaternion's parts: a frame that moves by less stands still."""
+MAX_TIMES = 200_000
+"""Of what is shown: more than an hour at the usual rate."""
+
+
+def is_own(path: Path) -> bool:
+    """Whether manipcli wrote a log: such a one says what it holds before its first message.
+
+    Raises:
+        BadRecording: it is no MCAP file, or damaged.
+    """
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Metadata
+
+    return any(
+        record.opcode == METADATA and Metadata.read(ReadDataStream(BytesIO(record.body))).name == RECORD
+        for record in Scan(path)
+    )
+
+
+@dataclass(slots=True)
+class _Samples:
+    """One thing over time: times [s] and rows of numbers, as they came."""
+
+    times: list[float]
+    rows: list[Sequence[float]]
+
+    def at(self, times: Array) -> Array:
+        """(T, c) between the samples in a straight line, beyond them as the nearest."""
+        known, rows = np.array(self.times), np.array(self.rows, dtype=np.float64)
+        order = np.argsort(known, kind="stable")
+        return np.stack([np.interp(times, known[order], column[order]) for column in rows.T], axis=1)
+
+    def told(self, times: Array) -> Array:
+        """The same with NaN before the first sample."""
+        found = self.at(times)
+        found[times < min(self.times)] = np.nan
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Poses:
+    """A frame over time: `p` (T, 3), `q` (T, 4) xyzw."""
+
+    p: Array
+    q: Array
+
+    def __matmul__(self, other: _Poses) -> _Poses:
+        return _Poses(self.p + rotate(self.q, other.p), quat_product(self.q, other.q))
+
+    def inverse(self) -> _Poses:
+        back = self.q * np.array([-1.0, -1.0, -1.0, 1.0])
+        return _Poses(-rotate(back, self.p), back)
+
+    @property
+    def steady(self) -> bool:
+        """Whether it does not move."""
+        turned = np.minimum(np.abs(self.q - self.q[:1]), np.abs(self.q + self.q[:1]))
+        return bool(np.ptp(self.p, axis=0).max() < LEAST_STEADY and turned.max() < LEAST_STEADY)
+
+
+class _Log:
+    """What was read of the log; of the robots in several namespaces, of that in `space` and of what they share."""
+
+    def __init__(self, topics: Topics, space: str | None) -> None:
+        self.urdf = ""
+        self.joints: dict[str, _Samples] = {}
+        self.frames: dict[tuple[str, str], _Samples] = {}
+        self.start, self.end = np.inf, -np.inf
+        known = meant({name: topic.type for name, topic in topics.all.items()})
+        self.spaces = namespaces(known.values())
+        if space is not None and space not in self.spaces:
+            raise InvalidInput([_no_robot(topics.path, space, self.spaces)])
+        # Of several robots none is meant; of one alone, in whatever namespace, it is.
+        shown = {"", space, *(self.spaces if len(self.spaces) == 1 else ())}
+        wanted = {name: one.usual for name, one in known.items() if one.namespace in shown}
+        self.unshown = [name for name in known if name not in wanted]
+        there = {one.usual for name, one in known.items() if space is None or name in wanted}
+        self.lacks = [name for name in TYPES if name not in there and name != channels.TF_STATIC]
+        begin = self._first(topics, wanted)
+        for topic, data, places in topics.messages(wanted):
+            try:
+                for ns, reader in singly(data, places):
+                    self._take(wanted[topic], (ns - begin) / 1e9, reader)
+            except CdrError as error:
+                raise BadRecording(topics.path, f"{topic} cannot be read: {error}") from error
+
+    def _first(self, topics: Topics, wanted: Mapping[str, str]) -> int:
+        """[ns] when what moves begins: a description may be from long before."""
+        moving = [topics.all[name] for name, usual in wanted.items() if usual in (channels.JOINT_STATES, channels.TF)]
+        return min((one.first for one in moving if one.count), default=topics.start)
+
+    def _take(self, topic: str, time: float, reader: CdrReader) -> None:
+        if topic == channels.ROBOT_DESCRIPTION:
+            self.urdf = reader.text()
+        elif topic == channels.JOINT_STATES:
+            self._saw(time)
+            self._joint_state(time, reader)
+        else:
+            if topic == channels.TF:
+                self._saw(time)
+            self._transforms(time, reader)
+
+    def _saw(self, time: float) -> None:
+        self.start, self.end = min(self.start, time), max(self.end, time)
+
+    def _joint_state(self, time: float, reader: CdrReader) -> None:
+        names, runs = joint_state(reader)
+        whole = (run if len(run) == len(names) else [np.nan] * len(names) for run in runs)
+        for name, *row in zip(names, *whole, strict=True):
+            samples = self.joints.setdefault(name, _Samples([], []))
+            samples.times.append(time)
+            samples.rows.append(row)
+
+    def _transforms(self, time: float, reader: CdrReader) -> None:
+        for parent, child, row in transforms(reader):
+            samples = self.frames.setdefault((parent, child), _Samples([], []))
+            if samples.rows and sum(a * b for a, b in zip(row[3:], samples.rows[-1][3:], strict=True)) < 0.0:
+                row[3:] = [-value for value in row[3:]]  # the same rotation, on the side of the one before it
+            samples.times.append(time)
+            samples.rows.append(row)
+
+
+NOWHERE: Final = "shown at zero, as nothing says where they are"
+AT_TIMES: Final = "shown as they were before, or will be, while nothing says where they are"
+FOREIGN: Final = "manipcli did not write this log"
+
+
+def open_other(
+    path: Path,
+    *,
+    rate: float,
+    space: str | None = None,
+    why: str = FOREIGN,
+    package_path: Sequence[Path],
+    allow_outside: bool,
+) -> Playback:
+    """A log of another program, as it is shown; see `open_playback`. `why` it has to be taken for one.
+
+    Raises:
+        InvalidInput: it is no MCAP file, damaged, or holds neither joints nor frames that move.
+    """
+    topics = open_topics(path)
+    log = _Log(topics, space)
+    notes = [f"{why}: it has no steps, no contacts, no references and no verdict"]
+    subject = "it" if space is None else f"'{space}'"
+    notes += [f"{subject} has no {name} ({TYPES[name]})" for name in log.lacks]
+    several = f"it tells of several robots, in {listed(log.spaces)}" if len(log.spaces) > 1 else ""
+    notes += [f"{several}: what {listed(log.unshown)} say is not shown"] if several else []
+    if not np.isfinite(log.start):
+        unchosen = several if space is None else ""
+        what = unchosen or f"{subject} has neither {channels.JOINT_STATES} nor {channels.TF}"
+        message = f"{path.name}: nothing to show: {what}"
+        hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
+        if unchosen:
+            hint = f"show one of them with --robot, as in --robot {log.spaces[0]}"
+        raise InvalidInput([Finding("REPLAY002", message, hint=hint)])
+    count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
+    times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
+    tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
+    robot = _robot(log.urdf, notes)
+    if robot is not None:
+        meshes = MeshSearch(path, package_path=package_path, allow_outside=allow_outside)
+        robot = meshes.robot(_placed(robot, tree, notes))
+        notes += meshes.notes
+    names = robot.joint_names if robot is not None else tuple(log.joints)
+    unknown: dict[str, list[str]] = {}
+    columns = [_joint(name, log, robot, tree, times, unknown) for name in names]
+    notes += [f"{what}: {listed(each)}" for what, each in unknown.items()]
+    position, velocity, effort = np.moveaxis(np.array(columns).reshape(-1, len(times), 3), (2, 1), (0, 1))
+    scene, p, q = _scene(robot, tree, len(times))
+    return Playback(
+        name=path.name,
+        robot=robot,
+        scene=scene,
+        joint_names=names,
+        times=frozen(times),
+        position=frozen(position),
+        velocity=frozen(velocity),
+        effort=frozen(effort),
+        reference=frozen(np.full_like(position, np.nan)),
+        body_position=frozen(p),
+        body_quat_xyzw=frozen(q),
+        contacts=((),) * len(times),
+        lost=topics.lost,
+        notes=tuple(notes),
+    )
+
+
+def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Finding:
+    hint = did_you_mean(space, spaces, kind="namespaces") or "it tells of one robot at most: leave --robot out"
+    return Finding("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
+
+
+def _poses(samples: _Samples, times: Array) -> _Poses:
+    rows = samples.at(times)
+    length = np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    q = np.where(length > 0.0, rows[:, 3:] / np.where(length > 0.0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
+    return _Poses(rows[:, :3], q)
+
+
+def _robot(urdf: str, notes: list[str]) -> RobotModel | None:
+    """The robot of a description without its file; where it cannot be used the first error is noted."""
+    if not urdf:
+        return None
+    try:
+        parts = read_parts(unread_description(urdf.encode(), "robot_description"))
+    except InvalidInput as error:
+        notes.append(f"the robot is not shown: {error.findings[0].message}")
+        return None
+    if parts.errors:
+        notes.append(f"the robot is not shown: {parts.errors[0].message}")
+        return None
+    return bare_robot(parts)
+
+
+def _chain(frame: str, tree: Mapping[str, tuple[str, _Poses]]) -> tuple[str, _Poses | None]:
+    """The frame at the top above a frame, and the pose of the frame in it; None where it is the top itself."""
+    pose: _Poses | None = None
+    seen = {frame}
+    while frame in tree:
+        frame, above = tree[frame]
+        pose = above if pose is None else above @ pose
+        if frame in seen:
+            break
+        seen.add(frame)
+    return frame, pose
+
+
+def _placed(robot: RobotModel, tree: Mapping[str, tuple[str, _Poses]], notes: list[str]) -> RobotModel:
+    """The robot where its base stands; one that drives about is shown at the origin, and what is around it moves."""
+    top, pose = _chain(robot.root, tree)
+    if pose is None:
+        return robot
+    if pose.steady:
+        return replace(robot, X_WB=Transform.of(xyz=pose.p[0], quat_xyzw=pose.q[0]))
+    notes.append(f"the robot's base moves in '{top}': everything is shown as seen from '{robot.root}'")
+    return robot
+
+
+def _joint(
+    name: str,
+    log: _Log,
+    robot: RobotModel | None,
+    tree: Mapping[str, tuple[str, _Poses]],
+    times: Array,
+    unknown: dict[str, list[str]],
+) -> Array:
+    """(T, 3) position, velocity, effort of a joint; NaN for what is not known. `unknown`: what to say, of which."""
+    if name in log.joints:
+        found = log.joints[name].told(times)
+        lacks = np.isnan(found[:, 0])
+        if lacks.all():
+            unknown.setdefault(NOWHERE, []).append(name)
+        elif lacks.any():
+            unknown.setdefault(AT_TIMES, []).append(name)
+        return found
+    found = np.full((len(times), 3), np.nan)
+    joint = robot.joint(name) if robot is not None else None
+    if joint is not None and joint.child in tree and tree[joint.child][0] == joint.parent:
+        found[:, 0] = _angle(joint, tree[joint.child][1])
+        unknown.setdefault(f"taken from {channels.TF}, as no {channels.JOINT_STATES} names them", []).append(name)
+    elif joint is not None and joint.mimic is not None and joint.mimic.joint in log.joints:
+        leader = log.joints[joint.mimic.joint].told(times)[:, 0]
+        found[:, 0] = joint.mimic.multiplier * leader + joint.mimic.offset
+    else:
+        unknown.setdefault(NOWHERE, []).append(name)
+    return found
+
+
+def _angle(joint: Joint, pose: _Poses) -> Array:
+    """(T,) the position of a joint whose child link stands so in its parent: X_PC = X_PJ X_JC(position)."""
+    inside = _Poses(joint.X_PJ.p[None], joint.X_PJ.quat_xyzw[None]).inverse() @ pose
+    if joint.type == "prismatic":
+        return np.asarray(inside.p @ joint.axis)
+    return np.unwrap(2.0 * np.arctan2(inside.q[:, :3] @ joint.axis, inside.q[:, 3]))
+
+
+def _scene(robot: RobotModel | None, tree: Mapping[str, tuple[str, _Poses]], count: int) -> tuple[Scene, Array, Array]:
+    """Frames that are no links of the robot, as bodies without a shape, and their poses (T, m, 3) and (T, m, 4)."""
+    links = {link.name for link in robot.links} if robot is not None else set()
+    base = _chain(robot.root, tree)[1] if robot is not None else None
+    back = base.inverse() if base is not None and not base.steady else None
+    bodies, p, q = [], [np.zeros((count, 0, 3))], [np.zeros((count, 0, 4))]
+    for frame in tree:
+        _, pose = _chain(frame, tree)
+        if frame in links or pose is None:
+            continue
+        shown = pose if back is None else back @ pose
+        # The names of the world and of links are taken in a drawing.
+        bodies.append(_shapeless(f"/{frame}" if frame == WORLD or frame.startswith("robot/") else frame))
+        p.append(shown.p[:, None])
+        q.append(shown.q[:, None])
+    return Scene(tuple(bodies), (), frozen([0.0, 0.0, 0.0])), np.concatenate(p, axis=1), np.concatenate(q, axis=1)
+
+
+def _shapeless(name: str) -> Body:
+    return Body(
+        name=name,
+        kind="frame",
+        geometries=(),
+        mass=0.0,
+        X_OI=Transform.identity(),
+        inertia=frozen(np.zeros((3, 3))),
+        friction=0.0,
+        rolling_friction=0.0,
+        spinning_friction=0.0,
+        restitution=0.0,
+        fixed=False,
+        X_WO=Transform.identity(),
+        interior=None,
+        size=frozen(np.zeros(3)),
+        centre=frozen(np.zeros(3)),
+    )

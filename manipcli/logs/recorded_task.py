@@ -1,0 +1,165 @@
+"""A log to the task that it is the run of, ready to be run again: from its attachments and the files of its meshes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from manipcli import __version__
+from manipcli.core.errors import Finding, InvalidInput, Loc, Place
+from manipcli.core.geometry import frozen
+from manipcli.judge.drawn import SAMPLE, Drawn
+from manipcli.judge.steps import PLAN_FILE
+from manipcli.logs.log import (
+    URDF,
+    attached,
+    mesh_files,
+    recorded_controllers_file,
+    recorded_robot,
+    recorded_robot_file,
+    recorded_scene,
+    recorded_task_file,
+)
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.model.build_robot import rebuild_robot
+from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Scene
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec.source.located import Located
+from manipcli.spec.task import TaskSpec
+from manipcli.task.consistency import disagreements
+from manipcli.task.sample import sampled
+from manipcli.task.task import Task
+from manipcli.task.vary import bind
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTask:
+    """The task of a log.
+
+    Attributes:
+        task: as it was.
+        embedded: whether the log carries its meshes.
+        unlike: what is not as it was in the run (versions, meshes), a sentence each.
+        keep: holds the folder of the files that were in the log.
+    """
+
+    task: Task
+    embedded: bool
+    unlike: tuple[Finding, ...]
+    keep: MeshSearch
+
+
+def recorded_task(
+    recording: Recording, path: Path, *, package_path: Sequence[Path], allow_outside: bool
+) -> RecordedTask:
+    """The task of a log.
+
+    Args:
+        recording: the log.
+        path: where it is.
+        package_path, allow_outside: where meshes are looked for that it does not carry, see `MeshSearch`.
+
+    Raises:
+        InvalidInput: it lacks a file, one of them cannot be used, or a mesh is not found.
+    """
+    task = recorded_task_file(recording, path)
+    robot_file = recorded_robot_file(recording, path)
+    controllers = recorded_controllers_file(recording, path)
+    meshes = MeshSearch(
+        path,
+        hashes=recording.metadata.get("meshes", {}),
+        embedded=recording.embedded_meshes(),
+        package_path=package_path,
+        allow_outside=allow_outside,
+    )
+    robot = meshes.robot(recorded_robot(recording, path))
+    # What the scene was built from may be files that no log carries; otherwise the task itself says it.
+    from_files = any(body.mesh is not None or body.urdf is not None for body in task.spec.scene.values())
+    found_scene = meshes.scene(recorded_scene(recording, path)) if from_files else None
+
+    def scene_of(file: Located[TaskSpec]) -> Scene:
+        if found_scene is None:
+            return build_scene(file.spec)
+        return replace(found_scene, gravity=frozen(file.spec.simulation.gravity))  # recorded is what was drawn
+
+    scene = scene_of(task)
+    found = disagreements(task, controllers, robot, scene)
+    if any(finding.severity == "error" for finding in found):
+        raise InvalidInput(found)
+    made = Task(
+        file=task,
+        robot_file=robot_file,
+        controllers_file=controllers,
+        robot=robot,
+        scene=scene,
+        findings=(*task.findings, *robot_file.findings, *controllers.findings, *found),
+        places=_places(recording, path, task.spec),
+    )
+    drawn = _drawn(recording, path)
+    if drawn is not None:
+        made = sampled(
+            made,
+            bind(task, robot_file, controllers)[0],
+            drawn,
+            robot_of=lambda file: meshes.robot(rebuild_robot(file.spec, attached(recording, path, URDF))),
+            scene_of=scene_of,
+        )
+    files = mesh_files(made)
+    _check_there(files, path, meshes)
+    unlike = (*_versions(recording, path, made), *_meshes(recording, path, files))
+    return RecordedTask(made, EMBEDDED in recording.metadata, unlike, meshes)
+
+
+def _drawn(recording: Recording, path: Path) -> Drawn | None:
+    """Which sample the run was of, if it was of one."""
+    if SAMPLE not in recording.metadata:
+        return None
+    try:
+        return Drawn.from_metadata(recording.metadata[SAMPLE])
+    except ValueError:
+        message = f"{path.name}: what was drawn for its sample cannot be read"
+        raise InvalidInput([Finding("LOG103", message)]) from None
+
+
+def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
+    """Where steps and what is judged were written, as the plan in the log says; {} where it does not."""
+    try:
+        plan = json.loads(attached(recording, path, PLAN_FILE))
+        places = [*(step["place"] for step in plan["steps"]), *plan["judged"]]
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return {}
+    keys = [*(("steps", k) for k in range(len(spec.steps))), *spec.judged_at]
+    whole = len(places) == len(keys) and all(isinstance(place, str) for place in places)
+    return dict(zip(keys, places, strict=True)) if whole else {}
+
+
+def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:
+    absent = [uri for uri, file in files.items() if not file.is_file()]
+    if absent:
+        more = f" (and {len(absent) - 1} more)" if len(absent) > 1 else ""
+        message = f"mesh '{absent[0]}' is not found{more}: nothing can be simulated again without it"
+        hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
+        raise InvalidInput([Finding("LOG400", message, Place(str(path), 0, 0), hint=hint)])
+
+
+def _versions(recording: Recording, path: Path, task: Task) -> Iterator[Finding]:
+    engine = ENGINES[task.spec.simulation.engine]
+    now = {"manipcli": __version__, engine.name: engine.version()}
+    then = recording.metadata.get("versions", {})
+    for name in dict.fromkeys((*then, *now)):
+        if then.get(name) != now.get(name):
+            message = f"the run was made with {name} {then.get(name, '(unknown)')}; this is {now.get(name, 'without')}"
+            yield Finding("LOG401", message, Place(str(path), 0, 0), severity="warning")
+
+
+def _meshes(recording: Recording, path: Path, files: Mapping[str, Path]) -> Iterator[Finding]:
+    then = recording.metadata.get("meshes", {})
+    for uri, file in files.items():
+        if hashlib.sha256(file.read_bytes()).hexdigest() != then.get(uri):
+            message = f"mesh '{uri}' is not the file that it was in the run"
+            yield Finding("LOG402", message, Place(str(path), 0, 0), severity="warning")

@@ -1,0 +1,122 @@
+"""A log to what is shown of it, from nothing but the log and the files of its meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import frozen
+from manipcli.judge.verdict import StepOutcome, Verdict
+from manipcli.logs.log import judge_recording, recorded_robot, recorded_scene
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.other_log import is_own, open_other
+from manipcli.record.channels import TF
+from manipcli.record.faults import LEFT_OUT, Thinned
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import TaskEvent
+from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
+from manipcli.replay.sampling import plot_tables, sampled
+
+
+def open_playback(
+    path: Path,
+    *,
+    rate: float = RATE,
+    space: str | None = None,
+    meshes: Mapping[str, Path] = {},
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> Playback:
+    """A log as it is shown.
+
+    Args:
+        path: the log of a run, what a killed run left of it, or a ROS 2 log of another program.
+        rate: [Hz] of what is shown.
+        space: the namespace of the robot that is shown, of several that another program recorded, as `/r1`.
+        meshes: files that the run had, by URI, where they are known.
+        package_path: folders to look for packages of meshes in, before those near the log and the working directory.
+        allow_outside: lets a mesh lie anywhere.
+
+    Raises:
+        InvalidInput: the file is no log, is damaged, or has nothing to show.
+    """
+    if space is None and is_own(path):
+        try:
+            return _open_own(path, rate=rate, known=meshes, package_path=package_path, allow_outside=allow_outside)
+        except Thinned:
+            return open_other(path, rate=rate, why=LEFT_OUT, package_path=package_path, allow_outside=allow_outside)
+    return open_other(path, rate=rate, space=space, package_path=package_path, allow_outside=allow_outside)
+
+
+def _open_own(
+    path: Path, *, rate: float, known: Mapping[str, Path], package_path: Sequence[Path], allow_outside: bool
+) -> Playback:
+    recording = open_recording(path)
+    samples = sampled(recording, rate=rate)
+    if not len(samples.times):
+        raise InvalidInput([Finding("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
+    robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
+    verdict = judge_recording(recording, path)
+    meshes = MeshSearch(
+        path,
+        hashes=recording.metadata.get("meshes", {}),
+        embedded=recording.embedded_meshes(),
+        known=known,
+        package_path=package_path,
+        allow_outside=allow_outside,
+    )
+    robot, scene = meshes.robot(robot), meshes.scene(scene)
+    notes = meshes.notes
+    body_position, body_quat_xyzw = samples.body_position, samples.body_quat_xyzw
+    if TF in recording.absent:
+        start = [scene.body(name).X_WO for name in recording.body_names]
+        body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
+        body_quat_xyzw = frozen(np.broadcast_to([X_WO.quat_xyzw for X_WO in start], body_quat_xyzw.shape))
+        notes = (*notes, f"the run did not record {TF}: every body is drawn where it was at the start")
+    notes = (*notes, *(recording.unknown(topic) for topic in recording.silent))
+    return Playback(
+        name=verdict.task or path.name,
+        robot=robot,
+        scene=scene,
+        joint_names=recording.joint_names,
+        times=samples.times,
+        position=samples.position,
+        velocity=samples.velocity,
+        effort=samples.effort,
+        reference=samples.reference,
+        body_position=body_position,
+        body_quat_xyzw=body_quat_xyzw,
+        contacts=samples.contacts,
+        steps=playback_steps(verdict, recording.events, end=float(samples.times[-1])),
+        verdict=verdict,
+        lost=recording.lost,
+        notes=notes,
+        tables=partial(plot_tables, recording, robot),
+        keep=meshes.folder,
+    )
+
+
+def playback_steps(verdict: Verdict, events: Sequence[TaskEvent], *, end: float) -> tuple[PlaybackStep, ...]:
+    """The steps that were begun; what did not end, ends at `end` [s]."""
+    begun = [step for step in verdict.steps if step.started is not None]
+    return tuple(_step(step, events, end) for step in sorted(begun, key=lambda step: step.started or 0.0))
+
+
+def _step(step: StepOutcome, events: Sequence[TaskEvent], end: float) -> PlaybackStep:
+    start, last = step.started or 0.0, end if step.ended is None else step.ended
+    begins = [(one.text, one.time) for one in events if one.kind == "phase_started" and one.step == step.id]
+    return PlaybackStep(
+        id=step.id,
+        verb=step.verb,
+        label=step.label,
+        start=start,
+        end=last,
+        outcome=step.outcome,
+        text=step.text,
+        phases=tuple(Phase(a, begin, stop) for (a, begin), (_, stop) in pairwise([*begins, ("", last)])),
+    )

@@ -1,0 +1,274 @@
+"""A log, or a task that was refused, to the page about it and to what CI reads of it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from manipcli import __version__
+from manipcli.conditions.members.at_pose import SLIDE, AtPoseSpec
+from manipcli.conditions.members.contact_force import ContactForceSpec
+from manipcli.conditions.members.moved import UnmovedSpec
+from manipcli.conditions.members.slip import SlipSpec
+from manipcli.judge.steps import PLAN_FILE
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.logs.log import (
+    CONTROLLERS,
+    ROBOT,
+    TASK,
+    judge_recording,
+    recorded_robot,
+    recorded_scene,
+    recorded_task_file,
+)
+from manipcli.logs.replay import open_playback
+from manipcli.record.reading import open_recording
+from manipcli.record.recording import Recording
+from manipcli.replay.playback import RATE, Playback
+from manipcli.replay.shots import Shots, telling
+from manipcli.report.facts import run_facts
+from manipcli.report.quantity import quantity
+from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
+from manipcli.report.text import how_wrong
+from manipcli.spec.base import Model
+from manipcli.spec.condition import ExpectationSpec
+from manipcli.spec.load import load_task as load_spec
+from manipcli.spec.source.located import Located
+from manipcli.spec.task import TaskSpec
+from manipcli.task.task import Task
+from manipcli.task.vocabulary import task_spec
+
+PICTURE = (640, 480)
+"""Width and height of a picture [pixel]."""
+QUALITY = 82
+"""Of WebP files, 0 to 100."""
+FRAMES = 1500
+"""Of the replay in a page, so that the page of a long run does not grow without end."""
+
+Places = tuple[tuple[Written, ...], tuple[Written, ...]]
+"""Of the steps, and of the expectations, of a task."""
+
+
+def log_page(
+    path: Path, *, meshes: Mapping[str, Path] = {}, package_path: Sequence[Path] = (), allow_outside: bool = False
+) -> RunPage:
+    """The page about a log, from nothing but the log and the files of its meshes.
+
+    Args:
+        path: the log of a run, or what a killed run left of it.
+        meshes, package_path, allow_outside: see `open_playback`.
+
+    Raises:
+        InvalidInput: the file is no log of ours, or is damaged.
+    """
+    recording = open_recording(path)
+    if not any(len(span.states.time) for span in recording.spans):  # it ended before the start
+        return _page(recording, path, judge_recording(recording, path), end=None)
+    playback = open_playback(
+        path, rate=_rate(recording), meshes=meshes, package_path=package_path, allow_outside=allow_outside
+    )
+    verdict = playback.verdict
+    assert verdict is not None, "the log is one of ours"
+    page = _page(recording, path, verdict, end=playback.end)
+    worst = page.causes[0].at if page.causes else None
+    with Shots(playback, size=PICTURE, captions=False) as shots:
+        pictures = {step.id: _picture(shots, telling(playback, step)) for step in playback.steps}
+        moment = _picture(shots, worst) if worst is not None else None
+    return replace(
+        page,
+        facts=run_facts(recording, recorded_robot(recording, path), recorded_scene(recording, path), verdict.steps),
+        playback=playback,
+        pictures=pictures,
+        moment=moment,
+        notes=playback.notes,
+    )
+
+
+def _page(recording: Recording, path: Path, verdict: Verdict, *, end: float | None) -> RunPage:
+    """What needs no tick of a log. `end` [s]: of the run; None where it did not begin."""
+    places = log_places(recording, path, verdict.steps)
+    return RunPage(
+        verdict=verdict,
+        log=path.name,
+        lost=recording.lost,
+        causes=_causes(verdict, places, end=end),
+        steps=places[0],
+        expectations=places[1],
+        limits=tuple(
+            _limit(one, outcome.unit)
+            for one, outcome in zip(recorded_task_file(recording, path).spec.judged, verdict.expectations, strict=False)
+        ),
+        sources=tuple(
+            Source(name, recording.attachments[name].decode("utf-8", "replace"))
+            for name in (TASK, ROBOT, CONTROLLERS)
+            if name in recording.attachments
+        ),
+        provenance=_provenance(recording, verdict, path),
+        hashes=_hashes(recording, path),
+    )
+
+
+def refused_page(task: Task, verdict: Verdict) -> RunPage:
+    """The page about a task of which a step cannot be planned: there is no log, and the file is shown as written."""
+    places = task_places(task.file)
+    file = Path(task.file.place().file)
+    return RunPage(
+        verdict=verdict,
+        causes=_causes(verdict, places, end=None),
+        steps=places[0],
+        expectations=places[1],
+        limits=(None,) * len(verdict.expectations),
+        sources=(Source(file.name, file.read_text("utf-8", "replace")),),
+        provenance=(
+            ("manipcli", __version__),
+            ("engine", verdict.engine),
+            ("seed", str(verdict.seed)),
+            ("run", "nothing was run"),
+        ),
+    )
+
+
+def log_places(recording: Recording, path: Path, outcomes: Sequence[StepOutcome]) -> Places:
+    """Where the log says that steps and expectations were written, and their lines in the resolved task.
+
+    The steps are those of `outcomes`: a log whose plan is lost tells of those alone that began.
+    """
+    task = recorded_task_file(recording, path)
+    known, judged = _known_places(recording)
+
+    def written(place: str, *key: str | int) -> Written:
+        return Written(place.rpartition(":")[0], TASK, task.place(*key).line)
+
+    numbers = {str(step.id): k for k, step in enumerate(task.spec.steps)}
+    steps = tuple(
+        written(known.get(one.id, ""), "steps", numbers[one.id]) if one.id in numbers else Written("")
+        for one in outcomes
+    )
+    keys = task.spec.judged_at
+    return steps, tuple(written(judged[k] if len(judged) == len(keys) else "", *key) for k, key in enumerate(keys))
+
+
+def task_places(task: Located[TaskSpec]) -> Places:
+    """Where steps and expectations stand in the file of a task."""
+
+    def written(*key: str | int) -> Written:
+        place = task.place(*key)
+        name = Path(place.file).name
+        return Written(f"{name}:{place.line}", name, place.line) if place.line > 0 else Written("")
+
+    steps = tuple(written("steps", k) for k in range(len(task.spec.steps)))
+    return steps, tuple(written(*key) for key in task.spec.judged_at)
+
+
+def file_places(path: Path, overrides: Sequence[str]) -> Places:
+    """The same of a task file that is read for this alone.
+
+    Raises:
+        InvalidInput: it cannot be used.
+    """
+    return task_places(load_spec(path, model=task_spec(), overrides=overrides))
+
+
+def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
+    """Where each step was written, `pour.yaml:21:5`, by its id, of those begun where the plan does not say; and where
+    each expectation and watch, none where the plan does not say."""
+    places = {event.step: event.place for event in recording.events if event.place}
+    try:
+        # Any: what a file holds is not known before it is looked at.
+        plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
+        steps = {str(step["id"]): str(step["place"]) for step in plan["steps"]}
+        return places | steps, [str(place) for place in plan.get("judged", ())]
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return places, []
+
+
+def _rate(recording: Recording) -> float:
+    last = max((event.time for event in recording.events), default=0.0)
+    return min(RATE, FRAMES / last) if last > 0.0 else RATE
+
+
+def _causes(verdict: Verdict, places: Places, *, end: float | None) -> tuple[Cause, ...]:
+    """Errors, then steps that went wrong, then expectations that are not met. `end` [s]: None where nothing was run."""
+    if verdict.verdict == "passed":
+        return ()
+    hint = next((finding.hint for finding in verdict.errors if finding.hint), None) or ""
+    causes = []
+    if verdict.verdict == "error":
+        causes = [Cause(finding.message, "", end, hint=finding.hint or "") for finding in verdict.errors]
+        hint = ""
+    for step, written in zip(verdict.steps, places[0], strict=False):
+        if step.went_wrong:
+            at = None if end is None else step.ended if step.ended is not None else end
+            causes.append(Cause(how_wrong(step), step.text, at, written, hint))
+            hint = ""
+    for one, written in zip(verdict.expectations, places[1], strict=False):
+        if one.outcome != "passed" and end is not None:
+            causes.append(Cause(f"expectation '{one.name}' {_missed(one)}", one.text, one.at, written))
+    if verdict.verdict == "failed" and verdict.ended_between:
+        causes.insert(0, Cause(verdict.text, "", end))
+    return tuple(causes)
+
+
+def _missed(one: ExpectationOutcome) -> str:
+    if one.outcome == "not_evaluated":
+        return "was never evaluated"
+    return f"fails by {quantity(one.distance, one.unit)}" if one.distance else "fails"
+
+
+def _limit(asked: ExpectationSpec, unit: str) -> float | None:
+    """As `limit_of`, of an expectation; of a combination none, since one of several decides, and none of `never`."""
+    condition = asked.condition
+    return None if condition.combines or asked.quantifier == "never" else limit_of(condition.body, unit)
+
+
+def limit_of(spec: Model, unit: str) -> float | None:
+    """What a margin in `unit` is measured from, in it; None where that is not stated.
+
+    Conditions and expectations call it `within` or `below`, those that ask for two things have one more.
+    """
+    match spec:
+        case SlipSpec() | UnmovedSpec() if unit == "rad":
+            return spec.turn
+        case AtPoseSpec() if unit == "m":
+            return spec.slide or SLIDE
+        case ContactForceSpec(above=float()):
+            return None  # either of its two may be what the margin is of
+    for key in ("within", "below"):
+        value = getattr(spec, key, None)
+        if isinstance(value, float) and value > 0.0:
+            return value
+    return None
+
+
+def _picture(shots: Shots, time: float) -> Picture:
+    from PIL import Image
+
+    run: Playback = shots.playback
+    stream = io.BytesIO()
+    Image.fromarray(shots.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
+    return Picture(float(run.times[run.index(time)]), stream.getvalue(), PICTURE)
+
+
+def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tuple[str, str], ...]:
+    run = recording.metadata.get("run", {})
+    return (
+        ("log", path.name),
+        *recording.metadata.get("versions", {}).items(),
+        ("engine", verdict.engine),
+        ("seed", str(verdict.seed)),
+        ("control period", f"{1e3 * recording.period:g} ms"),
+        ("run", run.get("status", "") or "did not come to its end"),
+    )
+
+
+def _hashes(recording: Recording, path: Path) -> tuple[tuple[str, str], ...]:
+    """SHA-256 of the log, of the files that it carries, and of the meshes."""
+    with path.open("rb") as file:
+        log = hashlib.file_digest(file, "sha256").hexdigest()
+    carried = {name: hashlib.sha256(data).hexdigest() for name, data in recording.attachments.items()}
+    return ((path.name, log), *carried.items(), *recording.metadata.get("meshes", {}).items())

@@ -1,0 +1,50 @@
+"""Postures: where all joints stand. Named poses, zero, and mimic joints that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.description.elements import Joint
+from manipcli.model.robot import RobotModel
+
+
+def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
+    """(n,) the least and (n,) the most of each joint [rad or m], soft limits kept; infinite where it has no limit."""
+    ranges = [joint.limits.within_soft for joint in joints]
+    return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
+
+
+def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
+    """(..., n) the same with every mimic joint where its leader puts it: multiplier * q_leader + offset."""
+    position = np.array(q, dtype=np.float64)
+    for k, joint in enumerate(robot.moving_joints):
+        if joint.mimic is not None:
+            leader = position[..., robot.joint_names.index(joint.mimic.joint)]
+            position[..., k] = joint.mimic.multiplier * leader + joint.mimic.offset
+    return frozen(position)
+
+
+def zero_posture(robot: RobotModel) -> Array:
+    """(n,) every independent joint at zero, or at the limit nearest to it."""
+    return with_mimics(robot, [joint.limits.nearest(0.0) for joint in robot.moving_joints])
+
+
+def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
+    """(n,) a named pose; None: `home` where there is one, else zero.
+
+    Args:
+        robot: the robot.
+        pose: its name.
+        rest: (n,) where the joints are that it does not speak of; at zero by default.
+    """
+    q = np.array(zero_posture(robot) if rest is None else rest)
+    if pose is None:
+        pose = "home" if any(known.name == "home" for known in robot.poses) else None
+    if pose is not None:
+        named = robot.pose(pose)
+        q[robot.indices(named.joints)] = named.positions
+    return with_mimics(robot, q)

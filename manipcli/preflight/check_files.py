@@ -1,0 +1,102 @@
+"""Files checked, and the words that files may use: what `check`, `list` and `schema` ask."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from manipcli.conditions.members import CONDITIONS
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.description.lint.checks import CHECKS
+from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
+from manipcli.plan.steps import STEPS
+from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.postures import posture_findings
+from manipcli.scene.build_scene import SHAPES
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec import load
+from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
+from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
+from manipcli.spec.source.tree import Plain
+from manipcli.task.robot_file import read_robot
+from manipcli.task.sample import load_task
+from manipcli.task.task import Task
+from manipcli.task.vocabulary import task_spec
+
+
+def check_files(
+    paths: Sequence[Path],
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    sample: int | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> tuple[Finding, ...]:
+    """Every finding of every file, once; a task is checked with the robot and controllers files that it names.
+
+    Args:
+        paths: task, robot and controllers files, URDF and xacro.
+        overrides, seed, sample: of the tasks among them, as of `load_task`.
+        package_path, allow_outside: where packages are, and whether a file may lie outside of them.
+    """
+
+    def of_task(path: Path) -> Task:
+        return load_task(
+            path, overrides=overrides, seed=seed, sample=sample, package_path=package_path, allow_outside=allow_outside
+        )
+
+    return tuple(
+        dict.fromkeys(finding for path in paths for finding in _findings(path, of_task, package_path, allow_outside))
+    )
+
+
+def _findings(
+    path: Path, of_task: Callable[[Path], Task], package_path: Sequence[Path], allow_outside: bool
+) -> tuple[Finding, ...]:
+    try:
+        if path.suffix.lower() in DESCRIPTIONS:
+            return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings
+        kind = load.kind_of(path)
+        if kind == "task":
+            task = of_task(path)
+            return (*task.findings, *gain_findings(task))
+        if kind == "controllers":
+            return load.load_controllers(path).findings
+        file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
+        return (*findings, *posture_findings(file, robot))
+    except InvalidInput as invalid:
+        return invalid.findings
+
+
+def kind_of(path: Path) -> load.FileKind | None:
+    """Which of the three files this is; None if it is none, or cannot be read."""
+    try:
+        return load.kind_of(path, sure=True)
+    except InvalidInput:
+        return None
+
+
+def words(kind: str) -> tuple[str, ...]:
+    """The words that files may use (`steps`, `expectations`, `conditions`, `shapes`, `engines`); codes (`checks`)."""
+    known = {
+        "steps": STEPS.names,
+        "expectations": (*CONDITIONS.names, *COMBINATIONS, *QUANTIFIERS),
+        "conditions": (*CONDITIONS.names, *COMBINATIONS),
+        "shapes": SHAPES,
+        "engines": ENGINES.names,
+        "checks": tuple(check.code for check in CHECKS),
+    }
+    return known[kind]
+
+
+def schema(kind: load.FileKind) -> Mapping[str, Plain]:
+    """The JSON Schema of a kind of file."""
+    texts = {
+        "task": lambda: task_schema(task_spec()),
+        "robot": robot_schema,
+        "controllers": controllers_schema,
+    }
+    parsed: Mapping[str, Plain] = json.loads(texts[kind]())
+    return parsed

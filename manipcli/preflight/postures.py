@@ -1,0 +1,36 @@
+"""Does a robot touch itself in one of its named poses?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manipcli.core.errors import Finding
+from manipcli.model.collision import CollisionChecker
+from manipcli.model.configuration import posture
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Scene
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.source.located import Located
+
+
+def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:
+    """A warning for every pair of links that overlap in a named pose; other joints stand as at `home`, if there is one.
+
+    Not told: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
+    """
+    nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
+    query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()
+    rest = posture(robot)
+    for pose in robot.poses:
+        for hit in query.every(posture(robot, pose.name, rest=rest)):
+            a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
+            yield Finding(
+                code="ROBOT347",
+                message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {hit.amount}",
+                place=file.place("poses", pose.name),
+                hint="change the pose; or list the pair under `collision_ignore` if the links may touch",
+                severity="warning",
+            )

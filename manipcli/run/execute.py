@@ -1,0 +1,127 @@
+"""The plan carried out in an engine: the world is opened, comes to rest, and the steps are run in it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from manipcli.conditions.condition import World
+from manipcli.control.factory import build_controllers
+from manipcli.control.manager import ControllerManager
+from manipcli.core.errors import SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
+from manipcli.model.kinematics import Kinematics
+from manipcli.record.recorder import Recorder
+from manipcli.run.live_conditions import Live
+from manipcli.run.observer import Onlooker, Progress
+from manipcli.run.step_loop import StepsRun, cuts_of
+from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.executor import Executor
+from manipcli.simulate.quiet import stdout_to_stderr
+from manipcli.simulate.session import Session
+from manipcli.task.plan_task import Plan
+from manipcli.task.task import Task
+
+__all__ = ["Progress", "controllers", "simulate"]
+
+SETTLED_SPEED: Final = 0.02
+"""Bodies slower than this [m/s] have settled."""
+SETTLED_SHIFT: Final = 0.01
+"""A body that moves further than this [m] while settling was put where it cannot stay."""
+
+
+def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
+    """The task's controllers, for its robot, gravity and control period.
+
+    Args:
+        task: whose files say what the controllers know of the robot and of gravity; what was drawn acts on neither.
+        kinematics: of the robot under that gravity, if they are at hand.
+    """
+    file = task.true.controllers
+    period = task.spec.simulation.control_period
+    compat = task.robot_file.spec.compat
+    kinematics = kinematics or Kinematics(task.robot, gravity=task.scene.gravity)
+    return build_controllers(
+        file.spec, task.robot, period, place=lambda loc: file.place(*loc), kinematics=kinematics, compat=compat
+    )
+
+
+def simulate(
+    task: Task,
+    plan: Plan,
+    manager: ControllerManager,
+    recorder: Recorder,
+    progress: Progress | None,
+    replanning: Stopwatch,
+) -> None:
+    """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
+
+    `replanning` runs while steps are planned again.
+
+    Raises:
+        SimulationFailed: the world does not stand still before the start, or leaves the plausible.
+    """
+    simulation, true = task.spec.simulation, task.true
+    settings = EngineSettings(
+        step=simulation.step,
+        substeps=round(simulation.control_period / simulation.step),
+        start=plan.start.position,
+    )
+    engine = ENGINES[simulation.engine].open(true.robot, true.scene, settings)
+    try:
+        with stdout_to_stderr():
+            session = Session(
+                robot=true.robot,
+                scene=true.scene,
+                engine=engine,
+                manager=manager,
+                period=simulation.control_period,
+            )
+            _settle(task, session)
+            live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
+            onlooker = Onlooker(recorder, live, progress, simulation.control_period)
+            session.restart_clock(onlooker)
+            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal, replanning=replanning)
+            try:
+                run.steps()
+            finally:
+                for kind, counts in cuts_of(session).to_metadata().items():
+                    recorder.metadata(kind, counts)
+    finally:
+        engine.close()
+
+
+def _world(task: Task, plan: Plan, session: Session) -> World:
+    """What live conditions are asked in, which is what the log will tell the judge; now is time 0."""
+    return World(
+        task.robot,
+        task.true.scene,
+        start=session.engine.read().map(np.copy),
+        physics=ENGINES[task.spec.simulation.engine].physics == "full",
+        referenced=frozenset(name for one in session.manager.controllers if one.interfaces for name in one.joints),
+        steps=tuple(step.id for step in plan.steps),
+        period=task.spec.simulation.control_period,
+    )
+
+
+def _settle(task: Task, session: Session) -> None:
+    """Let everything come to rest, and refuse a start from which something slides, falls or is thrown.
+
+    Raises:
+        SimulationFailed: names the body, and how far or how fast it moved.
+    """
+    Executor(session).hold(task.spec.simulation.settle)
+    state = session.engine.read()
+    for k, body in enumerate(task.scene.movable):
+        shift = float(np.linalg.norm(state.body_position[k] - body.X_WO.p))
+        speed = float(np.linalg.norm(state.body_linear[k]))
+        if not shift < SETTLED_SHIFT:
+            raise SimulationFailed(
+                f"'{body.name}' moved by {1000 * shift:.1f} mm while the world came to rest: it overlaps something, "
+                "stands on nothing, or something ran into it",
+                time=0.0,
+            )
+        if not speed < SETTLED_SPEED:
+            raise SimulationFailed(f"'{body.name}' does not come to rest ({speed:.3g} m/s before the start)", time=0.0)

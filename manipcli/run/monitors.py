@@ -1,0 +1,92 @@
+"""What a task watches while it runs: the first moment at which a `never` holds, or an `always` does not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.conditions.robustness import Reading, never
+from manipcli.conditions.state_window import ROUNDING, Moments
+from manipcli.judge.expectation import labels
+from manipcli.judge.verdict import broken_at
+from manipcli.run.live_conditions import Live, Probe
+from manipcli.spec.condition import ExpectationSpec, WatchSpec
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """Watch number `index` was broken; `text` says which, when, by how much and what was measured."""
+
+    index: int
+    text: str
+
+
+class Watching:
+    """The watches of a run, each asked from the beginning of the first of its steps to the end of the last.
+
+    Args:
+        watches: of the task.
+        expect: its expectations, beside which the watches have their names.
+        live: answers them; what it cannot answer is not watched, and judged as not evaluated.
+    """
+
+    def __init__(self, watches: Sequence[WatchSpec], expect: Sequence[ExpectationSpec], live: Live) -> None:
+        self._live = live
+        names = tuple(labels([*expect, *watches]))[len(expect) :]
+        self._watches = [
+            (k, watch, name)
+            for k, (watch, name) in enumerate(zip(watches, names, strict=True))
+            if live.absent(watch.condition) is None
+        ]
+        self._probes: dict[int, Probe] = {}
+        self._ended: set[str] = set()
+        self.broken: Broken | None = None
+        """The first that was broken."""
+        for k, watch, name in self._watches:
+            if not watch.steps:
+                self._open(k, watch, name)
+
+    def step_started(self, step: str) -> None:
+        """The next tick is the first of a step."""
+        for k, watch, name in self._watches:
+            if step in watch.steps and k not in self._probes:
+                self._open(k, watch, name)
+
+    def step_ended(self, step: str) -> None:
+        """The last tick was the last of a step."""
+        self._ended.add(step)
+        for k, watch, _ in self._watches:
+            if watch.steps and self._ended.issuperset(watch.steps) and k in self._probes:
+                self._live.close(self._probes.pop(k))
+
+    def _open(self, k: int, watch: WatchSpec, name: str) -> None:
+        def told(moments: Moments, reading: Reading) -> None:
+            if self.broken is None:
+                self.broken = _broken(k, watch, name, moments, reading)
+
+        self._probes[k] = self._live.open(watch.condition, told=told)
+
+
+def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Reading) -> Broken | None:
+    """The first of these moments that breaks a watch."""
+    answer = never(reading) if watch.quantifier == "never" else reading
+    bad = answer.applies & ~(answer.order >= 0.0)
+    if watch.steps:
+        bad &= _during(watch.steps, moments)
+    if not bad.any():
+        return None
+    tick = int(np.argmax(bad))
+    found, time = answer.found(tick), float(moments.times[tick])
+    return Broken(k, f"{broken_at(name)}t = {time:.3f} s{found.lacking}: {found.text}")
+
+
+def _during(steps: Sequence[str], moments: Moments) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(T,) which of the moments lie in one of the steps."""
+    inside = np.zeros(len(moments.times), dtype=np.bool_)
+    for step in moments.steps:
+        if step.id in steps and step.started is not None:
+            end = np.inf if step.ended is None else step.ended - ROUNDING
+            inside |= (moments.times >= step.started - ROUNDING) & (moments.times < end)
+    return inside

@@ -1,0 +1,362 @@
+"""The loop over steps: planned again where things are elsewhere, tried again where the task says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.conditions.touch import grips, held_force
+from manipcli.control.action import GoalHandle
+from manipcli.control.cut import KINDS
+from manipcli.core.errors import NotPlannable, SimulationFailed
+from manipcli.core.stopwatch import Stopwatch
+from manipcli.judge.cuts import Cuts
+from manipcli.judge.verdict import StepOutcome
+from manipcli.model.state import WorldState
+from manipcli.plan.step import Motion, Situation
+from manipcli.record.recorder import Recorder
+from manipcli.run.holding import Holding
+from manipcli.run.live_conditions import Live, Probe
+from manipcli.run.monitors import Watching
+from manipcli.run.observer import Progress
+from manipcli.run.replan import Measured, after
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
+from manipcli.simulate.session import Session
+from manipcli.spec.reactions import ReplanSpec
+from manipcli.spec.retry import retried
+from manipcli.spec.task import StepSpec
+from manipcli.task.plan_task import Plan, PlannedStep
+from manipcli.task.task import Task
+
+DEFAULT_UNTIL_TIME: Final = 30.0
+"""How long [s] an `until` without `timeout` is waited for."""
+AFTERMATH: Final = 0.6
+"""How long [s] the world is watched after the last step, so that "at rest" can be judged."""
+LEFT_BEHIND: Final = 0.05
+"""A held object further than this [m] from where it was planned is no longer held."""
+HELD: Final = 0.1
+"""An object that two links press on with this force [N] was not let go."""
+
+
+def cuts_of(session: Session) -> Cuts:
+    """In how many ticks each joint's command was cut, at which limits, and each actuator had no more to give."""
+    names = session.robot.joint_names
+    joints = dict(zip(names, map(int, session.saturations), strict=True))
+    kinds = {
+        kind: dict(zip(names, map(int, counts), strict=True))
+        for kind, counts in zip(KINDS, session.saturations_by_kind, strict=True)
+    }
+    actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
+    return Cuts(joints, actuators, session.ticks, kinds)
+
+
+class StepsRun:
+    """One pass over the steps.
+
+    Args:
+        task, plan: what to do.
+        session: in which world; its clock stands at 0.
+        recorder: is told of everything that happens.
+        live: asks the conditions that steps wait for; is told of steps.
+        progress: is told of steps, and of what was not planned.
+        told: is told of every goal, see `Executor`.
+        replanning: runs while a step is planned again.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        plan: Plan,
+        session: Session,
+        recorder: Recorder,
+        live: Live,
+        progress: Progress | None,
+        *,
+        told: Callable[[str, GoalHandle], None],
+        replanning: Stopwatch,
+    ) -> None:
+        self._task = task
+        self._live = live
+        self._plan = plan
+        self._session = session
+        self._recorder = recorder
+        self._progress = progress
+        self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
+        self._watching = Watching(task.spec.watch, task.spec.expect, live)
+        alarm = self._alarm if task.spec.watch else None
+        self._executor = Executor(session, touch=self._physics, told=told, alarm=alarm)
+        replan = task.spec.replan
+        self._replans = replan is not False
+        self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
+        limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
+        self._measured = Measured(session, plan.planner, limits, physics=self._physics)
+        self._holding = Holding(task.true.robot, task.true.scene)
+        self._believed = plan.start
+        self._replanning = replanning
+        self._failed = False
+        self._over = False
+        self._at: PlannedStep | None = None
+
+    def steps(self) -> None:
+        """Every step in order, until one fails that may not, or a watch is broken."""
+        total = len(self._plan.steps)
+        planned_start = self._plan.start
+        for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
+            if self._progress is not None:
+                self._progress.step_started(planned, index, total)
+            outcome = self._step(index, step, planned, planned_start)
+            if self._progress is not None:
+                self._progress.step_ended(outcome)
+            if outcome.outcome != "done" and not outcome.tolerated:
+                break
+            planned_start = planned.plan.end
+        self._at = None
+        try:
+            self._executor.hold(AFTERMATH)
+        except Alarmed:
+            self._executor.stop()
+
+    def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
+        """All attempts at a step. Where a watch is broken it ends at once; that the robot is stopped then is no part of
+        it."""
+        began = ended = self._session.time
+        retry = step.retry
+        attempts = 1 if retry is None else 1 + retry.retry
+        end = DONE
+        self._at = planned
+        self._live.step_started(planned.id)
+        self._watching.step_started(planned.id)
+        for attempt in range(1, attempts + 1):
+            if attempt > 1:
+                again = retried(self._task.file, index)
+                if again != step:
+                    planned = replace(planned, grasps=())  # they are of the step as it was
+                step = again
+            self._event("step_started", planned, "", self._nth(step, attempt, attempts))
+            end = self._attempt(step, planned, planned_start, again=attempt > 1)
+            if end.outcome == "done" or attempt == attempts or not self._may_go_on:
+                end = self._closed(planned, end)
+            ended = self._session.time
+            self._event("step_ended", planned, end.outcome, end.text)
+            if end.outcome == "done" or not self._may_go_on:
+                break
+            self._failed = True
+            if attempt < attempts:
+                self._tell(f"{end.outcome}: {end.text}; it is tried again", detail=False)
+            if attempt < attempts or step.may_fail:
+                self._executor.stop()
+        if self._over:
+            self._executor.stop()
+        tolerated = end.outcome != "done" and step.may_fail and self._may_go_on
+        if tolerated:
+            self._event("step_tolerated", planned, "", "on_fail: continue")
+        return StepOutcome(
+            id=planned.id,
+            verb=planned.verb,
+            outcome=end.outcome,
+            started=began,
+            ended=ended,
+            planned_duration=planned.plan.duration,
+            text=end.text,
+            tolerated=tolerated,
+        )
+
+    def _closed(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
+        """The end of a step; another one if what is watched in it turns out to be broken, of which the last ticks are
+        only looked at now."""
+        self._live.step_ended(planned.id, end.outcome)
+        self._watching.step_ended(planned.id)
+        broken = self._alarm(self._session.state)
+        if not broken:
+            return end
+        self._live.step_ended(planned.id, "failed")
+        before = f"; before that: {end.outcome}: {end.text}" if end.outcome != "done" else ""
+        return MotionEnd("failed", f"stopped: {broken}{before}")
+
+    @property
+    def _may_go_on(self) -> bool:
+        """Whether the task has a say in what follows a failure."""
+        return not self._over and not self._session.manager.faults
+
+    def _alarm(self, _: WorldState) -> str:
+        """What is the first to be broken of what the task watches."""
+        broken = None if self._over else self._watching.broken
+        if broken is None:
+            return ""
+        self._over = True
+        at = self._at
+        self._recorder.event(
+            self._session.ticks,
+            kind="watch_broken",
+            step="" if at is None else at.id,
+            verb="" if at is None else at.verb,
+            outcome="failed",
+            text=broken.text,
+            place=self._task.log_place("watch", broken.index),
+        )
+        return broken.text
+
+    def _nth(self, step: StepSpec, attempt: int, attempts: int) -> str:
+        """What an attempt begins with; nothing where there is but one."""
+        if attempts == 1:
+            return ""
+        changed = {} if step.retry is None or attempt == 1 else step.retry.with_
+        values = ", ".join(f"{name} = {value}" for name, value in changed.items())
+        return f"attempt {attempt} of {attempts}{f', with {values}' if values else ''}"
+
+    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: Situation, *, again: bool) -> MotionEnd:
+        """One attempt, planned anew where things are not as they were planned to be, or `again`."""
+        before = cuts_of(self._session)
+        now = self._measured.situation(self._believed)
+        if again and planned_start.carried is None and planned.plan.end.carried is not None:
+            now = replace(now, carried=None)  # it takes again what it took in vain, with a hand that is closed on it
+        differences = self._measured.differences(planned_start, now, step)
+        anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
+        if anew:
+            try:
+                with self._replanning:
+                    plan, now, stays = self._measured.plan(step, planned_start, now, planned.grasps)
+                planned = replace(planned, plan=plan)
+            except NotPlannable as refusal:
+                self._believed = now
+                why = f", where {'; '.join(differences)}" if differences else ""
+                bound = again or self._failed or self._guards
+                way_out = "" if bound else "; `replan: false` keeps the plan that there was"
+                return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}{way_out}")
+            why = "; ".join(differences) or ("it is tried again" if again else "the step before it failed")
+            why += stays
+            self._event("replanned", planned, "", why)
+            self._tell(f"planned again: {why}", detail=True)
+            self._failed = False
+        try:
+            end = self._motions(step, planned, now)
+        except Alarmed as alarm:
+            return MotionEnd("failed", f"stopped: {alarm}")
+        except SimulationFailed as failure:
+            text = str(failure) + _cut_since(before, self._session)
+            self._event("step_ended", planned, "failed", text)
+            raise
+        if end.outcome == "done":
+            return end
+        found = "" if anew or not differences else f"; when it began, {'; '.join(differences)}"
+        return MotionEnd(end.outcome, end.text + found + _cut_since(before, self._session))
+
+    def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
+        """Every motion of the plan, which begins in `before`, and what the step waits for."""
+        deadline = None if step.timeout is None else self._session.time + step.timeout
+        texts = []
+        with self._asked(step) as probe:
+            until: Until | None = None if probe is None else lambda _: probe.holds
+            awaited = until is not None
+            for k, motion in enumerate(planned.plan.motions):
+                self._event("phase_started", planned, "", motion.label)
+                self._believed = after(planned.plan, before, done=k)
+                over = deadline
+                if motion.awaits and until is not None and over is None:
+                    over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
+                end = self._executor.run(motion, until=until, deadline=over)
+                if end.outcome != "done":
+                    held = self._still_held(before) if motion.grip is not None and motion.grip.must_arrive else ""
+                    text = f"{motion.label}: {end.text}{_missing(end, probe)}{f'; {held}' if held else ''}"
+                    return MotionEnd(end.outcome, text)
+                if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
+                    self._holding.taken(planned.plan.end.carried.body, self._session.touching)
+                if end.weak:
+                    self._tell(f"{motion.label}: {end.text}", detail=False)
+                awaited = awaited and not motion.awaits
+                texts += [end.text + _no_longer(motion, probe)] if end.text else []
+            self._believed = planned.plan.end
+            if awaited and until is not None:
+                if deadline is None:
+                    deadline = self._session.time + DEFAULT_UNTIL_TIME
+                end = self._executor.wait(until, deadline=deadline)
+                if end.outcome != "done":
+                    return replace(end, text=end.text + _missing(end, probe))
+        held = self._still_held(before) if planned.plan.end.carried is None else ""
+        if held:
+            return MotionEnd("failed", held)
+        guarded = any(motion.guarded for motion in planned.plan.motions)
+        left = self._lost(planned) if guarded else self._left_behind(planned)
+        return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
+
+    @contextmanager
+    def _asked(self, step: StepSpec) -> Iterator[Probe | None]:
+        """What the step waits for, asked from now on; None where it waits for nothing, or only physics could answer
+        it."""
+        if step.until is None or self._live.absent(step.until) is not None:
+            yield None
+            return
+        probe = self._live.open(step.until)
+        try:
+            yield probe
+        finally:
+            self._live.close(probe)
+
+    def _left_behind(self, planned: PlannedStep) -> MotionEnd | None:
+        """A failure where the object that the step ends with in the hand is not there; None where it is."""
+        carried = planned.plan.end.carried
+        if carried is None or not self._physics:
+            return None
+        scene = self._task.scene
+        k = scene.movable.index(scene.body(carried.body))
+        away = float(np.linalg.norm(self._session.state.body_position[k] - planned.plan.end.bodies[k].p))
+        if away <= LEFT_BEHIND:
+            return None
+        where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
+        grasp = self._holding.told(carried.body)
+        return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
+
+    def _lost(self, planned: PlannedStep) -> MotionEnd | None:
+        """The same for a guarded step: where it ends only the hand can tell."""
+        carried = planned.plan.end.carried
+        if carried is None or self._measured.situation(planned.plan.end).carried is not None:
+            return None
+        return MotionEnd("failed", f"'{carried.body}' is no longer in the hand")
+
+    def _still_held(self, before: Situation) -> str:
+        """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""
+        if before.carried is None or not self._physics:
+            return ""
+        body = before.carried.body
+        if held_force(self._session.touching, body) < HELD:
+            return ""
+        self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
+        (_, first), (_, second), *_ = grips(self._session.touching, body)
+        return f"the hand still holds '{body}', between '{first}' and '{second}'"
+
+    def _tell(self, text: str, *, detail: bool) -> None:
+        if self._progress is not None:
+            self._progress.told(text, detail=detail)
+
+    def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
+        self._recorder.event(
+            self._session.ticks, kind=kind, step=step.id, verb=step.verb, outcome=outcome, text=text, place=step.place
+        )
+
+
+def _moves(planned: PlannedStep) -> bool:
+    """Whether a step does anything that depends on where things are."""
+    return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
+
+
+def _missing(end: MotionEnd, probe: Probe | None) -> str:
+    """How far what was waited for was from holding, where that is why a motion ended."""
+    missing = probe.missing if probe is not None and end.awaited else ""
+    return f"; at the end {missing}" if missing else ""
+
+
+def _no_longer(motion: Motion, probe: Probe | None) -> str:
+    """What a guarded motion was stopped by, where it does not hold any more at rest: the robot may have bounced off."""
+    missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
+    return f"; at rest {missing}" if missing else ""
+
+
+def _cut_since(before: Cuts, session: Session) -> str:
+    """What had nothing left to give since then; nothing where everything had."""
+    cut = str(cuts_of(session).since(before))
+    return f"; {cut}" if cut else ""

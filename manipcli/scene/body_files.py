@@ -1,0 +1,120 @@
+"""Bodies that come from files: a mesh, taken as its convex hull, or a URDF of one link."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.errors import InvalidInput
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.description.description import read_description
+from manipcli.description.elements import Inertial
+from manipcli.description.packages import Packages
+from manipcli.description.urdf.urdf import read_parts
+from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.mesh import SUFFIXES
+from manipcli.shapes.primitives import Geometry, Mesh, Rgba
+from manipcli.spec.task import MeshSpec, UrdfSpec
+
+
+def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
+    """A mesh in its own frame; hull, bounding box and mass properties (at uniform density) of its convex hull.
+
+    Its inertial states 1 kg per m3, so that only its mass has to be scaled; a mesh has no mass of its own.
+
+    Raises:
+        NotFound: there is no such file.
+        ValueError: the file is of another kind, unreadable, or encloses no volume.
+    """
+    path = packages.resolve(spec.file, anywhere=True)
+    if path.suffix.lower() not in SUFFIXES:
+        raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(SUFFIXES)}")
+    # A path is relative to the task, which no log is beside.
+    uri = spec.file if spec.file.startswith("package:") else packages.portable(path)
+    shape = Mesh(uri=uri, path=path, scale=(spec.scale, spec.scale, spec.scale))
+    try:
+        hull = coal_shape(shape)
+    except (ValueError, RuntimeError) as error:
+        raise ValueError(f"'{spec.file}' cannot be used as a mesh: it holds no solid") from error
+    points = np.array(hull.points())
+    volume = float(hull.computeVolume())
+    if not (math.isfinite(volume) and volume > 0.0 and np.all(np.isfinite(points))):
+        raise ValueError(f"'{spec.file}' cannot be used as a mesh: its hull encloses no volume")
+    low, high = points.min(axis=0), points.max(axis=0)
+    return BodyShape(
+        geometries=(Geometry(X_LS=Transform.identity(), shape=shape, rgba=rgba),),
+        interior=None,
+        size=frozen(high - low),
+        centre=frozen((high + low) / 2.0),
+        inertial=principal(volume, hull.computeCOM(), hull.computeMomentofInertiaRelatedToCOM()),
+    )
+
+
+def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
+    """The one link of a URDF, in the link's frame: its collision shapes and its inertia.
+
+    Args:
+        spec: names the file.
+        packages: of the file that names it.
+        rgba: instead of the file's colours.
+
+    Raises:
+        NotFound: there is no such file.
+        InvalidInput: the file has errors, each with its place.
+        ValueError: it holds more than one link, no collision shape, or (for a link with mass) no moments of inertia.
+    """
+    path = packages.resolve(spec.file, anywhere=True)
+    parts = read_parts(read_description(path, packages=packages.below(path)))
+    if parts.errors:
+        raise InvalidInput(parts.errors)
+    if len(parts.links) != 1:
+        raise ValueError(
+            f"'{spec.file}' has {len(parts.links)} links; an object of the scene has one, "
+            "as nothing joins two of them: give each part that moves a file of its own"
+        )
+    (link,) = parts.links
+    if not link.collisions:
+        raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")
+    seen = next((shape.rgba for shape in link.visuals if shape.rgba is not None), COLORS["urdf"])
+    shapes = tuple(replace(shape, rgba=rgba or shape.rgba or seen) for shape in link.collisions)
+    low, high = _bounds(shapes)
+    inertial = None
+    if link.inertial is not None and link.inertial.mass > 0.0:
+        X, inertia = link.inertial.X_LI, link.inertial.inertia
+        inertial = principal(link.inertial.mass, X.p, X.R @ inertia @ X.R.T)
+    return BodyShape(
+        geometries=shapes,
+        interior=None,
+        size=frozen(high - low),
+        centre=frozen((high + low) / 2.0),
+        inertial=inertial,
+    )
+
+
+def _bounds(shapes: tuple[Geometry, ...]) -> tuple[Array, Array]:
+    """Lowest and highest corner of a box about the shapes, in O; that of each shape's own box, so not the tightest."""
+    corners = []
+    for shape in shapes:
+        made = coal_shape(shape.shape)
+        made.computeLocalAABB()
+        low, high = np.array(made.aabb_local.min_), np.array(made.aabb_local.max_)
+        centre, half = shape.X_LS.apply((low + high) / 2.0), np.abs(shape.X_LS.R) @ ((high - low) / 2.0)
+        corners += [centre - half, centre + half]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+def principal(mass: float, centre: npt.ArrayLike, inertia: npt.ArrayLike) -> Inertial:
+    """The inertial with its frame turned into the principal axes, so that `inertia` (3, 3) becomes diagonal.
+
+    Args:
+        mass: [kg].
+        centre: (3,) [m] centre of mass in the body's frame.
+        inertia: (3, 3) [kg m2] about `centre`, along the axes of the body's frame.
+    """
+    moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=np.float64))
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return Inertial(mass=mass, X_LI=Transform.of(xyz=centre, R=axes), inertia=frozen(np.diag(moments)))

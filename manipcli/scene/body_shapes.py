@@ -1,0 +1,137 @@
+"""The shapes of the scene's words: what `cup: {...}` is made of, its hollow, its bounding box, its colour.
+
+All in the body's frame O: at the centre for box and sphere, in the middle of the bottom for what stands or contains.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.description.elements import Inertial
+from manipcli.scene.scene import Interior
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
+from manipcli.spec.task import BoxSpec, CupSpec, CylinderSpec, SphereSpec, TraySpec
+
+COLORS: dict[str, Rgba] = {
+    "floor": (0.80, 0.81, 0.82, 1.0),
+    "box": (0.83, 0.55, 0.25, 1.0),
+    "desk": (0.62, 0.46, 0.32, 1.0),
+    "sphere": (0.82, 0.20, 0.17, 1.0),
+    "cylinder": (0.36, 0.52, 0.72, 1.0),
+    "cup": (0.68, 0.83, 0.69, 1.0),
+    "tray": (0.44, 0.52, 0.61, 1.0),
+    "mesh": (0.70, 0.66, 0.58, 1.0),
+    "urdf": (0.70, 0.66, 0.58, 1.0),
+}
+"""By the word that made the body; `desk` is a fixed box, what things stand on."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodyShape:
+    """What a body is made of, before it has a place.
+
+    Attributes:
+        geometries: shapes in O.
+        interior: its hollow, or None.
+        size, centre: (3,) [m] its bounding box in O.
+        radius: [m] of its outline seen from above when that is round about O's z axis, else None.
+        flat_top: whether other bodies can rest on its upper side.
+        inertial: mass properties that a file states or a mesh implies; None: the union of the geometries, uniform.
+    """
+
+    geometries: tuple[Geometry, ...]
+    interior: Interior | None
+    size: Array
+    centre: Array
+    radius: float | None = None
+    flat_top: bool = False
+    inertial: Inertial | None = None
+
+
+def box(spec: BoxSpec, rgba: Rgba) -> BodyShape:
+    """One box."""
+    return BodyShape(
+        geometries=(_placed(Box(spec.size), (0.0, 0.0, 0.0), rgba),),
+        interior=None,
+        size=frozen(spec.size),
+        centre=frozen(np.zeros(3)),
+        flat_top=True,
+    )
+
+
+def sphere(spec: SphereSpec, rgba: Rgba) -> BodyShape:
+    """One sphere."""
+    return BodyShape(
+        geometries=(_placed(Sphere(spec.radius), (0.0, 0.0, 0.0), rgba),),
+        interior=None,
+        size=frozen([2.0 * spec.radius] * 3),
+        centre=frozen(np.zeros(3)),
+        radius=spec.radius,
+    )
+
+
+def cylinder(spec: CylinderSpec, rgba: Rgba) -> BodyShape:
+    """One cylinder that stands on the origin."""
+    return BodyShape(
+        geometries=(_placed(Cylinder(spec.radius, spec.height), (0.0, 0.0, spec.height / 2.0), rgba),),
+        interior=None,
+        size=frozen([2.0 * spec.radius, 2.0 * spec.radius, spec.height]),
+        centre=frozen([0.0, 0.0, spec.height / 2.0]),
+        radius=spec.radius,
+        flat_top=True,
+    )
+
+
+def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
+    """A floor disc and `segments` wall boxes that stand on it.
+
+    The walls' outer faces touch the circle of `radius`, their inner faces the hollow's circle of radius - wall. Each
+    box is 2 R tan(pi / n) wide with R in the middle of the wall: neighbours overlap inside as much as they gape
+    outside, so that the walls' volume is that of the n-sided ring.
+    """
+    middle, inner, n = spec.radius - spec.wall / 2.0, spec.radius - spec.wall, spec.segments
+    depth = spec.height - spec.wall
+    wall = Box((spec.wall, 2.0 * middle * math.tan(math.pi / n), depth))
+    walls = []
+    for k in range(n):
+        angle = 2.0 * math.pi * k / n
+        p = (middle * math.cos(angle), middle * math.sin(angle), spec.wall + depth / 2.0)
+        walls.append(Geometry(X_LS=Transform.of(xyz=p, rpy=(0.0, 0.0, angle)), shape=wall, rgba=rgba))
+    outline = math.hypot(spec.radius, wall.size[1] / 2.0)
+    return BodyShape(
+        geometries=(_placed(Cylinder(spec.radius, spec.wall), (0.0, 0.0, spec.wall / 2.0), rgba), *walls),
+        interior=Interior(
+            X_OS=Transform.of(xyz=(0.0, 0.0, spec.wall + depth / 2.0)), shape=Cylinder(radius=inner, length=depth)
+        ),
+        size=frozen([2.0 * outline, 2.0 * outline, spec.height]),
+        centre=frozen([0.0, 0.0, spec.height / 2.0]),
+        radius=outline,
+    )
+
+
+def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:
+    """A floor and four walls that stand on it; the walls along y lie between those along x."""
+    (x, y, z), w = spec.size, spec.wall
+    depth = z - w
+    middle = w + depth / 2.0
+    along_x, along_y = Box((x, w, depth)), Box((w, y - 2.0 * w, depth))
+    return BodyShape(
+        geometries=(
+            _placed(Box((x, y, w)), (0.0, 0.0, w / 2.0), rgba),
+            _placed(along_x, (0.0, (y - w) / 2.0, middle), rgba),
+            _placed(along_x, (0.0, (w - y) / 2.0, middle), rgba),
+            _placed(along_y, ((x - w) / 2.0, 0.0, middle), rgba),
+            _placed(along_y, ((w - x) / 2.0, 0.0, middle), rgba),
+        ),
+        interior=Interior(X_OS=Transform.of(xyz=(0.0, 0.0, middle)), shape=Box((x - 2.0 * w, y - 2.0 * w, depth))),
+        size=frozen(spec.size),
+        centre=frozen([0.0, 0.0, z / 2.0]),
+    )
+
+
+def _placed(shape: Shape, p: tuple[float, float, float], rgba: Rgba) -> Geometry:
+    return Geometry(X_LS=Transform.of(xyz=p), shape=shape, rgba=rgba)

@@ -1,0 +1,368 @@
+"""From what the user wrote under `scene:` and `frames:` to a `Scene`: shapes, mass, places; every finding at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from manipcli.core.errors import Finding, InvalidInput, Loc
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.text import digits
+from manipcli.description.elements import Inertial
+from manipcli.description.packages import NotFound, Packages
+from manipcli.scene import body_files, body_shapes
+from manipcli.scene.body_shapes import COLORS, BodyShape
+from manipcli.scene.drop_test import FORMED, landing
+from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.scene.scene_names import Locate, misnamed
+from manipcli.scene.start_overlap import overlaps
+from manipcli.shapes.mass_properties import union
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
+from manipcli.spec.base import Model
+from manipcli.spec.task import BodySpec, TaskSpec
+
+SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
+PLACING = ("pose", "rests_on", "inside", "at", "yaw")
+FLOOR_SIZE = (10.0, 10.0, 0.1)
+LONGEST = 10.0
+"""[m] of what can move: anything longer was meant in millimetres."""
+_SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
+EXACT = 1e-9
+"""[m] By so much rounding may move what fits exactly."""
+UPRIGHT = 1.0 - 1e-6
+"""Least cosine of the tilt of what carries or contains something: none, but for rounding."""
+
+
+def build_scene(spec: TaskSpec, *, place: Locate | None = None, packages: Packages | None = None) -> Scene:
+    """The scene of a task: the floor first (when there is one), then the bodies as written.
+
+    Args:
+        spec: the task; `scene`, `frames`, `floor` and `simulation.gravity` are read.
+        place: where in the file the value at a path such as `("scene", "cup", "inside")` stands.
+        packages: of the task file, whose bodies name files (mesh, urdf); default: as seen from the working directory.
+
+    Raises:
+        InvalidInput: with every finding: no or several shapes, no or several placements, a body, parent or container
+            that is not there, a missing mass, a wall thicker than its container, bodies that start inside each other.
+    """
+    return _Builder(spec, place or (lambda _: None), packages or Packages(None)).build()
+
+
+class _Builder:
+    """One use: collects findings on the way, so that a faulty body does not hide the faults of the others."""
+
+    def __init__(self, spec: TaskSpec, place: Locate, packages: Packages) -> None:
+        self.spec = spec
+        self.place = place
+        self.packages = packages
+        self.findings = list(misnamed(spec, place))
+        self.shapes: dict[str, BodyShape] = {}
+        self.kinds: dict[str, str] = {}
+        self.poses: dict[str, Transform] = {}
+        self.unplaced: set[str] = set()
+        self.waiting: list[str] = []
+
+    def build(self) -> Scene:
+        bodies: list[Body] = []
+        if self.spec.floor:
+            self._add_shape("floor", "floor", _floor_shape())
+            self.poses["floor"] = Transform.of(xyz=(0.0, 0.0, -FLOOR_SIZE[2] / 2.0))
+            bodies.append(self._body("floor", BodySpec(fixed=True), self.poses["floor"]))
+        for name, body in self.spec.scene.items():
+            self._shape(name, body)
+        for name in self.spec.scene:
+            X_WO = self._pose(name)
+            if X_WO is not None and name in self.shapes:
+                bodies.append(self._body(name, self.spec.scene[name], X_WO))
+        frames = tuple(self._frames())
+        if not self.findings:
+            for a, b, depth in overlaps(bodies):
+                self._error(
+                    "TASK226",
+                    f"'{a}' and '{b}' start {depth * 1e3:.1f} mm inside each other",
+                    self._blamed([name for name in reversed(self.spec.scene) if name in (a, b)]),
+                    self._apart(a, b),
+                )
+        if self.findings:
+            raise InvalidInput(self.findings)
+        return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
+
+    def _apart(self, a: str, b: str) -> str:
+        """What keeps two bodies from starting inside each other."""
+        specs = {name: self.spec.scene[name] for name in (a, b) if name in self.spec.scene}
+        inside = {spec.inside for spec in specs.values()}
+        middle = [f"'{name}'" for name, spec in specs.items() if spec.at is None]
+        if len(specs) == 2 and len(inside) == 1 and None not in inside and middle:
+            where = f"{' and '.join(middle)} {'are' if len(middle) > 1 else 'is'} in the middle of '{inside.pop()}'"
+            return f"{where}: `at: [X, Y]` says how far from it"
+        return "move one of them; things that only touch are fine"
+
+    def _blamed(self, bodies: Sequence[str]) -> Loc:
+        """Where an argument (`--set`) gave one of these a place or a shape; else the first of them."""
+        for name in bodies:
+            for word in (*PLACING, *SHAPES):
+                for loc in _written(getattr(self.spec.scene[name], word), ("scene", name, word)):
+                    place = self.place(loc)
+                    if place is not None and place.line == 0:
+                        return loc
+        return ("scene", bodies[0])
+
+    # -- shapes and mass
+
+    def _shape(self, name: str, spec: BodySpec) -> None:
+        loc: Loc = ("scene", name)
+        words = [word for word in SHAPES if getattr(spec, word) is not None]
+        if len(words) != 1:
+            found = f"has {len(words)} shapes ({', '.join(words)})" if words else "has no shape"
+            self._error("TASK221", f"body '{name}' {found}; it needs exactly one of {', '.join(SHAPES)}", loc)
+            return
+        (kind,) = words
+        rgba = spec.color or COLORS["desk" if kind == "box" and spec.fixed else kind]
+        try:
+            shape = self._made(spec, rgba)
+        except NotFound as error:
+            self._error("TASK222", f"body '{name}': {error.message}", (*loc, kind, "file"), error.hint)
+            return
+        except InvalidInput as error:
+            self.findings.extend(error.findings)
+            return
+        except ValueError as error:
+            self._error("TASK222", f"body '{name}': {error}", (*loc, kind))
+            return
+        self._add_shape(name, kind, shape)
+        if spec.fixed:
+            return
+        if max(shape.size) > LONGEST:
+            message = f"body '{name}' can move and is {max(shape.size):.3g} m long, more than {LONGEST:g} m"
+            scaled = _SCALED.get(kind, "each size with its unit, as '80 mm'")
+            self._error("TASK222", message, (*loc, kind), f"in millimetres? write {scaled}; else say `fixed: true`")
+        if kind == "urdf" and shape.inertial is None:
+            hint = "give the link an <inertial> with mass and moments, or say `fixed: true`"
+            self._error("TASK223", f"body '{name}' can move and its URDF states no inertia", (*loc, kind), hint)
+        elif kind != "urdf" and spec.mass is None:
+            hint = "say `mass: 150 g`, or `fixed: true`"
+            self._error("TASK223", f"body '{name}' can move and has no mass", loc, hint)
+
+    def _made(self, spec: BodySpec, rgba: Rgba) -> BodyShape:
+        """Raises ValueError when the numbers contradict each other or a file cannot be used."""
+        if spec.box is not None:
+            return body_shapes.box(spec.box, rgba)
+        if spec.sphere is not None:
+            return body_shapes.sphere(spec.sphere, rgba)
+        if spec.cylinder is not None:
+            return body_shapes.cylinder(spec.cylinder, rgba)
+        if spec.cup is not None:
+            if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
+                raise ValueError(f"a wall of {spec.cup.wall:g} m leaves no hollow in the cup")
+            return body_shapes.cup(spec.cup, rgba)
+        if spec.tray is not None:
+            x, y, z = spec.tray.size
+            if spec.tray.wall >= min(x / 2.0, y / 2.0, z):
+                raise ValueError(f"a wall of {spec.tray.wall:g} m leaves no hollow in the tray")
+            return body_shapes.tray(spec.tray, rgba)
+        if spec.mesh is not None:
+            return body_files.mesh(spec.mesh, self.packages, rgba)
+        assert spec.urdf is not None  # the words of SHAPES are the fields of BodySpec
+        return body_files.urdf(spec.urdf, self.packages, spec.color)
+
+    def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
+        self.shapes[name] = shape
+        self.kinds[name] = kind
+
+    def _body(self, name: str, spec: BodySpec, X_WO: Transform) -> Body:
+        shape = self.shapes[name]
+        inertial = _inertial(spec, shape)
+        return Body(
+            name=name,
+            kind=self.kinds[name],
+            geometries=shape.geometries,
+            mass=inertial.mass,
+            X_OI=inertial.X_LI,
+            inertia=inertial.inertia,
+            friction=spec.friction,
+            rolling_friction=spec.rolling_friction,
+            spinning_friction=spec.spinning_friction,
+            restitution=spec.restitution,
+            fixed=spec.fixed,
+            X_WO=X_WO,
+            interior=shape.interior,
+            size=shape.size,
+            centre=shape.centre,
+        )
+
+    # -- places
+
+    def _pose(self, name: str) -> Transform | None:
+        """X_WO of a body of the task; None when a finding says why not (here or at the body that it depends on)."""
+        if name in self.poses or name in self.unplaced:
+            return self.poses.get(name)
+        if name in self.waiting:
+            circle = " -> ".join((*self.waiting[self.waiting.index(name) :], name))
+            last = self.waiting[-1]
+            word = "inside" if self.spec.scene[last].inside is not None else "rests_on"
+            self._error("TASK225", f"bodies are placed on each other in a circle: {circle}", ("scene", last, word))
+            return None
+        self.waiting.append(name)
+        X_WO = self._placed(name, self.spec.scene[name])
+        self.waiting.pop()
+        if X_WO is None:
+            self.unplaced.add(name)
+        else:
+            self.poses[name] = X_WO
+        return X_WO
+
+    def _placed(self, name: str, spec: BodySpec) -> Transform | None:
+        loc: Loc = ("scene", name)
+        words = [word for word in ("pose", "rests_on", "inside") if getattr(spec, word) is not None]
+        if len(words) != 1:
+            found = f"is placed twice ({', '.join(words)})" if words else "has no place"
+            hint = "`pose: {xyz: [x, y, z]}`, or `rests_on: BODY` with `at: [x, y]`, or `inside: CONTAINER`"
+            self._error("TASK224", f"body '{name}' {found}", (*loc, words[-1]) if words else loc, hint)
+            return None
+        if spec.at is None and spec.rests_on is not None:
+            self._error("TASK224", f"body '{name}' needs `at: [x, y]` beside `rests_on`", (*loc, "rests_on"))
+            return None
+        if spec.at is not None and spec.pose is not None:
+            hint = "say it in the pose: `xyz: [x, y, z]`"
+            self._error("TASK224", f"body '{name}' has `pose` and `at`", (*loc, "at"), hint)
+            return None
+        if spec.pose is not None:
+            if spec.yaw != 0.0:
+                hint = "say it in the pose: `rpy: [0, 0, yaw]`"
+                self._error("TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), hint)
+            return spec.pose.transform
+        word = "rests_on" if spec.rests_on is not None else "inside"
+        other = spec.rests_on or spec.inside or ""
+        known = other in self.spec.scene or other in self.poses  # what is not has been told
+        X_WB = self._pose(other) if known else None
+        if X_WB is None or name not in self.shapes or other not in self.shapes:
+            return None
+        if word == "inside":
+            return self._inside(name, spec, other, X_WB)
+        return self._resting(name, spec, other, X_WB)
+
+    def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """Bottom of the body on the top face of the other, or on what it meets from above of a body from a file: the
+        settling lets it land."""
+        loc: Loc = ("scene", name, "rests_on")
+        support, shape = self.shapes[other], self.shapes[name]
+        assert spec.at is not None
+        if X_WB.R[2, 2] < UPRIGHT:
+            self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
+            return None
+        formed = self.kinds[other] in FORMED
+        if not support.flat_top and not formed:
+            flat = "rest it on a box, a cylinder or the floor"
+            hint = f"say `inside: {other}`" if support.interior is not None else flat
+            self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
+            return None
+        top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
+        X_WO = Transform.of(xyz=(*spec.at, top - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+        x, y = X_WB.inverse().apply(X_WO.p)[:2] - support.centre[:2]
+        beside = (
+            np.hypot(x, y) > support.radius
+            if support.radius is not None
+            else abs(x) > support.size[0] / 2.0 or abs(y) > support.size[1] / 2.0
+        )
+        if beside:
+            at = f"[{spec.at[0]:g}, {spec.at[1]:g}]"
+            middle = X_WB.apply(support.centre)
+            across = f"{support.size[0]:g} by {support.size[1]:g} m"
+            hint = f"the top of '{other}' is {across}, its middle at [{middle[0]:g}, {middle[1]:g}] m"
+            self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"), hint)
+            return None
+        if not formed:
+            return X_WO
+        fall = landing(shape, X_WO, support, X_WB)
+        if fall is None:
+            message = f"nothing of '{other}' lies below '{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m"
+            self._error("TASK224", message, ("scene", name, "at"), f"choose `at` over a part of '{other}'")
+            return None
+        return Transform.of(xyz=(0.0, 0.0, -fall)) @ X_WO
+
+    def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
+        """On the floor of the other's hollow, `at` and `yaw` as seen from its middle."""
+        loc: Loc = ("scene", name, "inside")
+        interior, shape = self.shapes[other].interior, self.shapes[name]
+        if interior is None:
+            containers = [known for known, made in self.shapes.items() if made.interior is not None]
+            hint = f"containers here: {', '.join(containers)}" if containers else "a cup or a tray is a container"
+            self._error("TASK224", f"'{other}' is a {self.kinds[other]} and has no inside", loc, hint)
+            return None
+        if X_WB.R[2, 2] < UPRIGHT:
+            self._error("TASK224", f"nothing stays inside '{other}': it is tilted", loc, "give a `pose` instead")
+            return None
+        lack = _too_big(shape, spec.yaw, interior)
+        if lack > EXACT:
+            self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for the inside of '{other}'", loc)
+            return None
+        x, y = spec.at or (0.0, 0.0)
+        lack = _too_big(shape, spec.yaw, interior, x, y)
+        if lack > EXACT:
+            hint = f"`at` counts from the middle of '{other}', along its axes"
+            message = f"'{name}' would stand {digits(lack * 1e3)} mm outside of the hollow of '{other}'"
+            self._error("TASK224", message, ("scene", name, "at"), hint)
+            return None
+        floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
+        return X_WB @ interior.X_OS @ Transform.of(xyz=(x, y, -floor / 2.0 - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
+
+    # -- frames
+
+    def _frames(self) -> Iterable[Frame]:
+        for name, frame in self.spec.frames.items():
+            yield Frame(name=name, parent=frame.parent, X_PF=frame.pose.transform)
+
+    # -- findings
+
+    def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
+        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+
+
+def _written(value: object, loc: Loc) -> Iterator[Loc]:
+    """Where a value stands, and everything below it."""
+    yield loc
+    if isinstance(value, Model):
+        for key in value.model_fields_set:
+            yield from _written(getattr(value, key), (*loc, key))
+    elif isinstance(value, tuple):
+        yield from ((*loc, k) for k in range(len(value)))
+
+
+def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
+    """Mass properties in O: those of a file scaled to the mass that is written, else of the union of the shapes."""
+    if spec.fixed:
+        return Inertial(mass=0.0, X_LI=Transform.identity(), inertia=frozen(np.zeros((3, 3))))
+    if shape.inertial is None:
+        return union(shape.geometries, spec.mass or 1.0)  # without a mass there is a finding, and no scene
+    mass = spec.mass or shape.inertial.mass
+    scale = mass / shape.inertial.mass
+    return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=frozen(shape.inertial.inertia * scale))
+
+
+def _floor_shape() -> BodyShape:
+    # A thick box and not PyBullet's plane: the same body for contact, collision checks and drawing.
+    return BodyShape(
+        geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
+        interior=None,
+        size=frozen(FLOOR_SIZE),
+        centre=frozen(np.zeros(3)),
+        flat_top=True,
+    )
+
+
+def _bottom(shape: BodyShape) -> float:
+    """Lowest z [m] of the shape in O."""
+    return float(shape.centre[2] - shape.size[2] / 2.0)
+
+
+def _too_big(shape: BodyShape, yaw: float, interior: Interior, x: float = 0.0, y: float = 0.0) -> float:
+    """By how much [m] the outline of the shape at (x, y) [m], turned by yaw, leaves the hollow; <= 0: it fits."""
+    half: Array = shape.size[:2] / 2.0
+    if isinstance(interior.shape, Cylinder):
+        outline = shape.radius if shape.radius is not None else float(np.hypot(*half))
+        return outline + float(np.hypot(x, y)) - interior.shape.radius
+    if shape.radius is None:
+        c, s = abs(np.cos(yaw)), abs(np.sin(yaw))
+        half = np.array([c * half[0] + s * half[1], s * half[0] + c * half[1]])
+    return float(np.max(half + np.abs([x, y]) - np.array(interior.shape.size[:2]) / 2.0))

@@ -1,0 +1,86 @@
+"""What stands around the robot: bodies made of primitive shapes, and named frames. Immutable.
+
+The frame O of a body lies at its reference point: the centre for boxes and spheres; the middle of the *bottom* for
+what stands and contains (cup, tray, cylinder), z up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.shapes.primitives import Box, Cylinder, Geometry
+
+
+@dataclass(frozen=True, slots=True)
+class Interior:
+    """The hollow of a container: a box or an upright cylinder, open at its top (+z of O)."""
+
+    X_OS: Transform
+    shape: Box | Cylinder
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One thing in the scene.
+
+    Attributes:
+        name: as in the task.
+        kind: the word of the task file that made it (`box`, `cup`, ...).
+        geometries: shapes in O, for contact and for drawing.
+        mass: [kg]; 0 when fixed.
+        X_OI: inertial frame in O (origin at the centre of mass).
+        inertia: (3, 3) [kg m2] in I.
+        friction, rolling_friction, spinning_friction: coefficients of this body; the engine combines two bodies'.
+        restitution: 0 to 1.
+        fixed: never moves.
+        X_WO: where it starts.
+        interior: the hollow, when it has one.
+        size: (3,) [m] bounding box of the body in O (full lengths).
+        centre: (3,) [m] centre of that bounding box in O.
+    """
+
+    name: str
+    kind: str
+    geometries: tuple[Geometry, ...]
+    mass: float
+    X_OI: Transform
+    inertia: Array
+    friction: float
+    rolling_friction: float
+    spinning_friction: float
+    restitution: float
+    fixed: bool
+    X_WO: Transform
+    interior: Interior | None
+    size: Array
+    centre: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A named frame, fixed in `parent`: 'world', or a body."""
+
+    name: str
+    parent: str
+    X_PF: Transform
+
+
+@dataclass(frozen=True)
+class Scene:
+    bodies: tuple[Body, ...]
+    frames: tuple[Frame, ...]
+    gravity: Array
+
+    @cached_property
+    def movable(self) -> tuple[Body, ...]:
+        """The bodies that can move, in the order of all body arrays (m, ...) of a `WorldState`."""
+        return tuple(body for body in self.bodies if not body.fixed)
+
+    @cached_property
+    def _bodies(self) -> dict[str, Body]:
+        return {body.name: body for body in self.bodies}
+
+    def body(self, name: str) -> Body:
+        return self._bodies[name]

@@ -1,0 +1,216 @@
+"""A scene as text and back, so that a log says what stood where without the files that it was built from."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+
+from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
+from manipcli.spec.base import Model
+
+Numbers3 = tuple[float, float, float]
+Numbers4 = tuple[float, float, float, float]
+Matrix = tuple[Numbers3, Numbers3, Numbers3]
+
+
+class _Pose(Model):
+    xyz: Numbers3
+    R: Matrix
+
+
+class _Box(Model):
+    type: Literal["box"]
+    size: Numbers3
+
+
+class _Sphere(Model):
+    type: Literal["sphere"]
+    radius: float
+
+
+class _Cylinder(Model):
+    type: Literal["cylinder"]
+    radius: float
+    length: float
+
+
+class _Mesh(Model):
+    type: Literal["mesh"]
+    uri: str
+    scale: Numbers3
+
+
+_Shape = Annotated[_Box | _Sphere | _Cylinder | _Mesh, Field(discriminator="type")]
+
+
+class _Geometry(Model):
+    pose: _Pose
+    shape: _Shape
+    rgba: Numbers4 | None
+
+
+class _Interior(Model):
+    pose: _Pose
+    shape: Annotated[_Box | _Cylinder, Field(discriminator="type")]
+
+
+class _Body(Model):
+    name: str
+    kind: str
+    pose: _Pose
+    geometries: tuple[_Geometry, ...]
+    mass: float
+    inertial_pose: _Pose
+    inertia: Matrix
+    friction: float
+    rolling_friction: float
+    spinning_friction: float
+    restitution: float
+    fixed: bool
+    interior: _Interior | None
+    size: Numbers3
+    centre: Numbers3
+
+
+class _Frame(Model):
+    name: str
+    parent: str
+    pose: _Pose
+
+
+class _Scene(Model):
+    bodies: tuple[_Body, ...]
+    frames: tuple[_Frame, ...]
+    gravity: Numbers3
+
+
+def scene_to_json(scene: Scene) -> bytes:
+    """The scene as JSON: the same bytes for the same scene, every number exact; meshes by their URI."""
+    bodies = tuple(
+        _Body(
+            name=body.name,
+            kind=body.kind,
+            pose=_pose(body.X_WO),
+            geometries=tuple(
+                _Geometry(pose=_pose(one.X_LS), shape=_shape(one.shape), rgba=one.rgba) for one in body.geometries
+            ),
+            mass=body.mass,
+            inertial_pose=_pose(body.X_OI),
+            inertia=_matrix(body.inertia),
+            friction=body.friction,
+            rolling_friction=body.rolling_friction,
+            spinning_friction=body.spinning_friction,
+            restitution=body.restitution,
+            fixed=body.fixed,
+            interior=_hollow(body.interior),
+            size=_three(body.size),
+            centre=_three(body.centre),
+        )
+        for body in scene.bodies
+    )
+    frames = tuple(_Frame(name=one.name, parent=one.parent, pose=_pose(one.X_PF)) for one in scene.frames)
+    made = _Scene(bodies=bodies, frames=frames, gravity=_three(scene.gravity))
+    return (json.dumps(made.model_dump(mode="json"), indent=1) + "\n").encode()
+
+
+def scene_from_json(text: bytes) -> Scene:
+    """The scene that `scene_to_json` wrote. No file is looked for: the path of a mesh is its URI.
+
+    Raises:
+        ValueError: the text is no such scene.
+    """
+    made = TypeAdapter(_Scene).validate_json(text)
+    return Scene(
+        bodies=tuple(
+            Body(
+                name=body.name,
+                kind=body.kind,
+                geometries=tuple(
+                    Geometry(X_LS=_transform(one.pose), shape=_made(one.shape), rgba=one.rgba)
+                    for one in body.geometries
+                ),
+                mass=body.mass,
+                X_OI=_transform(body.inertial_pose),
+                inertia=frozen(body.inertia),
+                friction=body.friction,
+                rolling_friction=body.rolling_friction,
+                spinning_friction=body.spinning_friction,
+                restitution=body.restitution,
+                fixed=body.fixed,
+                X_WO=_transform(body.pose),
+                interior=_read_hollow(body.interior),
+                size=frozen(body.size),
+                centre=frozen(body.centre),
+            )
+            for body in made.bodies
+        ),
+        frames=tuple(Frame(name=one.name, parent=one.parent, X_PF=_transform(one.pose)) for one in made.frames),
+        gravity=frozen(made.gravity),
+    )
+
+
+def _pose(X: Transform) -> _Pose:
+    return _Pose(xyz=_three(X.p), R=_matrix(X.R))
+
+
+def _transform(pose: _Pose) -> Transform:
+    return Transform(R=frozen(pose.R), p=frozen(pose.xyz))
+
+
+def _three(values: Array) -> Numbers3:
+    x, y, z = np.asarray(values, dtype=np.float64).tolist()
+    return (x, y, z)
+
+
+def _matrix(values: Array) -> Matrix:
+    return (_three(values[0]), _three(values[1]), _three(values[2]))
+
+
+def _shape(shape: Shape) -> _Box | _Sphere | _Cylinder | _Mesh:
+    match shape:
+        case Box(size=size):
+            return _Box(type="box", size=size)
+        case Sphere(radius=radius):
+            return _Sphere(type="sphere", radius=radius)
+        case Cylinder(radius=radius, length=length):
+            return _Cylinder(type="cylinder", radius=radius, length=length)
+        case Mesh(uri=uri, scale=scale):
+            return _Mesh(type="mesh", uri=uri, scale=scale)
+
+
+def _made(shape: _Box | _Sphere | _Cylinder | _Mesh) -> Shape:
+    match shape:
+        case _Box(size=size):
+            return Box(size)
+        case _Sphere(radius=radius):
+            return Sphere(radius)
+        case _Cylinder(radius=radius, length=length):
+            return Cylinder(radius, length)
+        case _Mesh(uri=uri, scale=scale):
+            return Mesh(uri=uri, path=Path(uri), scale=scale)
+
+
+def _hollow(interior: Interior | None) -> _Interior | None:
+    if interior is None:
+        return None
+    shape = interior.shape
+    written: _Box | _Cylinder
+    if isinstance(shape, Box):
+        written = _Box(type="box", size=shape.size)
+    else:
+        written = _Cylinder(type="cylinder", radius=shape.radius, length=shape.length)
+    return _Interior(pose=_pose(interior.X_OS), shape=written)
+
+
+def _read_hollow(interior: _Interior | None) -> Interior | None:
+    if interior is None:
+        return None
+    shape = interior.shape
+    hollow = Box(shape.size) if isinstance(shape, _Box) else Cylinder(shape.radius, shape.length)
+    return Interior(X_OS=_transform(interior.pose), shape=hollow)

@@ -1,0 +1,174 @@
+"""Mesh files, read safely: the content tells what a file is, every size is bounded, nothing outside is followed.
+
+`read_mesh` answers with the triangles or raises `UnusableMesh`, which says what is wrong with the file.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from manipcli.core.geometry import Array, frozen
+from manipcli.shapes.mesh_collada import read_collada
+from manipcli.shapes.mesh_fault import MAX_BYTES, MAX_TRIANGLES, Colours, Faces, UnusableMesh
+from manipcli.shapes.mesh_obj import read_obj
+from manipcli.shapes.mesh_stl import is_ascii_stl, is_binary_stl, read_ascii_stl, read_binary_stl
+
+SUFFIXES = {".stl": "stl", ".obj": "obj", ".dae": "collada"}
+"""The formats that are read, by the ends of their names."""
+
+Format = Literal["stl", "stl-ascii", "obj", "collada"]
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Triangles in the frame of the file, in its unit (Collada: in metres).
+
+    Attributes:
+        vertices: (n, 3), finite.
+        faces: (m, 3) integers, each row the vertices of a triangle.
+        parts: index of the first face of each part; an engine makes a hull of each part.
+        format: what the file holds.
+        up_axis: what a Collada file states, "" where it states none; it changes nothing here.
+        colours: which faces have which colour, as far as the file itself says.
+    """
+
+    vertices: Array
+    faces: Faces
+    parts: tuple[int, ...]
+    format: Format
+    up_axis: str = "Z_UP"
+    colours: Colours = ()
+
+    @functools.cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) of the box about all vertices of triangles."""
+        used = self.vertices[self.faces.ravel()]
+        return used.min(axis=0), used.max(axis=0)
+
+    @functools.cached_property
+    def flat(self) -> bool:
+        """Whether the vertices of all triangles lie in a plane, on a line or at a point: they have no hull."""
+        used = self.vertices[np.unique(self.faces)]
+        spread = np.linalg.svd(used - used.mean(axis=0), compute_uv=False)
+        return len(used) < 4 or bool(spread[2] <= 1e-9 * spread[0])
+
+
+def read_mesh(path: Path) -> TriangleMesh:
+    """The triangles of an STL (binary or text), OBJ or Collada file; a file that did not change is read once.
+
+    Raises:
+        UnusableMesh: not a regular file, too large, of another format, damaged, or without triangles.
+    """
+    try:
+        info = path.stat()
+        if not stat.S_ISREG(info.st_mode):
+            raise UnusableMesh("is not a regular file")
+    except (OSError, ValueError) as error:
+        raise UnusableMesh(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if info.st_size > MAX_BYTES:
+        raise UnusableMesh(f"has {info.st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are read")
+    if info.st_size == 0:
+        raise UnusableMesh("is empty")
+    found = _read(path.resolve(), info.st_mtime_ns, info.st_size)
+    if isinstance(found, TriangleMesh):
+        return found
+    raise UnusableMesh(found[0], hint=found[1])
+
+
+@functools.lru_cache(maxsize=64)
+def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, str | None]:
+    """The mesh, or reason and hint: exceptions are not cached, and a bad file must not be read again and again."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise UnusableMesh(f"has more than {MAX_BYTES / 1e6:.0f} MB")
+        return _checked(*_parsed(data, path.suffix.lower()))
+    except UnusableMesh as error:
+        return error.reason, error.hint
+    except OSError as error:
+        return f"cannot be read: {error.strerror}", None
+    except MemoryError:
+        return "needs more memory than there is", None
+
+
+_BEGINS_AS_OBJ: Final = re.compile(rb"(\s*(#|o |g |s |mtllib |usemtl )[^\n]*\n)*\s*v\s+-?[0-9.]")
+_OTHERS: Final = {
+    b"\x89png": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"gltf": "a glTF file",
+    b"ply\n": "a PLY file",
+    b"ply\r": "a PLY file",
+    b"pk\x03\x04": "a ZIP archive",
+    b"\x1f\x8b": "a gzip archive",
+    b"iso-10303": "a STEP file",
+    b"%pdf": "a PDF document",
+}
+"""By the first bytes, in lower case."""
+
+
+def _other_format(head: bytes) -> str | None:
+    return next((name for begins, name in _OTHERS.items() if head.startswith(begins)), None)
+
+
+Parsed = tuple[Format, Array, Faces, tuple[int, ...], str, Colours]
+
+
+def _parsed(data: bytes, suffix: str) -> Parsed:
+    head = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    if head.startswith(b"version https://git-lfs"):
+        raise UnusableMesh("is a Git LFS pointer, not the mesh itself", hint="fetch it: git lfs pull")
+    if head.startswith((b"<!doctype html", b"<html")):
+        raise UnusableMesh("is a web page, not a mesh", hint="download the file itself")
+    if is_binary_stl(data):
+        return ("stl", *read_binary_stl(data), "Z_UP", ())
+    if is_ascii_stl(data):
+        return ("stl-ascii", *read_ascii_stl(data), "Z_UP", ())
+    if head.startswith((b"<?xml", b"<collada", b"<!doctype")):
+        return ("collada", *read_collada(data))
+    if other := _other_format(head):
+        raise UnusableMesh(f"is {other}, as its first bytes say", hint=f"expected one of {', '.join(SUFFIXES)}")
+    if suffix == ".stl" and _BEGINS_AS_OBJ.match(data[:4096]):
+        raise UnusableMesh("looks like an OBJ file, by its first lines", hint="rename it to end with .obj")
+    if suffix == ".stl":
+        return ("stl", *read_binary_stl(data), "Z_UP", ())
+    if suffix == ".dae":
+        raise UnusableMesh("is no Collada file: it does not begin as XML")
+    if suffix == ".obj":
+        return ("obj", *read_obj(data), "Z_UP", ())
+    known = ", ".join(SUFFIXES)
+    raise UnusableMesh(f"is of a format that is not read ('{suffix}'); expected one of {known}", hint="convert it")
+
+
+def _checked(
+    kind: Format, vertices: Array, faces: Faces, parts: tuple[int, ...], up_axis: str, colours: Colours
+) -> TriangleMesh:
+    if len(faces) == 0:
+        raise UnusableMesh("holds no triangle")
+    if len(faces) > MAX_TRIANGLES:
+        raise UnusableMesh(f"has {len(faces)} triangles; at most {MAX_TRIANGLES} are read")
+    if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
+        k = int(np.argmax((faces < 0).any(axis=1) | (faces >= len(vertices)).any(axis=1)))
+        at = ", ".join(str(index) for index in faces[k])
+        raise UnusableMesh(f"is damaged: triangle {k + 1} names vertices {at} of {len(vertices)}")
+    # Larger numbers overflow in an engine, which counts in single precision and squares them.
+    bad = ~(np.abs(vertices) < 1e15).all(axis=1)
+    if bad.any():
+        k = int(np.argmax(bad))
+        at = ", ".join(f"{value:g}" for value in vertices[k])
+        raise UnusableMesh(f"is damaged: vertex {k + 1} is at ({at})")
+    mesh = TriangleMesh(
+        vertices=frozen(vertices), faces=faces, parts=parts, format=kind, up_axis=up_axis, colours=colours
+    )
+    low, high = mesh.bounds
+    if not (high > low).any():
+        raise UnusableMesh("is damaged: all its triangles lie in one point")
+    mesh.faces.flags.writeable = False
+    return mesh

@@ -1,0 +1,61 @@
+"""What stands in for a scene or a robot that cannot be built, so that the names that a task gets wrong are told with
+the mistakes that keep it from being built. Nothing is planned or simulated with these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manipcli.conditions.touch import ROBOT
+from manipcli.core.geometry import Transform, frozen
+from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
+from manipcli.scene.scene import Body, Frame, Interior, Scene
+from manipcli.shapes.primitives import Box
+from manipcli.spec.task import TaskSpec
+
+
+def named_scene(spec: TaskSpec) -> Scene:
+    """The names of a scene that cannot be built. Its bodies could be anything but the floor, so that only unknown names
+    are told."""
+    one = Box((1.0, 1.0, 1.0))
+    origin = Transform.identity()
+    bodies = tuple(
+        Body(
+            name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
+            rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in spec.scene, X_WO=origin,
+            interior=Interior(X_OS=origin, shape=one), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
+        )
+        for name in (*(("floor",) if spec.floor else ()), *spec.scene)
+    )  # fmt: skip
+    frames = tuple(Frame(name=name, parent="world", X_PF=origin) for name in spec.frames)
+    return Scene(bodies=bodies, frames=frames, gravity=frozen([0.0, 0.0, -1.0]))
+
+
+def named_robot(spec: TaskSpec) -> RobotModel:
+    """A robot of which nothing is known: every word of the task is a pose, a group, a joint and a link of it, so that
+    only what is wrong with any robot is told."""
+    words = tuple(dict.fromkeys(_words(spec.model_dump(serialize_as_any=True))))
+    links = dict.fromkeys(name for word in words for name in (word, word.removeprefix(f"{ROBOT}/")))
+    limits = JointLimits(lower=-np.inf, upper=np.inf, velocity=np.inf, effort=np.inf)
+    axis, origin = frozen([0.0, 0.0, 1.0]), Transform.identity()
+    return RobotModel(
+        name="", root="", urdf="", transmissions=(), X_WB=origin, tool=Tool("", origin),
+        links=tuple(Link(name, None, (), ()) for name in links),
+        joints=tuple(Joint(name, "revolute", "", name, origin, axis, limits) for name in words),
+        groups=tuple(Group(name, words) for name in words),
+        poses=tuple(NamedPose(name, words, (0.0,) * len(words)) for name in words),
+    )  # fmt: skip
+
+
+def _words(data: object) -> Iterator[str]:
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, dict):
+        for key, value in data.items():
+            yield str(key)
+            yield from _words(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from _words(value)

@@ -1,0 +1,204 @@
+"""The whole task planned before anything moves: every step from the predicted end of the one before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipcli.core.errors import NotPlannable
+from manipcli.core.geometry import Array
+from manipcli.judge.expectation import labels
+from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
+from manipcli.model.configuration import posture
+from manipcli.plan.claims import Claims
+from manipcli.plan.grasp_backtracking import Regrasps
+from manipcli.plan.hand import SPEED, closing_speed
+from manipcli.plan.planner import Planner
+from manipcli.plan.step import Motion, Situation, StepPlan
+from manipcli.plan.steps import STEPS
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import GripperSpec
+from manipcli.spec.task import StepSpec
+from manipcli.task.task import Task
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStep:
+    """A step as written (`place`: file:line:column), and what was planned for it, by none of `grasps`, R_WT (3, 3) of
+    the tool, which lead nowhere."""
+
+    id: str
+    verb: str
+    plan: StepPlan
+    place: str
+    grasps: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedMotion:
+    """One motion of one step, for tables and files."""
+
+    step_id: str
+    verb: str
+    label: str
+    trajectory: JointTrajectory | None
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What will be done. `planner` can plan a step again from what was measured; `judged`: where expectations and
+    watches were written, for the log."""
+
+    steps: tuple[PlannedStep, ...]
+    start: Situation
+    planner: Planner
+    judged: tuple[str, ...] = ()
+
+    @property
+    def motions(self) -> tuple[PlannedMotion, ...]:
+        """All motions in order."""
+        return tuple(
+            PlannedMotion(step.id, step.verb, motion.label, motion.trajectory, motion.duration)
+            for step in self.steps
+            for motion in step.plan.motions
+        )
+
+    def to_json(self) -> bytes:
+        """What the log carries: ids, verbs, where steps and what is judged were written, durations, and each
+        trajectory's ends."""
+        steps = [
+            {
+                "id": step.id,
+                "verb": step.verb,
+                "place": step.place,
+                "planned_duration": step.plan.duration,
+                "motions": [_described(motion) for motion in step.plan.motions],
+            }
+            for step in self.steps
+        ]
+        return json.dumps({"steps": steps, "judged": list(self.judged)}, indent=1).encode()
+
+
+def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> Plan:
+    """Plan every step.
+
+    Args:
+        task: whose steps.
+        doing: told of each step before it is planned.
+
+    Raises:
+        NotPlannable: names the step and why; no later step was planned.
+    """
+    planner = _planner(task)
+    start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
+    return Plan(steps=_steps(task, planner, start, doing), start=start, planner=planner, judged=judged)
+
+
+def refused(task: Task, refusal: NotPlannable) -> Verdict:
+    """The verdict on a task that was never run, because one of its steps cannot be planned."""
+    reason = "a step cannot be planned"
+    return Verdict(
+        task=task.name,
+        verdict="failed",
+        seed=task.spec.simulation.seed,
+        engine=task.spec.simulation.engine,
+        simulated_time=0.0,
+        steps=tuple(
+            StepOutcome(
+                id=str(step.id),
+                verb=step.verb,
+                outcome="failed" if step.id == refusal.step else "not_run",
+                started=None,
+                ended=None,
+                planned_duration=None,
+                text=f"cannot be planned: {refusal.cause}" if step.id == refusal.step else "",
+            )
+            for step in task.spec.steps
+        ),
+        expectations=tuple(
+            ExpectationOutcome(name, "not_evaluated", margin=None, unit="", at=None, text=reason)
+            for name in labels(task.spec.judged)
+        ),
+        errors=refusal.findings,
+        text=f"{reason}: {refusal}",
+        drawn=task.drawn,
+    )
+
+
+def plan_step(planner: Planner, step: StepSpec, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+    """Plan one step, by none of `grasps`; whatever refuses it is told with its id."""
+    member = STEPS[step.verb]
+    try:
+        if situation.at_start:
+            planner.outside(situation)
+        if grasps and member.regrasp is not None:
+            return member.regrasp(step.body, planner, situation, grasps)
+        return member.plan(step.body, planner, situation)
+    except NotPlannable as refusal:
+        raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
+
+
+def start_position(task: Task) -> Array:
+    """(n) where the robot starts: the task's `start` pose, else `home` if there is one, else zero within the limits."""
+    return posture(task.robot, task.spec.start)
+
+
+def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
+    """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
+    done: list[PlannedStep] = []
+    regrasps = Regrasps(planner)
+    while (k := len(done)) < len(task.spec.steps):
+        grasps = regrasps.of(k)
+        again = ", with another grasp" if grasps else ""
+        doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{again}")
+        try:
+            done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
+        except NotPlannable as refusal:
+            del done[regrasps.back(refusal, [(one.verb, one.plan.end) for one in done]) :]
+    return tuple(done)
+
+
+def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tuple[Array, ...]) -> PlannedStep:
+    """Step `k` of the task, by none of `grasps`; a refusal tells where it is written."""
+    step = task.spec.steps[k]
+    try:
+        planned = plan_step(planner, step, start, grasps)
+    except NotPlannable as refusal:
+        at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
+        told = NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at, loc=refusal.loc)
+        raise told from refusal
+    return PlannedStep(str(step.id), step.verb, planned, task.log_place("steps", k), grasps)
+
+
+def _planner(task: Task) -> Planner:
+    hands = [spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec)]
+    speeds = (closing_speed(task.robot, hand.joints, hand.speed) for hand in hands)
+    return Planner(
+        task.robot,
+        task.scene,
+        period=task.spec.simulation.control_period,
+        rng=np.random.default_rng(task.spec.simulation.seed),
+        gripper_joints=Claims.of(task.controllers).hand,
+        gripper_speed=min(speeds, default=SPEED),
+    )
+
+
+def _described(motion: Motion) -> dict[str, object]:
+    described: dict[str, object] = {"label": motion.label, "duration": motion.duration}
+    if motion.trajectory is not None:
+        described["joints"] = list(motion.trajectory.names)
+        described["from"] = motion.trajectory.positions[0].tolist()
+        described["to"] = motion.trajectory.positions[-1].tolist()
+    if motion.grip is not None:
+        described["hand"] = motion.grip.target.tolist()
+        described["force"] = motion.grip.force
+    if motion.switch is not None:
+        described["switch"] = {
+            key: list(names) for key in ("to", "activate", "deactivate") if (names := getattr(motion.switch, key))
+        }
+    return described

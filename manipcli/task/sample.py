@@ -1,0 +1,129 @@
+"""One sample of a task that varies: what is planned with, and what only the world knows.
+
+Where things are, how large they are, limits and the clock are seen by planner and controllers. Masses, coefficients of
+contact, gravity, actuators and everything of the controllers act in the world alone: planner and the models of
+controllers keep what the files say (`Varied.only_world`).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.description.packages import Packages
+from manipcli.judge.drawn import Drawn
+from manipcli.model.build_robot import build_robot
+from manipcli.model.robot import RobotModel
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene import Scene
+from manipcli.spec.override import Override, read_overrides
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.source.located import Located
+from manipcli.spec.task import TaskSpec
+from manipcli.task import load_task as load
+from manipcli.task.changed_files import Changes, Files
+from manipcli.task.task import Task, Truth
+from manipcli.task.vary import Varied, bind, draw
+
+RobotOf = Callable[[Located[RobotSpec]], RobotModel]
+SceneOf = Callable[[Located[TaskSpec]], Scene]
+
+
+def load_task(
+    path: Path,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    sample: int | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> Task:
+    """Read a task and everything it names; see `flow.load.load_task`.
+
+    Args:
+        sample: which one of `vary:`; None for the task as it is written. What `overrides` set is not drawn; its
+            `offset` or `scale` is, about the value that they set.
+
+    Raises:
+        InvalidInput: also where nothing varies, or a drawn value cannot be.
+    """
+    task = load.load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
+    if sample is None:
+        return task
+    robot_path = Path(os.path.normpath(path.parent / task.spec.robot))
+    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    if sample < 0:
+        message = f"there is no sample {sample}: they count from 0"
+        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
+    varied, _ = bind(task.file, task.robot_file, task.controllers_file)
+    if not varied:
+        message = f"there is no sample {sample}: task '{task.name}' has no `vary:`"
+        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
+    drawn = _but_for(draw(varied, task.spec.simulation.seed, sample), varied, read_overrides(overrides))
+    return sampled(
+        task,
+        varied,
+        drawn,
+        robot_of=lambda file: build_robot(
+            file.spec,
+            file=robot_path,
+            package_path=package_path,
+            allow_outside=allow_outside,
+            source=file.source,
+        )[0],
+        scene_of=lambda file: build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages),
+    )
+
+
+def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: RobotOf, scene_of: SceneOf) -> Task:
+    """The task with drawn values.
+
+    Args:
+        task: as it is written.
+        varied: what varies, and `drawn`: the value of each.
+        robot_of, scene_of: build what a changed file means.
+
+    Raises:
+        InvalidInput: a drawn value is out of range, or no scene can be built with it.
+    """
+    values = dict(drawn.values)
+    changes = [(one, values[one.path]) for one in varied if one.path in values]
+    seen = [(one, value) for one, value in changes if not one.only_world]
+    written = Files(task.file, task.robot_file, task.controllers_file)
+    try:
+        planned = written.changed(seen)
+        true = written.changed(changes)
+        robot = task.robot if planned.robot is written.robot else robot_of(planned.robot)
+        scene = task.scene if planned.task is written.task else scene_of(planned.task)
+        truth = Truth(
+            robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
+            scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
+            controllers=true.controllers,
+        )
+    except InvalidInput as invalid:
+        told = [replace(one, message=f"{one.message} (sample {drawn.number})") for one in invalid.findings]
+        raise InvalidInput(told) from None
+    return replace(
+        task, file=planned.task, robot_file=planned.robot, robot=robot, scene=scene, drawn=drawn, truth=truth
+    )
+
+
+def _but_for(drawn: Drawn, varied: Sequence[Varied], overrides: Sequence[Override]) -> Drawn:
+    """Without the values that somebody set, alone or with what is around or in them."""
+
+    def is_set(one: Varied) -> bool:
+        return any(
+            override.area == one.area and all(a == b for a, b in zip(override.path, one.parts, strict=False))
+            for override in overrides
+        )
+
+    kept = {one.path for one in varied if one.how or not is_set(one)}
+    return replace(drawn, values=tuple((path, value) for path, value in drawn.values if path in kept))
+
+
+def _same(changes: Changes, seen: Changes, area: str) -> bool:
+    """Whether of this file nothing changes that is not seen."""
+    return sum(one.area == area for one, _ in changes) == sum(one.area == area for one, _ in seen)

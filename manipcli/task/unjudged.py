@@ -1,0 +1,55 @@
+"""Conditions that a task leaves without evidence: told before the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from manipcli.conditions.condition import Seen, World
+from manipcli.conditions.formula import absent
+from manipcli.conditions.members import CONDITIONS
+from manipcli.core.errors import Finding, Severity
+from manipcli.model.robot import RobotModel
+from manipcli.model.state import WorldState
+from manipcli.plan.steps import STEPS
+from manipcli.scene.scene import Scene
+from manipcli.simulate.engines import ENGINES
+from manipcli.spec.source.located import Located
+from manipcli.spec.task import TaskSpec
+
+TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "references": "controller_state"}
+"""The words of `record: {topics: ...}` without which nothing is known of each."""
+
+
+def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
+    """A warning for each expectation and watch that needs a topic which `record:` leaves out, and for each `until` that
+    the engine cannot answer; an error where a move is guarded by it."""
+    left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
+    physics = task.spec.simulation.engine not in ENGINES.names or ENGINES[task.spec.simulation.engine].physics == "full"
+    if not left_out and physics:
+        return
+    nothing = np.zeros(())
+    start = WorldState(*([nothing] * 8))  # no condition is asked for a margin here
+    steps = tuple(step.id for step in task.spec.steps if step.id is not None)
+    world = World(robot, scene, start, unrecorded=left_out, steps=steps)
+    for key, expectations in (("expect", task.spec.expect), ("watch", task.spec.watch)):
+        for k, expected in enumerate(expectations):
+            topic = absent(expected.condition, world, CONDITIONS)
+            if topic in left_out.values():
+                yield Finding(
+                    "TASK236",
+                    f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
+                    task.place(key, k),
+                    hint=f"add {topic} to record.topics",
+                    severity="warning",
+                )
+    live = World(robot, scene, start, physics=physics, referenced=frozenset(robot.joint_names), steps=steps)
+    for k, step in enumerate(task.spec.steps):
+        reason = None if step.until is None else absent(step.until, live, CONDITIONS)
+        if reason is not None:
+            guarded = STEPS[step.verb].guarded(step.body)
+            message = f"`until` is not waited for{', by which this move is guarded' if guarded else ''}: {reason}"
+            severity: Severity = "error" if guarded else "warning"  # it would go all its way, which nobody planned for
+            yield Finding("TASK237", message, task.place("steps", k, "until"), severity=severity)

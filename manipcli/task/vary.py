@@ -1,0 +1,363 @@
+"""`vary:` bound to the numbers of a task's files, and drawn.
+
+A sample is a pure function of seed, sample number and path: the uniform deviate of component k of a path is
+
+    u = (first 52 bits of SHA-256("seed/sample/path/k") + 1/2) / 2^52
+
+so that no path changes the draws of another, and no library's version those of any. From it `uniform` is a + (b - a) u,
+`normal` the quantile of F(least) + (F(most) - F(least)) u, where F is its distribution and least and most
+are the field's bounds, `choice` item floor(n u).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from statistics import NormalDist
+from typing import Final
+
+from pydantic import BaseModel
+
+from manipcli.core.errors import Finding, Loc
+from manipcli.core.text import did_you_mean, escape
+from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
+from manipcli.judge.drawn import Drawn, Number
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.expression import quantity_of
+from manipcli.spec.fields import bounds_of, children, unit_of
+from manipcli.spec.quantity import Unit
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.source.located import Area, Located
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
+
+EVERY: Final = "*"
+"""In a path: each name of a mapping, or each item of a list."""
+LARGEST: Final = 1e100
+"""Amounts are below this [SI]: what is drawn stays finite."""
+RAREST: Final = 1e-3
+"""A normal distribution has at least this share where the field may be."""
+_TASK_KEYS: Final = ("scene", "frames", "simulation")
+_CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
+
+Path = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """What is drawn for one path: `rows` of amounts [SI], one a component.
+
+    They are least and most of `uniform`, mean and deviation of `normal`, the items of `choice` and `grid`; of these the
+    components are drawn `together` where an item was written as a list. What `normal` draws of each component lies
+    `between` two amounts: the bounds that the field states.
+    """
+
+    word: str
+    rows: tuple[tuple[float, ...], ...]
+    together: bool
+    between: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """A number or vector of a file that is drawn.
+
+    Attributes:
+        path: as after `--set`; `key`: as in `vary:`, where `*` may stand for several.
+        area, parts: the file, and the path in it.
+        nominal: the value in the file, one number a component; `vector`: whether it is written as a list.
+        whole: it is a whole number.
+        how: `offset`, `scale`, or nothing where the value itself is drawn.
+        law: from what.
+    """
+
+    key: str
+    path: str
+    area: Area
+    parts: Path
+    nominal: tuple[float, ...]
+    vector: bool
+    whole: bool
+    how: str
+    law: Law
+
+    @property
+    def only_world(self) -> bool:
+        """Whether planner and models of controllers keep the value in the file: it changes how things move, not where
+        they are."""
+        match self.area, self.parts:
+            case ("CTRL", _) | ("TASK", ("simulation", "gravity", *_)) | ("ROBOT", ("friction" | "actuators", *_)):
+                return True
+            case "TASK", ("scene", _, field, *_):
+                return field in _CONTACT
+        return False
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """How many items each of its grids has."""
+        return (
+            (len(self.law.rows),) * (1 if self.law.together else len(self.nominal)) if self.law.word == "grid" else ()
+        )
+
+    def ends(self, inside: float = 0.0) -> tuple[Number, ...]:
+        """The ends of `uniform`, by a share `inside` of it; each item of `choice`, `grid`; () of `normal`: no end."""
+        rows = self.law.rows
+        if self.law.word == "normal":
+            return ()
+        if self.law.word == "uniform" and not self.whole:
+            shares = (inside, 1.0 - inside)
+            rows = tuple(tuple((1.0 - u) * a + u * b for a, b in zip(*rows, strict=True)) for u in shares)
+        return tuple(self._written(row) for row in rows)
+
+    def value(self, seed: int, sample: int, items: Sequence[int]) -> Number:
+        """What is drawn; `items`: of each of its grids, which one."""
+        return self._written([self._component(k, seed, sample, items) for k in range(len(self.nominal))])
+
+    def _written(self, drawn: Sequence[float]) -> Number:
+        """The value in the file, from what is drawn of each component."""
+        if self.how == "offset":
+            drawn = [a + b for a, b in zip(self.nominal, drawn, strict=True)]
+        elif self.how == "scale":
+            drawn = [a * b for a, b in zip(self.nominal, drawn, strict=True)]
+        values = [round(one) if self.whole else one for one in drawn]
+        return tuple(values) if self.vector else values[0]
+
+    def _component(self, k: int, seed: int, sample: int, items: Sequence[int]) -> float:
+        rows, which = self.law.rows, 0 if self.law.together else k
+        u = deviate(seed, sample, self.path, which)
+        match self.law.word:
+            case "uniform":
+                least, most = rows[0][k], rows[1][k]
+                if self.whole and self.how != "scale":
+                    return least + math.floor(u * (most - least + 1.0))
+                return least + (most - least) * u
+            case "normal":
+                law = NormalDist(rows[0][k], rows[1][k])
+                low, high = map(law.cdf, self.law.between[k])
+                return law.inv_cdf(min(low + (high - low) * u, math.nextafter(1.0, 0.0)))
+            case "choice":
+                return rows[math.floor(u * len(rows))][k]
+        return rows[items[which]][k]
+
+
+def deviate(seed: int, sample: int, path: str, component: int) -> float:
+    """Uniform in (0, 1)."""
+    digest = sha256(f"{seed}/{sample}/{path}/{component}".encode()).digest()
+    return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2.0**52
+
+
+def draw(varied: Sequence[Varied], seed: int, sample: int) -> Drawn:
+    """Sample `sample` of what is varied, in its order."""
+    rest = sample
+    items: list[int] = []
+    for size in reversed([size for one in varied for size in one.axes]):
+        rest, item = divmod(rest, size)
+        items.insert(0, item)
+    values: list[tuple[str, Number]] = []
+    for one in varied:
+        own = len(one.axes)
+        values.append((one.path, one.value(seed, sample, items[:own])))
+        items = items[own:]
+    return Drawn(sample, tuple(values))
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem(Exception):
+    """Why a path or an amount cannot be meant; `loc`: where below the path's own block, () for the path itself."""
+
+    message: str
+    hint: str | None = None
+    loc: Loc = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Leaf:
+    """What stands at the end of a path."""
+
+    parts: Path
+    value: object
+    unit: Unit | None
+    bounds: tuple[float, float]
+
+
+def bind(
+    task: Located[TaskSpec], robot: Located[RobotSpec], controllers: Located[ControllersSpec]
+) -> tuple[tuple[Varied, ...], tuple[Finding, ...]]:
+    """Everything that the task varies, in the order of its file; and what cannot be meant."""
+    found: list[Varied] = []
+    findings: list[Finding] = []
+    for key, spec in task.spec.vary.items():
+        try:
+            new = _bound(key, spec, task.spec, robot.spec, controllers.spec)
+            for one in new:
+                _refuse_overlap(one, found)
+        except _Problem as problem:
+            loc = ("vary", key, *problem.loc)
+            findings.append(task.source.finding(234, loc, problem.message, hint=problem.hint, key=not problem.loc))
+        else:
+            found += new
+    return tuple(found), tuple(findings)
+
+
+def _bound(
+    key: str, spec: VarySpec, task: TaskSpec, robot: RobotSpec, controllers: ControllersSpec
+) -> tuple[Varied, ...]:
+    first, *rest = key.split(".")
+    area: Area
+    if first == "robot":
+        area, prefix, leaves = "ROBOT", "robot.", _leaves(robot, tuple(rest))
+    elif first == "controllers":
+        area, prefix, leaves = "CTRL", "", _leaves(controllers, (first, *rest))
+    elif first in _TASK_KEYS:
+        area, prefix, leaves = "TASK", "", _leaves(task, (first, *rest))
+    else:
+        known = (*_TASK_KEYS, "robot", "controllers")
+        message = f"'{escape(first)}' cannot be varied, only {', '.join(known[:-1])} and {known[-1]}"
+        raise _Problem(message, did_you_mean(first, known) if first not in TaskSpec.model_fields else None)
+    return tuple(_varied(key, f"{prefix}{'.'.join(leaf.parts)}", area, leaf, spec) for leaf in leaves)
+
+
+def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Varied:
+    vector = isinstance(leaf.value, tuple)
+    values = leaf.value if isinstance(leaf.value, tuple) else (leaf.value,)
+    nominal = tuple(one for one in values if isinstance(one, int | float) and not isinstance(one, bool))
+    if leaf.value is None:
+        raise _Problem(f"there is no value at '{path}' that could vary", _to_write(leaf.parts))
+    if len(nominal) != len(values) or not nominal:
+        raise _Problem(f"'{path}' is no number, and no list of numbers")
+    whole = all(isinstance(one, int) for one in nominal)
+    how = spec.word if spec.word in ("offset", "scale") else ""
+    dimensions = (NUMBER,) if how == "scale" or leaf.unit is None else leaf.unit.dimensions
+    law = _law(spec.distribution, len(nominal), vector, dimensions, (how,) if how else ())
+    if whole and how != "scale" and law.word != "normal":
+        broken = next((one for row in law.rows for one in row if not float(one).is_integer()), None)
+        if broken is not None:
+            loc = (*((how,) if how else ()), law.word)
+            raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
+    _refuse_too_large(law, nominal, how)
+    if law.word == "normal":
+        law = replace(law, between=tuple(_between(leaf.bounds, value, how) for value in nominal))
+        _refuse_too_rare(law, path, how)
+    return Varied(key, path, area, leaf.parts, nominal, vector, whole, how, law)
+
+
+def _refuse_too_large(law: Law, nominal: Sequence[float], how: str) -> None:
+    """Amounts so large that what is drawn would be infinite."""
+    for row in law.rows:
+        for amount, value in zip(row, nominal, strict=True):
+            reach = amount * value if how == "scale" else amount + (value if how == "offset" else 0.0)
+            if not max(abs(amount), abs(reach)) < LARGEST:
+                raise _Problem(f"{amount:g} is too large an amount", loc=(*((how,) if how else ()), law.word))
+
+
+def _between(bounds: tuple[float, float], nominal: float, how: str) -> tuple[float, float]:
+    """Between what an amount must lie so that the value in the file keeps its bounds."""
+    if how == "offset":
+        return bounds[0] - nominal, bounds[1] - nominal
+    if how == "scale":
+        ends = sorted(bound / nominal for bound in bounds) if nominal else (-math.inf, math.inf)
+        return ends[0], ends[1]
+    return bounds
+
+
+def _refuse_too_rare(law: Law, path: str, how: str) -> None:
+    """A normal distribution that has next to nothing where the field may be."""
+    for mean, sd, (least, most) in zip(*law.rows, law.between, strict=True):
+        normal = NormalDist(mean, sd)
+        if normal.cdf(most) - normal.cdf(least) < RAREST:
+            message = f"less than one in a thousand of these is what '{path}' may be"
+            raise _Problem(message, loc=(*((how,) if how else ()), law.word))
+
+
+def _law(
+    spec: DistributionSpec, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: tuple[str, ...]
+) -> Law:
+    word = spec.word
+    written: tuple[tuple[Value, Loc], ...]
+    if spec.normal is not None:
+        written = ((spec.normal.mean, (*loc, word, "mean")), (spec.normal.sd, (*loc, word, "sd")))
+    else:
+        written = tuple((value, (*loc, word, k)) for k, value in enumerate(getattr(spec, word)))
+    rows = tuple(_row(value, count, vector, dimensions, at) for value, at in written)
+    if word == "uniform" and any(a > b for a, b in zip(*rows, strict=True)):
+        raise _Problem("the least value is above the most", "write [least, most]", (*loc, word))
+    if word == "normal" and not all(sd > 0.0 for sd in rows[1]):
+        raise _Problem("the standard deviation must be above 0", loc=(*loc, word))
+    lists = word in ("choice", "grid") and any(isinstance(value, tuple) for value, _ in written)
+    return Law(word, rows, together=lists)
+
+
+def _row(value: Value, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: Loc) -> tuple[float, ...]:
+    """One amount a component, in SI."""
+    if not isinstance(value, tuple):
+        return (_si(value, dimensions, loc),) * count
+    if not vector:
+        raise _Problem("a list of amounts for a single number", "write a number, or a text with a unit", loc)
+    if len(value) != count:
+        raise _Problem(f"expected {count} amounts, got {len(value)}", loc=loc)
+    return tuple(_si(one, dimensions, (*loc, k)) for k, one in enumerate(value))
+
+
+def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: Loc) -> float:
+    if not isinstance(amount, str):
+        return amount
+    try:
+        return to_si(amount, *dimensions, read=quantity_of)
+    except UnitError as error:
+        raise _Problem(error.cause, error.hint, loc) from None
+
+
+def _refuse_overlap(one: Varied, before: Sequence[Varied]) -> None:
+    for other in before:
+        shorter = min(len(one.parts), len(other.parts))
+        if one.area == other.area and one.parts[:shorter] == other.parts[:shorter]:
+            raise _Problem(f"'{one.path}' is varied by '{other.key}' already")
+
+
+def _leaves(root: BaseModel, parts: Path) -> list[_Leaf]:
+    """What stands at the end of a path, or of each path that its `*` stand for.
+
+    Raises:
+        _Problem: nothing does.
+    """
+    return list(_below(root, type(root), (), (), parts))
+
+
+def _below(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> Iterator[_Leaf]:
+    if not rest:
+        yield _Leaf(done, value, unit_of(annotation, metadata), bounds_of(annotation, metadata))
+        return
+    part, further = rest[0], rest[1:]
+    known = children(value, annotation)
+    if part == EVERY and not isinstance(value, BaseModel):
+        there = [leaf for name, child in known.items() for leaf in _tried(*child, (*done, name), further)]
+        if not there:
+            raise _Problem(f"nothing stands at '{'.'.join((*done, *rest))}'", _to_write((*done, *rest)))
+        yield from there
+        return
+    if part not in known:
+        where = f"'{'.'.join(done)}'" if done else "the file"
+        if not known:
+            raise _Problem(f"{where} has nothing in it", _to_write((*done, *rest)) if value in (None, {}) else None)
+        raise _Problem(f"there is no '{escape(part)}' in {where}", did_you_mean(part, known, kind="there are"))
+    yield from _below(*known[part], (*done, part), further)
+
+
+def _to_write(parts: Path) -> str:
+    """What the file lacks: `write it into the robot file first, as actuators: {NAME: {latency: ...}}`."""
+    file = "task" if parts[0] in _TASK_KEYS else "controllers" if parts[0] == "controllers" else "robot"
+    *above, last = ("NAME" if part == EVERY else escape(part) for part in parts)
+    written = f"{last}: ..."
+    for part in reversed(above):
+        written = f"{part}: {{{written}}}"
+    return f"write it into the {file} file first, as `{written}`"
+
+
+def _tried(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> list[_Leaf]:
+    """What one of many names leads to: not each of them needs to have all of the path."""
+    try:
+        return [leaf for leaf in _below(value, annotation, metadata, done, rest) if leaf.value is not None]
+    except _Problem:
+        return []

@@ -1,0 +1,69 @@
+"""Files to what can be looked at: a description, a robot file or a task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.geometry import Array
+from manipcli.description.lint.inspection import DESCRIPTIONS
+from manipcli.model.build_robot import build_robot
+from manipcli.model.configuration import posture
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Scene
+from manipcli.spec import load
+from manipcli.spec.robot import RobotSpec
+from manipcli.task.load_task import load_task
+from manipcli.task.plan_task import start_position
+from manipcli.task.robot_file import read_robot
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """A robot, the scene around it (of a task), where its joints (n,) start, and warnings and notes."""
+
+    robot: RobotModel
+    scene: Scene | None
+    q: Array
+    findings: tuple[Finding, ...]
+
+
+def load_sight(
+    path: Path,
+    *,
+    arguments: Mapping[str, str] = {},
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> Sight:
+    """Read what is to be shown.
+
+    Args:
+        path: URDF, xacro, robot file or task.
+        arguments: of a xacro file, `NAME:=VALUE`.
+        package_path, allow_outside: see `load_task`.
+
+    Raises:
+        InvalidInput: every error of the file.
+    """
+    if path.suffix.lower() in DESCRIPTIONS:
+        load.read_bytes(path)  # tells a file that is not there as for every other kind
+        spec = RobotSpec(robot=path.name.partition(".")[0], description=path.name, args=dict(arguments))
+        robot, notes = build_robot(spec, file=path, package_path=package_path, allow_outside=allow_outside)
+        # Acceleration limits are a matter of robot files.
+        return Sight(robot, None, posture(robot), tuple(note for note in notes if note.code != "ROBOT330"))
+    if arguments:
+        names = ", ".join(arguments)
+        raise InvalidInput(
+            [Finding("VIEW002", f"only a description has arguments; given: {names}", Place(str(path), 0, 0))]
+        )
+    kind = load.kind_of(path)
+    if kind == "task":
+        task = load_task(path, package_path=package_path, allow_outside=allow_outside)
+        return Sight(task.robot, task.scene, start_position(task), task.findings)
+    if kind == "controllers":
+        message = "a controllers file has nothing to look at; give a robot, a description or a task"
+        raise InvalidInput([Finding("VIEW003", message, Place(str(path), 0, 0))])
+    _, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
+    return Sight(robot, None, posture(robot), findings)

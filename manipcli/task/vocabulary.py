@@ -1,0 +1,28 @@
+"""The words of a task file: what the members of the seams add to the spec."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from manipcli.conditions.members import CONDITIONS
+from manipcli.plan.steps import STEPS
+from manipcli.spec.base import about
+from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
+from manipcli.spec.task import TaskSpec
+from manipcli.spec.unions import task_model
+
+
+def task_spec() -> type[TaskSpec]:
+    """`TaskSpec` with all verbs and conditions; the same class each time."""
+    return task_model(STEPS, CONDITIONS)
+
+
+def meanings(kind: str) -> Mapping[str, str]:
+    """What each word of a kind of `flow.check.words` means, in one line; empty where the words alone are told."""
+    conditions = {one.name: about(one.spec) for one in CONDITIONS} | COMBINATIONS
+    told = {
+        "steps": {one.name: about(one.spec) for one in STEPS},
+        "conditions": conditions,
+        "expectations": conditions | QUANTIFIERS,
+    }
+    return told.get(kind, {})

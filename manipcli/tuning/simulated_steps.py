@@ -1,0 +1,145 @@
+"""How the joints of a whole robot, held by proposed gains, answer a step in the engine, under gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from manipcli.control.controller import ControllerOutput, FeedForward, JointState
+from manipcli.control.feed_forward import ModelFeedForward
+from manipcli.control.manager import ControllerManager
+from manipcli.control.pid import Pid
+from manipcli.control.tuning import StepAnswer, Tuned, Wish
+from manipcli.core.errors import InvalidInput
+from manipcli.core.geometry import Array
+from manipcli.core.units import EARTH_GRAVITY
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.scene.scene import Scene
+from manipcli.simulate.engine import EngineSettings
+from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.quiet import stdout_to_stderr
+from manipcli.simulate.session import Session
+from manipcli.spec.controllers import Interface, Role
+from manipcli.spec.controllers_file import ControllersSpec
+
+RETURN: Final = 0.5
+"""[s] at least that a joint has to come back before the next one steps."""
+
+
+def simulated_answers(
+    robot: RobotModel,
+    spec: ControllersSpec,
+    proposals: tuple[Tuned, ...],
+    joints: Sequence[str],
+    wish: Wish,
+    start: Array,
+) -> tuple[Tuned, ...]:
+    """Joints step and come back, one after the other, while all others hold.
+
+    Args:
+        robot: the whole of it.
+        spec: the controllers, whose gains are the proposed ones.
+        proposals: for all joints that are held.
+        joints: those that step.
+        wish: of the gains: the control period.
+        start: (n) the posture.
+
+    Returns:
+        The proposals for `joints`, with their answers.
+
+    Raises:
+        InvalidInput: the engine cannot hold this robot.
+    """
+    holders = [
+        _Holder(name, [one for one in proposals if one.controller == name], spec, robot, start)
+        for name in dict.fromkeys(one.controller for one in proposals)
+    ]
+    member = ENGINES["pybullet"]
+    refused = member.refuses(robot)
+    if refused:
+        raise InvalidInput(refused)
+    scene = Scene(bodies=(), frames=(), gravity=np.array(EARTH_GRAVITY))
+    with stdout_to_stderr():
+        engine = member.open(robot, scene, EngineSettings(wish.period / wish.substeps, wish.substeps, start))
+        try:
+            manager = ControllerManager(
+                holders,
+                joints=robot.joint_names,
+                period=wish.period,
+                following=robot.following,
+                feed_forward=ModelFeedForward(robot, Kinematics(robot)),
+            )
+            session = Session(robot=robot, scene=scene, engine=engine, manager=manager, period=wish.period)
+            for _ in range(round(RETURN / wish.period)):
+                session.tick()
+            answers = {
+                one.joint: _stepped(session, holder, one)
+                for holder in holders
+                for one in holder.tuned
+                if one.joint in joints
+            }
+        finally:
+            engine.close()
+    return tuple(replace(one, simulated=answers[one.joint]) for one in proposals if one.joint in joints)
+
+
+class _Holder:
+    """Holds joints with proposed gains at a reference that can be stepped: what their controller does with it."""
+
+    role: Role = "other"
+    senses_contact = False
+
+    def __init__(self, name: str, tuned: list[Tuned], spec: ControllersSpec, robot: RobotModel, start: Array) -> None:
+        own = spec.controllers[name]
+        self.name, self.tuned = name, tuned
+        self.joints = tuple(one.joint for one in tuned)
+        self.interfaces: tuple[Interface, ...] = (tuned[0].interface,)
+        weightless = getattr(own, "gravity_compensation", False) or getattr(own, "inverse_dynamics", False)
+        self.feed_forward: FeedForward = "gravity" if weightless else "none"
+        clamp = np.array([np.inf if one.i_clamp is None else one.i_clamp for one in tuned])
+        self._pid = Pid(
+            p=[one.p for one in tuned],
+            i=[one.i for one in tuned],
+            d=[one.d for one in tuned],
+            i_min=-clamp,
+            i_max=clamp,
+        )
+        self.output = ControllerOutput.of(len(tuned), 1)
+        self.reference = self.output.position
+        self.reference[:] = start[robot.indices(self.joints)]
+        self.measured = self.reference.copy()
+
+    def update(
+        self, time: float, period: float, measured: JointState, *, contact_force: Array | None = None
+    ) -> ControllerOutput:
+        self.measured[:] = measured.position
+        error = self.reference - measured.position
+        self.output.command[:] = self._pid.update(error, period, -measured.velocity)
+        return self.output
+
+    def deactivate(self, time: float, reason: str = "") -> None:
+        self._pid.reset()
+
+
+def _stepped(session: Session, holder: _Holder, one: Tuned) -> StepAnswer:
+    """The joint steps, away from its nearer limit, and comes back."""
+    k = holder.joints.index(one.joint)
+    limits = session.robot.joint(one.joint).limits
+    before = float(holder.reference[k])
+    beyond = limits.upper is not None and before + 2.0 * one.predicted.size > limits.upper
+    size = -one.predicted.size if beyond else one.predicted.size
+    rest = float(session.state.position[session.robot.joint_names.index(one.joint)])
+    count = len(one.predicted.times)
+    share = np.zeros(count)
+    holder.reference[k] += size
+    for tick in range(count):
+        session.tick()
+        share[tick] = (float(holder.measured[k]) - rest) / size
+    holder.reference[k] = before
+    for _ in range(max(count, round(RETURN / session.period))):
+        session.tick()
+    return StepAnswer(abs(size), one.predicted.times, share)

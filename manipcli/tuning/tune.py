@@ -1,0 +1,320 @@
+"""Gains proposed for the controllers of a robot, and tried on the whole robot in the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.geometry import Array
+from manipcli.core.text import did_you_mean, listed, told_apart
+from manipcli.model.configuration import posture, with_mimics
+from manipcli.model.kinematics import Kinematics
+from manipcli.model.robot import RobotModel
+from manipcli.preflight.gains import named_postures
+from manipcli.spec import load
+from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.other_controllers import ComputedTorqueSpec
+from manipcli.spec.resolved import as_written
+from manipcli.spec.source.located import Located
+from manipcli.task.robot_file import read_robot
+from manipcli.tuning.extremes import climbed
+from manipcli.tuning.simulated_steps import simulated_answers
+
+if TYPE_CHECKING:
+    from manipcli.replay.curves import Chart
+
+RANDOM_POSTURES: Final = 60
+"""Postures within the limits, beside the named ones; always the same."""
+WIDE: Final = 2.0
+"""[rad or m] how far from the start a joint without limits is put."""
+HOPELESS: Final = 0.01
+"""Of the bandwidth that is asked for: where less is stable, gains are of no use."""
+ROUNDS: Final = 12
+"""How often the gains are calmed at the posture in which they have the least margin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Proposed gains, the file with them in place of its own, and what else there is to say."""
+
+    robot: str
+    wish: Wish
+    joints: tuple[Tuned, ...]
+    controllers: ControllersSpec
+    notes: tuple[str, ...]
+
+
+def tune(
+    robot_path: Path,
+    controllers_path: Path,
+    wish: Wish,
+    *,
+    joints: Sequence[str] = (),
+    step: float = 0.02,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+    simulated: bool = False,
+) -> Tuning:
+    """Gains for the loops of a controllers file.
+
+    Args:
+        robot_path, controllers_path: the two files.
+        wish: what is wanted.
+        joints: only these; () is all that have gains.
+        step: that must not saturate [rad]; a tenth of it [m] for joints that slide.
+        package_path, allow_outside: as everywhere.
+        simulated: also let every joint of the whole robot step in the engine, under gravity.
+
+    Raises:
+        InvalidInput: a file cannot be used, a joint has no loop, nothing has gains, or none are stable.
+    """
+    _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
+    file = load.load_controllers(controllers_path)
+    tuner = _Tuner(robot, file, wish, step)
+    everything = tuner.proposals()
+    there = [one.joint for one in everything]
+    for joint in joints:
+        if joint not in there:
+            hint = did_you_mean(joint, there, kind="joints with gains")
+            raise InvalidInput([Finding("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
+    found = tuple(one for one in everything if not joints or one.joint in joints)
+    if simulated:
+        found = simulated_answers(robot, file.spec, everything, [one.joint for one in found], wish, posture(robot))
+    return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
+
+
+def written(tuning: Tuning, controllers_path: Path) -> str:
+    """The controllers file with the proposed gains."""
+    wish = tuning.wish
+    head = (
+        f"# {controllers_path.name} with the gains of `manipcli tune --bandwidth '{wish.bandwidth:g} Hz' --damping "
+        f"{wish.damping:g}`, for a control period of {1e3 * wish.period:g} ms.\n"
+    )
+    return head + as_written(tuning.controllers)
+
+
+def chart_of(tuning: Tuning) -> Chart:
+    """The answers to a step, a panel a controller; what was simulated over what was predicted."""
+    from manipcli.replay.curves import Chart, Curve, Panel
+
+    panels, end = [], 0.1
+    for name in dict.fromkeys(one.controller for one in tuning.joints):
+        curves = []
+        for one in tuning.joints:
+            for log, answer in (("predicted", one.predicted), ("simulated", one.simulated)):
+                if one.controller == name and answer is not None:
+                    log = log if any(each.simulated for each in tuning.joints) else ""
+                    curves.append(Curve(one.joint, one.joint, log, answer.times, 100.0 * answer.share))
+                    end = max(end, min(1.6 * answer.settling_time, float(answer.times[-1])))
+        panels.append(Panel(name, "done of the step", "%", tuple(curves)))
+    return Chart(title=f"{tuning.robot}: answers to a step", panels=tuple(panels), steps=(), start=0.0, end=end)
+
+
+class _Tuner:
+    def __init__(self, robot: RobotModel, file: Located[ControllersSpec], wish: Wish, step: float) -> None:
+        self._robot, self._file, self._wish = robot, file, wish
+        self._kinematics = Kinematics(robot)
+        self._step = step
+        self.notes: tuple[str, ...] = ()
+        known = {joint.name for joint in robot.moving_joints}
+        missing = [
+            Finding("TUNE002", f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
+                    file.place("controllers", name, "joints", k), did_you_mean(joint, known, kind="joints"))
+            for name, spec in file.spec.controllers.items() for k, joint in enumerate(spec.joints)
+            if joint not in known
+        ]  # fmt: skip
+        if missing:
+            raise InvalidInput(missing)
+
+    def proposals(self) -> tuple[Tuned, ...]:
+        """Of every loop in the file; of several on one joint, of that which is active at the start."""
+        efforts: list[tuple[str, str, bool]] = []
+        velocities: list[tuple[str, str]] = []
+        elsewhere = self._elsewhere()
+        for name, spec in self._file.spec.controllers.items():
+            if name in elsewhere:
+                told = f"{name}: its gains stay, because joints of it are those of {elsewhere[name]}"
+                self.notes += (f"{told}; `active` says which one is tuned",)
+            elif isinstance(spec, JointTrajectorySpec | GripperSpec):
+                carried = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
+                if spec.interfaces == ("effort",):
+                    efforts += [(name, joint, carried) for joint in spec.joints]
+                elif spec.interfaces == ("velocity",):
+                    velocities += [(name, joint) for joint in spec.joints]
+                else:
+                    self.notes += (f"{name}: its interface is {', '.join(spec.interfaces)}, which needs no gains",)
+            elif isinstance(spec, ComputedTorqueSpec):
+                self.notes += (
+                    f"{name}: the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` give them",
+                )
+            elif spec.interfaces:
+                self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
+        if not efforts and not velocities:
+            message = "no controller has a loop to propose gains for"
+            hint = "; ".join(self.notes) or None
+            raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"), hint=hint)])
+        return self._of_efforts(efforts) + self._of_velocities(velocities)
+
+    def _elsewhere(self) -> dict[str, str]:
+        """The controllers of which joints have a loop in another one, and which: what is active comes first."""
+        owners: dict[str, str] = {}
+        found: dict[str, str] = {}
+        for name, spec in sorted(self._file.spec.controllers.items(), key=lambda one: not one[1].active):
+            if isinstance(spec, JointTrajectorySpec | GripperSpec) and spec.interfaces in (("effort",), ("velocity",)):
+                first = next((owners[joint] for joint in spec.joints if joint in owners), None)
+                if first is None:
+                    owners |= dict.fromkeys(spec.joints, name)
+                else:
+                    found[name] = first
+        return found
+
+    def _of_efforts(self, loops: list[tuple[str, str, bool]]) -> tuple[Tuned, ...]:
+        if not loops:
+            return ()
+        names = [name for name, _, _ in loops]
+        joints = [joint for _, joint, _ in loops]
+        carried = np.array([each for _, _, each in loops])
+        steps = np.array([self._step_of(joint) for joint in joints])
+        pressing = np.array([self._pressing(name, joint) for name, joint, _ in loops])
+        postures = self._postures().position
+        heaviest = [self._extreme(joints, partial(_inertia, k), postures) for k in range(len(joints))]
+        lightest = [self._extreme(joints, partial(_lightness, k), postures) for k in range(len(joints))]
+        postures = np.vstack([postures, *heaviest, *lightest])
+        for _ in range(ROUNDS):
+            met = self._load(joints, postures)
+            tuned = tune_efforts(names, met, self._wish, steps=steps, carried=carried, pressing=pressing)
+            tight = partial(tightness, tuned=tuned, wish=self._wish)
+            tightest = self._extreme(joints, tight, postures, starts=3)
+            margin = least_margin(self._load(joints, tightest[None]), tuned, self._wish)
+            if margin >= MARGIN:
+                break
+            postures = np.vstack([postures, tightest])
+        self._refuse_hopeless(tuned)
+        raised = [one.joint for one in tuned if one.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
+        if raised:
+            self.notes += (f"Raised, so that a finger presses with all its effort over its travel: {listed(raised)}.",)
+        if margin < MARGIN:
+            self._tell_margin(margin)
+        return tuned
+
+    def _load(self, joints: list[str], q: Array) -> Load:
+        return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
+
+    def _extreme(self, joints: list[str], score: Callable[[Load], Array], postures: Array, *, starts: int = 1) -> Array:
+        """(n) the posture in which the score of what these joints meet is largest, uphill from `postures` (T, n)."""
+        return climbed(self._robot, lambda q: score(self._load(joints, q)), postures, *self._range(), starts=starts)
+
+    def _tell_margin(self, margin: float) -> None:
+        """Notes that less than `MARGIN` is left; raises InvalidInput where these gains are unstable (0)."""
+        there = f"in a posture that was found last, after {ROUNDS} rounds of calming all gains"
+        if margin < 1.0:
+            hint = "a shorter `--period`, or less `--bandwidth`"
+            message = f"no gains were found that are stable in all postures: these are unstable {there}"
+            raise InvalidInput([Finding("TUNE003", message, self._file.place("controllers"), hint)])
+        left, wanted = told_apart(margin, MARGIN, form=".2g")
+        self.notes += (f"But {there}, all of them together may grow by {left} alone, not by {wanted}.",)
+
+    def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
+        """Raises InvalidInput where what is stable is next to nothing."""
+        period = f"{1e3 * self._wish.period:g} ms"
+        hint = (
+            "a shorter `--period`, less latency of the actuators, or masses and moments that are nearer to each other"
+        )
+        hopeless = []
+        for one in tuned:
+            if one.limited_by not in ("control step", "other joints"):
+                continue
+            if one.frequency < HOPELESS * self._wish.bandwidth:
+                unit = self._robot.joint(one.joint).inertia_unit
+                message = (
+                    f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
+                    f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "
+                    f"{one.least:.2g} {unit} at least"
+                )
+                place = self._file.place("controllers", one.controller, "gains", one.joint)
+                hopeless.append(Finding("TUNE003", message, place, hint))
+        if hopeless:
+            raise InvalidInput(hopeless)
+
+    def _of_velocities(self, loops: list[tuple[str, str]]) -> tuple[Tuned, ...]:
+        if not loops:
+            return ()
+        found = load_of(self._robot, self._kinematics, [joint for _, joint in loops], self._postures())
+        tuned = []
+        for k, (name, joint) in enumerate(loops):
+            limits = self._robot.joint(joint).limits
+            inertia = float(found.held_inertia[:, k].max())
+            left = float(found.effort[k] - np.abs(found.gravity[:, k]).max())
+            fastest = np.inf if limits.acceleration is None else limits.acceleration
+            tuned.append(
+                tune_velocity(
+                    name,
+                    joint,
+                    self._wish,
+                    step=self._step_of(joint),
+                    inertia=inertia,
+                    velocity=np.inf if limits.velocity is None else limits.velocity,
+                    acceleration=min(fastest, max(left, 0.1 * float(found.effort[k])) / inertia),
+                )
+            )
+        return tuple(tuned)
+
+    def _pressing(self, controller: str, joint: str) -> float:
+        """p with which the joint of a hand gives its effort over its travel; 0 of others, and where one is unknown."""
+        spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
+        if not isinstance(spec, GripperSpec):
+            return 0.0
+        effort = min((each for each in (limits.effort, spec.max_effort) if each), default=0.0)
+        lower, upper = limits.range
+        return effort / (upper - lower) if 0.0 < upper - lower < np.inf else 0.0
+
+    def _step_of(self, joint: str) -> float:
+        return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)
+
+    def _postures(self) -> Postures:
+        """The named ones, and some from the whole range of the joints."""
+        start = posture(self._robot)
+        rng = np.random.default_rng(0)
+        spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
+        return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+
+    def _range(self) -> tuple[Array, Array]:
+        """(n), (n) the least and the greatest of the joints."""
+        start = posture(self._robot)
+        lower, upper = np.array([joint.limits.range for joint in self._robot.moving_joints]).reshape(-1, 2).T
+        return np.where(np.isneginf(lower), start - WIDE, lower), np.where(np.isposinf(upper), start + WIDE, upper)
+
+
+def _inertia(k: int, load: Load) -> Array:
+    """(T,) of a joint whose others stand."""
+    return load.held_inertia[:, k]
+
+
+def _lightness(k: int, load: Load) -> Array:
+    """(T,) the inverse of what the effort of a joint alone moves."""
+    return np.asarray(1.0 / load.own_inertia[:, k])
+
+
+def _with_gains(spec: ControllersSpec, tuned: Sequence[Tuned]) -> ControllersSpec:
+    changed = dict(spec.controllers)
+    for one in tuned:
+        own = changed[one.controller]
+        assert isinstance(own, JointTrajectorySpec | GripperSpec)
+        old = own.gains.get(one.joint, GainsSpec())
+        update: dict[str, float | None] = {"p": one.p, "d": one.d}
+        if one.i or old.i:
+            update |= {"i": one.i, "i_clamp": one.i_clamp}
+        if one.interface == "velocity":
+            update["ff_velocity_scale"] = 1.0
+        gains = {**own.gains, one.joint: old.model_copy(update=update)}
+        changed[one.controller] = own.model_copy(update={"gains": gains})
+    return spec.model_copy(update={"controllers": changed})
