@@ -27,8 +27,9 @@ from manipcli.scene.scene import Scene
 from manipcli.shapes.coal_shape import coal_shape
 
 if TYPE_CHECKING:
-    import coal
     import pinocchio as pin
+
+    from manipcli.shapes.coal_shape import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: how far any joint moves between two checked positions of a trajectory
 _SEEN = 5e-5  # m: less is 0.0 mm to one digit
@@ -240,7 +241,7 @@ class _Part:
     role: Literal["link", "carried", "scene"]
     joint: int
     placement: pin.SE3
-    shape: coal.CollisionGeometry
+    shape: CollisionGeometry
 
 
 def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.scene.body_shapes import BodyShape
 from manipcli.scene.scene import Body
-from manipcli.shapes.coal_shape import coal_shape
-
-if TYPE_CHECKING:
-    import coal
+from manipcli.shapes.coal_shape import coal_shape, distance
 
 FORMED: Final = ("urdf", "mesh")
 """Kinds of bodies whose top need not be that of their bounding box: a drawer, a shelf."""
@@ -28,29 +25,23 @@ def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape,
     Conservative advancement: a step as long as the distance meets nothing, whichever way it goes. It has landed where
     the least step further down would make it overlap.
     """
-    import coal
-
     pairs = [(a, b, coal_shape(a.shape), coal_shape(b.shape)) for a in falling.geometries for b in under.geometries]
-    still = [_placed(X_WU @ b.X_LS) for _, b, _, _ in pairs]
+    still = [X_WU @ b.X_LS for _, b, _, _ in pairs]
     fallen, step, deepest = 0.0, 0.0, _top(falling, X_WF) - _bottom(under, X_WU)
     while fallen < deepest:
         X_WN = Transform.of(xyz=(0.0, 0.0, -fallen)) @ X_WF
-        apart = np.inf
-        for (a, _, shape, other), X_WB in zip(pairs, still, strict=True):
-            result = coal.DistanceResult()
-            coal.distance(shape, _placed(X_WN @ a.X_LS), other, X_WB, coal.DistanceRequest(), result)
-            apart = min(apart, float(result.min_distance))
+        apart = min(
+            (
+                distance(shape, X_WN @ a.X_LS, other, X_WB).distance
+                for (a, _, shape, other), X_WB in zip(pairs, still, strict=True)
+            ),
+            default=np.inf,
+        )
         if apart < -GRAZES:
             return fallen - step
         step = max(apart, LEAST)
         fallen += step
     return None
-
-
-def _placed(X: Transform) -> coal.Transform3s:
-    import coal
-
-    return coal.Transform3s(np.array(X.R), np.array(X.p))
 
 
 def _top(body: Body | BodyShape, X_WO: Transform) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.scene.scene import Body
-from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.coal_shape import coal_shape, distance
 from manipcli.shapes.primitives import Geometry
 
 TOLERANCE = 1e-3
@@ -43,16 +43,5 @@ def _world_box(body: Body) -> tuple[Array, Array]:
 
 def _depth(a: Body, shape_a: Geometry, b: Body, shape_b: Geometry) -> float:
     """How deep two shapes are in each other [m]; 0 when apart."""
-    import coal
-
     X_a, X_b = a.X_WO @ shape_a.X_LS, b.X_WO @ shape_b.X_LS
-    result = coal.DistanceResult()
-    coal.distance(
-        coal_shape(shape_a.shape),
-        coal.Transform3s(np.array(X_a.R), np.array(X_a.p)),
-        coal_shape(shape_b.shape),
-        coal.Transform3s(np.array(X_b.R), np.array(X_b.p)),
-        coal.DistanceRequest(),
-        result,
-    )
-    return max(0.0, -float(result.min_distance))
+    return max(0.0, -distance(coal_shape(shape_a.shape), X_a, coal_shape(shape_b.shape), X_b).distance)

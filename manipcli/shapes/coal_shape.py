@@ -1,21 +1,37 @@
-"""Shapes as coal knows them: for collision checks, hulls and mass properties alike."""
+"""Convex shapes, distances and contacts between them, through coal: the one module that imports coal."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from manipcli.core.geometry import Array
+from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.mesh import read_mesh
 from manipcli.shapes.mesh_fault import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Mesh, Shape, Sphere
 
 if TYPE_CHECKING:
     import coal
+    from coal import CollisionGeometry as CollisionGeometry
+
+@dataclass(frozen=True, slots=True)
+class Proximity:
+    """Two shapes A and B in world coordinates.
+
+    Attributes:
+        distance: [m]; negative where they overlap.
+        point: (3,) halfway between their nearest points.
+        normal: (3,) from A to B; not finite where it is undefined.
+    """
+
+    distance: float
+    point: Array
+    normal: Array
 
 
-def coal_shape(shape: Shape) -> coal.CollisionGeometry:
+def coal_shape(shape: Shape) -> CollisionGeometry:
     """Coal's own shape; a mesh becomes the convex hull of the vertices of its triangles.
 
     Raises:
@@ -40,7 +56,7 @@ def coal_shape(shape: Shape) -> coal.CollisionGeometry:
             return _hull(mesh.vertices[np.unique(mesh.faces)] * np.array(scale))
 
 
-def _hull(points: Array) -> coal.CollisionGeometry:
+def _hull(points: Array) -> CollisionGeometry:
     import coal
 
     model = coal.BVHModelOBBRSS()
@@ -48,3 +64,48 @@ def _hull(points: Array) -> coal.CollisionGeometry:
     model.addVertices(points)
     model.buildConvexHull(True, "Qt")
     return model.convex
+
+
+def surface(shape: Shape, *, most_triangles: int) -> CollisionGeometry | None:
+    """The triangles of a mesh instead of its hull; None for a mesh of more than `most_triangles`."""
+    import coal
+
+    if not isinstance(shape, Mesh):
+        return coal_shape(shape)
+    mesh = read_mesh(shape.path)
+    if len(mesh.faces) > most_triangles:
+        return None
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(mesh.faces), len(mesh.vertices))
+    points = coal.StdVec_Vec3s()
+    points.extend(list(mesh.vertices * np.array(shape.scale)))
+    triangles = coal.StdVec_Triangle()
+    triangles.extend([coal.Triangle(*row) for row in mesh.faces.tolist()])
+    model.addSubModel(points, triangles)
+    model.endModel()
+    return model
+
+
+def distance(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform) -> Proximity:
+    """How far apart two shapes are, and where."""
+    import coal
+
+    result = coal.DistanceResult()
+    coal.distance(a, _placed(X_WA), b, _placed(X_WB), coal.DistanceRequest(), result)
+    point = (result.getNearestPoint1() + result.getNearestPoint2()) / 2.0
+    return Proximity(float(result.min_distance), point, np.array(result.normal))
+
+
+def overlap(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform) -> bool:
+    """Whether two shapes touch or overlap."""
+    import coal
+
+    result = coal.CollisionResult()
+    coal.collide(a, _placed(X_WA), b, _placed(X_WB), coal.CollisionRequest(), result)
+    return bool(result.isCollision())
+
+
+def _placed(X: Transform) -> coal.Transform3s:
+    import coal
+
+    return coal.Transform3s(np.array(X.R), np.array(X.p))

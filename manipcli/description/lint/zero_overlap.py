@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,12 +12,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Joint
 from manipcli.description.lint.rigid import box_about, moved_bodies
 from manipcli.description.urdf.urdf import Parts
-from manipcli.shapes.coal_shape import coal_shape
-from manipcli.shapes.mesh import read_mesh
+from manipcli.shapes.coal_shape import coal_shape, distance, overlap, surface
 from manipcli.shapes.primitives import Geometry, Mesh
-
-if TYPE_CHECKING:
-    import coal
 
 TOLERANCE: Final = 0.002
 """Depth [m] up to which shapes count as touching: descriptions are drawn without a gap."""
@@ -94,42 +90,14 @@ def _at_zero(joint: Joint) -> Transform:
 
 def _depth(a: _Placed, b: _Placed) -> float:
     """How deep two shapes are in each other [m]; 0 when apart."""
-    import coal
-
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
-    placed = [coal.Transform3s(np.array(each.X_WS.R), np.array(each.X_WS.p)) for each in (a, b)]
     try:
         shapes = [coal_shape(each.geometry.shape) for each in (a, b)]
     except ValueError:
         return 0.0
-    coal.distance(shapes[0], placed[0], shapes[1], placed[1], request, result)
-    depth = -float(result.min_distance)
+    depth = -distance(shapes[0], a.X_WS, shapes[1], b.X_WS).distance
     if depth <= TOLERANCE or not any(isinstance(each.geometry.shape, Mesh) for each in (a, b)):
         return max(0.0, depth)
-    exact = [_triangles(each.geometry) for each in (a, b)]
-    if any(shape is None for shape in exact):
+    surface_a, surface_b = (surface(each.geometry.shape, most_triangles=MOST_TRIANGLES) for each in (a, b))
+    if surface_a is None or surface_b is None:
         return 0.0
-    met = coal.CollisionResult()
-    coal.collide(exact[0], placed[0], exact[1], placed[1], coal.CollisionRequest(), met)
-    return depth if met.isCollision() else 0.0
-
-
-def _triangles(geometry: Geometry) -> coal.CollisionGeometry | None:
-    """The surface of a mesh as it is, not its hull; None for one of too many triangles."""
-    import coal
-
-    shape = geometry.shape
-    if not isinstance(shape, Mesh):
-        return coal_shape(shape)
-    mesh = read_mesh(shape.path)
-    if len(mesh.faces) > MOST_TRIANGLES:
-        return None
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(mesh.faces), len(mesh.vertices))
-    points = coal.StdVec_Vec3s()
-    points.extend(list(mesh.vertices * np.array(shape.scale)))
-    triangles = coal.StdVec_Triangle()
-    triangles.extend([coal.Triangle(*row) for row in mesh.faces.tolist()])
-    model.addSubModel(points, triangles)
-    model.endModel()
-    return model
+    return depth if overlap(surface_a, a.X_WS, surface_b, b.X_WS) else 0.0
