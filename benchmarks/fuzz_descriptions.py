@@ -208,9 +208,9 @@ def examine_cases() -> None:
     """A worker: numbers of cases on standard input, a line about each on standard output."""
     from manipcli.core.errors import ManipcliError
     from manipcli.description.lint.examine import examine
-    from manipcli.description.normalised_urdf import engine_urdf
     from manipcli.description.packages import Packages
     from manipcli.model.build_robot import build_robot
+    from manipcli.model.normalised_urdf import engine_urdf
     from manipcli.spec.robot import RobotSpec
 
     seed, folder = int(sys.argv[2]), Path(sys.argv[3])

@@ -15,7 +15,7 @@ from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.judge.verdict import INTERRUPTED, Verdict
-from manipcli.logs.log import default_log, judge_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
+from manipcli.logs.judge_log import judge_log
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
@@ -25,6 +25,7 @@ from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
 from manipcli.run.execute import Progress, controllers, simulate
+from manipcli.run.run_log import default_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.task.controller_rows import controllers_of
 from manipcli.task.load_task import load_libraries
 from manipcli.task.plan_task import Plan, plan_task, refused

@@ -120,7 +120,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
         verdict: of the run.
         log: of the run.
     """
-    from manipcli.logs.log import recorded_robot
+    from manipcli.logs.recorded_files import recorded_robot
     from manipcli.record.reading import open_recording
     from manipcli.report.step_measures import step_measures
 

@@ -100,7 +100,9 @@ def check_urdf(
         if inspection.examination.errors:
             console.talk(f"not drawn: {path} has errors")
         else:
-            console.not_drawn(describe.draw(inspection, picture))
+            from manipcli.replay.draw_description import draw_description
+
+            console.not_drawn(draw_description(inspection, picture))
             console.talk(f"drawn: {picture}")
     return ExitCode.PASSED if passed else ExitCode.FAILED
 

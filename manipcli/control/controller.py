@@ -16,8 +16,8 @@ import numpy as np
 from manipcli.conditions.condition import Problem
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
+from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import ControllerSpec, Interface, Role
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from manipcli.control.lifecycle import ticks_between
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, listed
+from manipcli.description.transmission import Compat
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import ControllerSpec, Interface
 from manipcli.spec.controllers_file import ControllersSpec
 

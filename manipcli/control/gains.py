@@ -12,8 +12,8 @@ from manipcli.conditions.condition import Problem
 from manipcli.control.pid import AntiWindup, Pid
 from manipcli.core.errors import InvalidArgument, Loc
 from manipcli.core.text import did_you_mean
+from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface
 
 

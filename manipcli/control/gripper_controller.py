@@ -15,7 +15,7 @@ from manipcli.control.gains import build_pid, joint_gains
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
-from manipcli.model.transmission import Compat
+from manipcli.description.transmission import Compat
 from manipcli.spec.controllers import GainsSpec, Interface, Role
 
 REACHED = 1e-9

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model.transmission import Compat
+from manipcli.description.transmission import Compat
 
 AntiWindup = Literal["none", "back_calculation", "conditional_integration"]
 

@@ -30,7 +30,7 @@ from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
-from manipcli.model.transmission import Compat
+from manipcli.description.transmission import Compat
 from manipcli.plan.trajectory import Interpolation, JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
 

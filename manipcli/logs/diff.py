@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
-from manipcli.logs.log import judge_recording, recorded_robot
+from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.other_log import is_own
+from manipcli.logs.recorded_files import recorded_robot
 from manipcli.record.channels import EVENTS, ROSOUT
 from manipcli.record.compare import Comparison, compare_logs
 from manipcli.record.compare_entries import compare_entries

@@ -16,15 +16,8 @@ from manipcli.control.controller import Controller
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
-from manipcli.logs.log import (
-    action_of,
-    recorded,
-    recorded_controllers_file,
-    recorded_robot,
-    recorded_scene,
-    recorded_task_file,
-)
 from manipcli.logs.other_log import is_own
+from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.channels import channel_table
@@ -32,6 +25,7 @@ from manipcli.record.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word
 from manipcli.record.topics import Topic, open_topics
 from manipcli.report.graph import Edge, Graph, Node
+from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec

@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
 from manipcli.description.packages import NotFound, Packages
-from manipcli.logs.log import RUNS
 from manipcli.model.robot import RobotModel
+from manipcli.run.run_log import RUNS
 from manipcli.scene.scene import Scene
 from manipcli.shapes.primitives import Geometry, Mesh
 

@@ -12,9 +12,10 @@ from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform
 from manipcli.judge.steps import step_outcomes
-from manipcli.logs.log import URDF, recorded_robot
+from manipcli.logs.recorded_files import recorded_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.state import Contact
+from manipcli.record.attachments import URDF
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned

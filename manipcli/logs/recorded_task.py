@@ -13,19 +13,19 @@ from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.steps import PLAN_FILE
-from manipcli.logs.log import (
-    URDF,
+from manipcli.logs.mesh_search import MeshSearch
+from manipcli.logs.recorded_files import (
     attached,
-    mesh_files,
     recorded_controllers_file,
     recorded_robot,
     recorded_robot_file,
     recorded_scene,
     recorded_task_file,
 )
-from manipcli.logs.mesh_search import MeshSearch
 from manipcli.model.build_robot import rebuild_robot
+from manipcli.record.attachments import URDF
 from manipcli.record.recording import EMBEDDED, Recording
+from manipcli.run.run_log import mesh_files
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES

@@ -12,9 +12,10 @@ import numpy as np
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.judge.verdict import StepOutcome, Verdict
-from manipcli.logs.log import judge_recording, recorded_robot, recorded_scene
+from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.other_log import is_own, open_other
+from manipcli.logs.recorded_files import recorded_robot, recorded_scene
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.reading import open_recording

@@ -17,16 +17,10 @@ from manipcli.conditions.members.moved import UnmovedSpec
 from manipcli.conditions.members.slip import SlipSpec
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.logs.log import (
-    CONTROLLERS,
-    ROBOT,
-    TASK,
-    judge_recording,
-    recorded_robot,
-    recorded_scene,
-    recorded_task_file,
-)
+from manipcli.logs.judge_log import judge_recording
+from manipcli.logs.recorded_files import recorded_robot, recorded_scene, recorded_task_file
 from manipcli.logs.replay import open_playback
+from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback

@@ -9,8 +9,8 @@ import numpy as np
 
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import Joint, TransmissionTag
+from manipcli.description.transmissions import BY_TYPE, TRANSMISSIONS
 from manipcli.model.robot import Actuator
-from manipcli.model.transmissions import BY_TYPE, TRANSMISSIONS
 from manipcli.spec.robot import RobotSpec, TransmissionSpec
 
 if TYPE_CHECKING:

@@ -13,12 +13,12 @@ from manipcli.description.description import unread_description
 from manipcli.description.elements import Joint, JointLimits, Link, Mimic, SoftLimits, TransmissionTag
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.examine import examine
-from manipcli.description.normalised_urdf import portable_urdf
 from manipcli.description.packages import NotFound, Packages
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.joint_units import misread_units
 from manipcli.model.named_poses import build_groups, build_poses, interval
+from manipcli.model.normalised_urdf import portable_urdf
 from manipcli.model.robot import Group, RobotModel, Tool
 from manipcli.spec.robot import AttachSpec, LimitsSpec, RobotSpec
 from manipcli.spec.source.located import Source

@@ -24,12 +24,12 @@ import numpy.typing as npt
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.kinematics import Kinematics
 from manipcli.scene.scene import Scene
-from manipcli.shapes.coal_shape import coal_shape
+from manipcli.shapes.proximity import coal_shape
 
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from manipcli.shapes.coal_shape import CollisionGeometry
+    from manipcli.shapes.proximity import CollisionGeometry
 
 RESOLUTION = 0.01  # rad or m: how far any joint moves between two checked positions of a trajectory
 _SEEN = 5e-5  # m: less is 0.0 mm to one digit

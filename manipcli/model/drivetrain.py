@@ -10,9 +10,9 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.description.elements import TransmissionTag
+from manipcli.description.transmission import Maps, Transmission
+from manipcli.description.transmissions import BY_TYPE
 from manipcli.model.robot import Actuator, RobotModel
-from manipcli.model.transmission import Maps, Transmission
-from manipcli.model.transmissions import BY_TYPE
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from manipcli.model.state import Contact
 from manipcli.replay.drawing import link_frame
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
-from manipcli.shapes.coal_shape import coal_shape
 from manipcli.shapes.primitives import Geometry
+from manipcli.shapes.proximity import coal_shape
 
 if TYPE_CHECKING:
     import coal

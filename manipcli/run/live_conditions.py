@@ -18,9 +18,9 @@ from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.robustness import Reading
 from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
 from manipcli.control.controller import Controller, ControllerOutput
-from manipcli.logs.log import recorded
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
+from manipcli.run.run_log import recorded
 from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 

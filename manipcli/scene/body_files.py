@@ -15,9 +15,9 @@ from manipcli.description.elements import Inertial
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.scene.body_shapes import COLORS, BodyShape
-from manipcli.shapes.coal_shape import coal_shape
 from manipcli.shapes.mesh import SUFFIXES
 from manipcli.shapes.primitives import Geometry, Mesh, Rgba
+from manipcli.shapes.proximity import coal_shape
 from manipcli.spec.task import MeshSpec, UrdfSpec
 
 

@@ -14,10 +14,10 @@ from manipcli.description.packages import NotFound, Packages
 from manipcli.scene import body_files, body_shapes
 from manipcli.scene.body_shapes import COLORS, BodyShape
 from manipcli.scene.drop_test import FORMED, landing
+from manipcli.scene.mass_properties import union
 from manipcli.scene.scene import Body, Frame, Interior, Scene
 from manipcli.scene.scene_names import Locate, misnamed
 from manipcli.scene.start_overlap import overlaps
-from manipcli.shapes.mass_properties import union
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba
 from manipcli.spec.base import Model
 from manipcli.spec.task import BodySpec, TaskSpec

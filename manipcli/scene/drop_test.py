@@ -9,7 +9,7 @@ import numpy as np
 from manipcli.core.geometry import Transform
 from manipcli.scene.body_shapes import BodyShape
 from manipcli.scene.scene import Body
-from manipcli.shapes.coal_shape import coal_shape, distance
+from manipcli.shapes.proximity import coal_shape, distance
 
 FORMED: Final = ("urdf", "mesh")
 """Kinds of bodies whose top need not be that of their bounding box: a drawer, a shelf."""

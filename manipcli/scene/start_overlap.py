@@ -9,8 +9,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.scene.scene import Body
-from manipcli.shapes.coal_shape import coal_shape, distance
 from manipcli.shapes.primitives import Geometry
+from manipcli.shapes.proximity import coal_shape, distance
 
 TOLERANCE = 1e-3
 """Depth [m] up to which two bodies count as touching: rounding, and what the settling pushes apart without harm."""

@@ -550,7 +550,7 @@ def test_what_bullet_holds_is_read_back(tmp_path: Path) -> None:
     """The comparison is silent about the robot that was loaded, and names every way in which another one differs."""
     import pybullet as p
 
-    from manipcli.description.normalised_urdf import engine_urdf
+    from manipcli.model.normalised_urdf import engine_urdf
     from manipcli.simulate.engines.pybullet_readback import differences
 
     skew = Inertial(1.0, Transform.of(xyz=(0.1, 0.2, 0.0), rpy=(0.3, 0.2, 0.1)), frozen(np.diag([0.02, 0.03, 0.04])))

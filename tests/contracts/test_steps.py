@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
@@ -20,6 +19,7 @@ from manipcli.plan.steps import STEPS
 from manipcli.spec.controllers import GripperSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
+from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
 PICK = ("pick", {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}})

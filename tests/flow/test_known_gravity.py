@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 
 from manipcli.core.geometry import Array
 from manipcli.core.units import EARTH_GRAVITY
@@ -17,6 +16,7 @@ from manipcli.pipeline import run_task, verify_log
 from manipcli.run.execute import controllers
 from manipcli.task.plan_task import plan_task, start_position
 from manipcli.task.sample import load_task
+from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
 MOVES = f"""\

@@ -15,7 +15,7 @@ from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.robustness import Reading
 from manipcli.conditions.state_window import Moments
 from manipcli.judge import expectation
-from manipcli.logs.log import judge_recording
+from manipcli.logs.judge_log import judge_recording
 from manipcli.record.reading import open_recording
 from manipcli.run import execute
 from manipcli.run.live_conditions import Live

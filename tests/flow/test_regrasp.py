@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
@@ -20,6 +19,7 @@ from manipcli.run import replan
 from manipcli.spec.task import StepSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import Plan, plan_step, plan_task
+from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
 PANDA = f"robot: {ROOT}/robots/panda/robot.yaml\ncontrollers: {ROOT}/controllers/panda.yaml\n"

@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
@@ -27,6 +26,7 @@ from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.task import StepSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import Plan, plan_step, plan_task
+from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
 PICK, LIFT, PLACE, MOVE = range(4)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 
 from manipcli.core.errors import InvalidInput
 from manipcli.pipeline import run_task, verify_log
@@ -16,6 +15,7 @@ from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.task.plan_task import plan_task
 from manipcli.task.sample import load_task
+from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
 TASK = ROOT / "tasks" / "pick_place.yaml"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.logs.log import judge_log
+from manipcli.logs.judge_log import judge_log
 from manipcli.logs.log_info import log_info
 from manipcli.pipeline import run_task
 from manipcli.record.reading import open_recording

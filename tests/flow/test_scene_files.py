@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import InvalidInput
-from manipcli.logs.log import mesh_files
 from manipcli.logs.mesh_search import MeshSearch
+from manipcli.run.run_log import mesh_files
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]

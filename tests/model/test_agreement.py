@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from manipcli.description.lint.examine import examine
-from manipcli.description.normalised_urdf import engine_urdf, massless_joints
 from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.normalised_urdf import engine_urdf, massless_joints
 from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import RobotSpec
 

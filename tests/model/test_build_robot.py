@@ -9,9 +9,9 @@ import pytest
 
 from manipcli.core.errors import InvalidInput
 from manipcli.description.lint.examine import examine
-from manipcli.description.normalised_urdf import engine_urdf, massless_joints
 from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot, rebuild_robot
+from manipcli.model.normalised_urdf import engine_urdf, massless_joints
 from manipcli.model.robot import RobotModel
 from manipcli.spec.load import load_robot_text
 from manipcli.spec.robot import RobotSpec

@@ -9,7 +9,9 @@ import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.description.elements import TransmissionTag
-from manipcli.model import DifferentialTransmission, FourBarLinkageTransmission, SimpleTransmission
+from manipcli.description.transmissions.differential import DifferentialTransmission
+from manipcli.description.transmissions.four_bar import FourBarLinkageTransmission
+from manipcli.description.transmissions.simple import SimpleTransmission
 from manipcli.model.build_robot import build_robot, rebuild_robot
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import Actuator, RobotModel

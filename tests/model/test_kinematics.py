@@ -11,10 +11,10 @@ import pytest
 
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.core.units import EARTH_GRAVITY
-from manipcli.description.normalised_urdf import engine_urdf
 from manipcli.model.batch_kinematics import forward_batch, relative_batch, tool_poses
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.normalised_urdf import engine_urdf
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.spec.robot import AttachSpec, PoseSpec, RobotSpec
 

@@ -11,10 +11,10 @@ import pytest
 from manipcli.core.errors import InvalidInput
 from manipcli.description.description import read_description
 from manipcli.description.elements import JointLimits, SoftLimits
-from manipcli.description.normalised_urdf import engine_urdf
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts, read_parts
 from manipcli.model.build_robot import bare_robot, build_robot
+from manipcli.model.normalised_urdf import engine_urdf
 from manipcli.model.robot import RobotModel
 from manipcli.spec.robot import LimitsSpec, RobotSpec
 

@@ -8,7 +8,7 @@ from scipy.stats.qmc import Sobol
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.scene import body_shapes
-from manipcli.shapes.mass_properties import union
+from manipcli.scene.mass_properties import union
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Sphere
 from manipcli.spec.task import CupSpec, TraySpec
 

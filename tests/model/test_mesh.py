@@ -15,12 +15,12 @@ from manipcli.core.errors import InvalidInput
 from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron
 from manipcli.shapes import mesh as mesh_module
 from manipcli.shapes import mesh_collada, mesh_stl
-from manipcli.shapes.coal_shape import coal_shape
 from manipcli.shapes.mesh import read_mesh
 from manipcli.shapes.mesh_fault import UnusableMesh
 from manipcli.shapes.mesh_files import clean_mesh
 from manipcli.shapes.mesh_stl import binary_stl
 from manipcli.shapes.primitives import Mesh
+from manipcli.shapes.proximity import coal_shape
 
 CUBE_OBJ = b"""# two boxes' worth of nothing: one quad and one triangle
 o first

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
-from manipcli.model import DifferentialTransmission, FourBarLinkageTransmission, SimpleTransmission, Transmission
+from manipcli.description.transmission import Quantity, Transmission
+from manipcli.description.transmissions.differential import DifferentialTransmission
+from manipcli.description.transmissions.four_bar import FourBarLinkageTransmission
+from manipcli.description.transmissions.simple import SimpleTransmission
 from manipcli.model.drivetrain import BlockTransmission
-from manipcli.model.transmission import Quantity
 
 QUANTITIES: tuple[Quantity, ...] = ("position", "velocity", "effort")
 REDUCTION = st.floats(0.01, 1000.0) | st.floats(-1000.0, -0.01)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from manipcli.task.task import Task
 from scipy.spatial.transform import Rotation
 
 from manipcli.core.errors import NotPlannable
@@ -23,6 +22,7 @@ from manipcli.shapes.primitives import Box, Cylinder, Geometry, Shape
 from manipcli.spec.controllers import GripperSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
+from manipcli.task.task import Task
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 _LENGTHS = (0.16, 0.2, 0.22, 0.2, 0.2, 0.2, 0.1)  # from joint k to joint k + 1, along z

@@ -11,13 +11,13 @@ import pytest
 from manipcli.conditions.robustness import EDGE, Measured, Reading, never, opposite, reading
 from manipcli.judge.expectation import outcome
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.logs.log import verdict_metadata
 from manipcli.report.html_parts import signed
 from manipcli.report.json import render_verdict
 from manipcli.report.junit import render_junit
 from manipcli.report.log_diff import _met
 from manipcli.report.run_page import Written
 from manipcli.report.text import _margin
+from manipcli.run.run_log import verdict_metadata
 
 NEAR_TO_0 = (0.0, -0.0, 5e-324, -5e-324, 4e-10, -4e-10, EDGE, -EDGE, 1.4e-9, -1.4e-9, -0.01)
 

@@ -11,9 +11,9 @@ import pytest
 
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Inertial, Joint, JointLimits, Link, TransmissionTag
-from manipcli.description.normalised_urdf import engine_urdf
 from manipcli.model.drivetrain import reflected_inertia
 from manipcli.model.kinematics import Kinematics
+from manipcli.model.normalised_urdf import engine_urdf
 from manipcli.model.robot import Actuator, RobotModel
 from manipcli.simulate.engines.pybullet import _library
 from manipcli.simulate.engines.pybullet_flywheels import add_flywheels, stiff_damping

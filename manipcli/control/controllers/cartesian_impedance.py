@@ -42,9 +42,9 @@ from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import did_you_mean, listed
 from manipcli.description.elements import JointLimits, JointType
+from manipcli.description.transmission import Compat
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, Interface, Role

@@ -32,8 +32,8 @@ from manipcli.control.gains import strangers
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, JointType
+from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
 from manipcli.spec.other_controllers import ComputedTorqueSpec

@@ -38,8 +38,8 @@ from manipcli.control.gains import build_pid, gains_of, own_joints, strangers
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
+from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.model.transmission import Compat
 from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.other_controllers import PidGainsSpec, PidSpec
 

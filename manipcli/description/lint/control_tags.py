@@ -8,7 +8,7 @@ from typing import Final
 
 from manipcli.description.lint.check import Subject
 from manipcli.description.located_xml import Element
-from manipcli.model.transmissions import TRANSMISSIONS
+from manipcli.description.transmissions import TRANSMISSIONS
 
 SIZES: Final = {member.type: member.size for member in TRANSMISSIONS}
 """Types, and how many joints and actuators each has."""

@@ -17,7 +17,6 @@ from manipcli.description.lint.examine import Examination, examine
 from manipcli.description.lint.fix import Change, mended
 from manipcli.description.lint.summary import Summary, summarise, tree_lines
 from manipcli.description.packages import NotFound, Packages
-from manipcli.model.build_robot import bare_robot
 from manipcli.spec.load import sibling
 
 DESCRIPTIONS = (".urdf", ".xacro", ".xml")
@@ -160,17 +159,3 @@ def mend(inspection: Inspection, *, in_place: bool, force: bool = False) -> tupl
 
 def _same(path: Path, data: bytes) -> bool:
     return path.is_file() and path.stat().st_size == len(data) and path.read_bytes() == data
-
-
-def draw(inspection: Inspection, path: Path) -> tuple[str, ...]:
-    """A picture of a sound description; what of it could not be drawn, a line each.
-
-    Raises:
-        InvalidInput: it has errors.
-    """
-    from manipcli.replay.picture import draw_robot
-
-    parts = inspection.examination.parts
-    if parts is None or inspection.examination.errors:
-        raise InvalidInput([Finding("USE041", f"'{inspection.path}' has errors and is not drawn")])
-    return draw_robot(bare_robot(parts), path)

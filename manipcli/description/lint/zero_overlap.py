@@ -12,8 +12,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Joint
 from manipcli.description.lint.rigid import box_about, moved_bodies
 from manipcli.description.urdf.urdf import Parts
-from manipcli.shapes.coal_shape import coal_shape, distance, overlap, surface
 from manipcli.shapes.primitives import Geometry, Mesh
+from manipcli.shapes.proximity import coal_shape, distance, overlap, surface
 
 TOLERANCE: Final = 0.002
 """Depth [m] up to which shapes count as touching: descriptions are drawn without a gap."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Inertial
-from manipcli.description.normalised_urdf import MASSLESS, inside_triangle
+from manipcli.model.normalised_urdf import MASSLESS, inside_triangle
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body
 

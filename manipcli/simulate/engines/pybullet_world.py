@@ -12,7 +12,7 @@ import numpy as np
 from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Transform
 from manipcli.description.elements import Inertial, Mimic
-from manipcli.description.normalised_urdf import MASSLESS, body_urdf
+from manipcli.model.normalised_urdf import MASSLESS, body_urdf
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body
 from manipcli.shapes.mesh_files import clean_mesh

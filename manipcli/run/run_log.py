@@ -1,10 +1,9 @@
-"""What a log is opened with, and a log judged from nothing but itself."""
+"""The log of a run: what it is opened with, and what is added at its end."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -15,38 +14,29 @@ from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.judge.drawn import SAMPLE
-from manipcli.judge.judge import STORED, UNTIL, judge
+from manipcli.judge.judge import STORED, UNTIL
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
-from manipcli.model.build_robot import rebuild_robot
-from manipcli.model.robot import RobotModel
+from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
-from manipcli.record.reading import open_recording
 from manipcli.record.recorder import Recorder
-from manipcli.record.recording import EMBEDDED, Recording, Span
+from manipcli.record.recording import EMBEDDED
 from manipcli.record.selection import Selection
 from manipcli.run.embedding import embeddable
-from manipcli.scene.scene import Scene
-from manipcli.scene.scene_file import scene_from_json, scene_to_json
+from manipcli.scene.scene_file import scene_to_json
 from manipcli.shapes.primitives import Mesh
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.controllers_file import ControllersSpec
-from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import expressions
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
-from manipcli.task.vocabulary import task_spec
 
 RUNS = Path("runs")
 """Where logs go that nobody asked elsewhere, below the working directory."""
-TASK, ROBOT, CONTROLLERS, URDF = "task.yaml", "robot.yaml", "controllers.yaml", "robot.urdf"
-SCENE = "scene.json"
 YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/json", "application/octet-stream"
 
 
@@ -161,82 +151,6 @@ def _portable_robot(spec: RobotSpec) -> RobotSpec:
     """The robot file without folders of this machine in the names of its descriptions."""
     attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
     return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
-
-
-def judge_log(path: Path, *, being_written: bool = False, doing: Callable[[str], None] = lambda _: None) -> Verdict:
-    """The verdict on a log, from the log alone; a verdict stored in it is not looked at.
-
-    Args:
-        path: the log, or what a killed run left.
-        being_written: the run that writes it is still on and has just flushed: that it has no end is no loss.
-        doing: told of each span that is judged.
-
-    Raises:
-        InvalidInput: the file is no log of ours, is damaged, or lacks what it is judged by.
-    """
-    recording = open_recording(path, being_written=being_written)
-    return judge_recording(replace(recording, spans=_Watched(recording.spans, doing)), path)
-
-
-@dataclass(frozen=True, slots=True)
-class _Watched:
-    """Spans; somebody is told of each that is read."""
-
-    spans: Iterable[Span]
-    doing: Callable[[str], None]
-
-    def __iter__(self) -> Iterator[Span]:
-        for span in self.spans:
-            self.doing("judging")
-            yield span
-
-
-def judge_recording(recording: Recording, path: Path) -> Verdict:
-    """The verdict on a log that is open already; see `judge_log`."""
-    expect = recorded_task_file(recording, path).spec.judged
-    scene = recorded_scene(recording, path)
-    return judge(recording, expect=expect, robot=recorded_robot(recording, path), scene=scene)
-
-
-def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
-    """The resolved task file of a log."""
-    return load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
-
-
-def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
-    """The resolved robot file of a log."""
-    return load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
-
-
-def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:
-    """The resolved controllers file of a log."""
-    return load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
-
-
-def recorded_robot(recording: Recording, path: Path) -> RobotModel:
-    """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
-    return rebuild_robot(recorded_robot_file(recording, path).spec, attached(recording, path, URDF))
-
-
-def recorded_scene(recording: Recording, path: Path) -> Scene:
-    """The scene of a log at its start; no mesh is looked for."""
-    try:
-        return scene_from_json(attached(recording, path, SCENE))
-    except ValueError as error:
-        message = f"{path.name}/{SCENE}: this is not the scene of a log"
-        raise InvalidInput([Finding("LOG103", message)]) from error
-
-
-def attached(recording: Recording, path: Path, name: str) -> bytes:
-    """An attachment.
-
-    Raises:
-        InvalidInput: the log has no such attachment.
-    """
-    if name not in recording.attachments:
-        message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
-        raise InvalidInput([Finding("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")])
-    return recording.attachments[name]
 
 
 def known_of(task: Task, log: Path) -> Mapping[str, str | int]:

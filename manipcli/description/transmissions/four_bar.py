@@ -10,7 +10,7 @@ from typing import get_args
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import TransmissionTag
-from manipcli.model.transmission import Compat, Maps, Transmission, TransmissionMember, finite, nonzero
+from manipcli.description.transmission import Compat, Maps, Transmission, TransmissionMember, finite, nonzero
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from manipcli.description.elements import TransmissionTag
-from manipcli.model.transmission import Compat, Maps, Transmission, TransmissionMember, finite, nonzero
+from manipcli.description.transmission import Compat, Maps, Transmission, TransmissionMember, finite, nonzero
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import coal
     from coal import CollisionGeometry as CollisionGeometry
 
+
 @dataclass(frozen=True, slots=True)
 class Proximity:
     """Two shapes A and B in world coordinates.

@@ -1,0 +1,60 @@
+"""The files, the robot and the scene of a log, from the log alone; no mesh is looked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from manipcli.core.errors import Finding, InvalidInput
+from manipcli.model.build_robot import rebuild_robot
+from manipcli.model.robot import RobotModel
+from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
+from manipcli.record.recording import Recording
+from manipcli.scene.scene import Scene
+from manipcli.scene.scene_file import scene_from_json
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.source.located import Located
+from manipcli.spec.task import TaskSpec
+from manipcli.task.vocabulary import task_spec
+
+
+def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
+    """The resolved task file of a log."""
+    return load_task_text(attached(recording, path, TASK), f"{path.name}/{TASK}", model=task_spec())
+
+
+def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
+    """The resolved robot file of a log."""
+    return load_robot_text(attached(recording, path, ROBOT), f"{path.name}/{ROBOT}")
+
+
+def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:
+    """The resolved controllers file of a log."""
+    return load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
+
+
+def recorded_robot(recording: Recording, path: Path) -> RobotModel:
+    """The robot of a log: from its expanded URDF and its resolved robot file; no mesh is looked for."""
+    return rebuild_robot(recorded_robot_file(recording, path).spec, attached(recording, path, URDF))
+
+
+def recorded_scene(recording: Recording, path: Path) -> Scene:
+    """The scene of a log at its start; no mesh is looked for."""
+    try:
+        return scene_from_json(attached(recording, path, SCENE))
+    except ValueError as error:
+        message = f"{path.name}/{SCENE}: this is not the scene of a log"
+        raise InvalidInput([Finding("LOG103", message)]) from error
+
+
+def attached(recording: Recording, path: Path, name: str) -> bytes:
+    """An attachment.
+
+    Raises:
+        InvalidInput: the log has no such attachment.
+    """
+    if name not in recording.attachments:
+        message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
+        raise InvalidInput([Finding("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")])
+    return recording.attachments[name]
