@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from manipcli.core.lazy import lazy_exports
+from manipcli.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, SimulationFailed
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from manipcli.record.reading import open_recording, read_recording
     from manipcli.record.recording import Recording
     from manipcli.report.run_report import RunReport
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Finding",

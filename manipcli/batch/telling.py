@@ -24,7 +24,7 @@ from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Trouble
 from manipcli.report.text import describe_expectation, describe_step
 from manipcli.spec import load
-from manipcli.spec.source.located import Located
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 

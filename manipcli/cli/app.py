@@ -15,7 +15,6 @@ from typing import Annotated, Final
 import typer
 from typer.exceptions import TyperException
 
-from manipcli import __version__
 from manipcli.cli import (
     at,
     bless,
@@ -40,6 +39,7 @@ from manipcli.cli import (
 from manipcli.cli import list as list_
 from manipcli.core import collector
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
+from manipcli.core.version import __version__
 from manipcli.record.faults import RecordingFailed
 
 _INTERRUPTED_BY_TYPER = 130

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from manipcli import __version__
 from manipcli.core.errors import Finding, Place
+from manipcli.core.version import __version__
 from manipcli.judge.verdict import Verdict
 from manipcli.report.run_page import Cause, RunPage, Source, Written
 

@@ -13,8 +13,8 @@ from manipcli.scene.scene import Scene
 from manipcli.scene.scene_file import scene_from_json
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
+from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.vocabulary import task_spec
 

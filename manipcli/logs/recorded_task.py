@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
+from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.logs.mesh_search import MeshSearch
@@ -29,7 +29,7 @@ from manipcli.run.run_log import mesh_files
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.source.located import Located
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.consistency import disagreements
 from manipcli.task.sample import sampled

@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from manipcli import __version__
 from manipcli.conditions.members.at_pose import SLIDE, AtPoseSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.conditions.members.moved import UnmovedSpec
 from manipcli.conditions.members.slip import SlipSpec
+from manipcli.core.version import __version__
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
@@ -32,7 +32,7 @@ from manipcli.report.text import how_wrong
 from manipcli.spec.base import Model
 from manipcli.spec.condition import ExpectationSpec
 from manipcli.spec.load import load_task as load_spec
-from manipcli.spec.source.located import Located
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.task import Task
 from manipcli.task.vocabulary import task_spec

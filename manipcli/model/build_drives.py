@@ -14,7 +14,7 @@ from manipcli.model.robot import Actuator
 from manipcli.spec.robot import RobotSpec, TransmissionSpec
 
 if TYPE_CHECKING:
-    from manipcli.model.build_robot import Reporter
+    from manipcli.model.reporter import Reporter
 
 
 def build_transmissions(

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Loc, Place
+from manipcli.core.errors import Finding, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.description import unread_description
@@ -19,34 +19,10 @@ from manipcli.model.build_drives import build_actuators, build_transmissions
 from manipcli.model.joint_units import misread_units
 from manipcli.model.named_poses import build_groups, build_poses, interval
 from manipcli.model.normalised_urdf import portable_urdf
+from manipcli.model.reporter import Reporter
 from manipcli.model.robot import Group, RobotModel, Tool
+from manipcli.spec.located import Source
 from manipcli.spec.robot import AttachSpec, LimitsSpec, RobotSpec
-from manipcli.spec.source.located import Source
-
-
-class Reporter:
-    """Gathers findings about the robot file, each with the place of the value it is about."""
-
-    def __init__(self, source: Source | None) -> None:
-        self.source = source
-        self.findings: list[Finding] = []
-
-    def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
-
-    def warning(self, code: str, message: str, loc: Loc, *, hint: str) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="warning"))
-
-    def note(self, code: str, message: str, loc: Loc, *, hint: str | None) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
-
-    def place(self, loc: Loc) -> Place | None:
-        return self.source.place(*loc) if self.source is not None else None
-
-    def stop(self) -> None:
-        """Raises InvalidInput when an error was found."""
-        if any(finding.severity == "error" for finding in self.findings):
-            raise InvalidInput(self.findings)
 
 
 def build_robot(

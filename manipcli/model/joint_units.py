@@ -14,7 +14,7 @@ from manipcli.model.robot import Group
 from manipcli.spec.base import Model
 from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import Held, children, unit_of
-from manipcli.spec.source.located import Source
+from manipcli.spec.located import Source
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, shown
 
 

@@ -12,7 +12,7 @@ from manipcli.model.robot import Group, NamedPose
 from manipcli.spec.robot import GroupSpec, RobotSpec
 
 if TYPE_CHECKING:
-    from manipcli.model.build_robot import Reporter
+    from manipcli.model.reporter import Reporter
 
 LIMIT_TOLERANCE = 1e-6
 """How far a named pose may lie beyond a limit [rad or m]: angles in degrees are written with few digits."""

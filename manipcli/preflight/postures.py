@@ -12,8 +12,8 @@ from manipcli.model.configuration import posture
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
+from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 
 
 def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:

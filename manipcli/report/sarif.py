@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from manipcli import __version__
 from manipcli.core.errors import Finding
+from manipcli.core.version import __version__
 from manipcli.description.lint.check import Check
 from manipcli.report.json import Json, dumps
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
-from manipcli import __version__
 from manipcli.control.controller import Controller
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
 from manipcli.judge.steps import PLAN_FILE

@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from manipcli.core.errors import Loc
 
 Mistake = Literal["name", "range", "type", "count", "unit", "conflict", "verb", "duplicate"]
-"""Kinds of mistakes that validators tell with `problem`; the codes stand in `spec/source/explain.py`."""
+"""Kinds of mistakes that validators tell with `problem`; the codes stand in `spec/explain.py`."""
 
 _STRICT = frozenset({"float", "int", "bool", "str"})
 _NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function", "expected"})

@@ -15,6 +15,7 @@ from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import substitute
 from manipcli.spec.kind import names_controllers, refuse_description, refuse_other_kind
+from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply, read_overrides, seed_override
 from manipcli.spec.partial.partial_controllers import salvage_controllers
 from manipcli.spec.partial.partial_robot import salvage_robot
@@ -22,7 +23,6 @@ from manipcli.spec.partial.partial_task import salvage
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.ros import rewrite
 from manipcli.spec.ros.substitutions import open_substitutions
-from manipcli.spec.source.located import Area, Located, Source, validate
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode, child
 from manipcli.spec.source.yaml import MAX_BYTES, parse
 from manipcli.spec.task import TaskSpec

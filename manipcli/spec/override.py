@@ -17,8 +17,8 @@ from types import NoneType
 from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
 from manipcli.spec.base import Model
+from manipcli.spec.located import Area
 from manipcli.spec.source import shape
-from manipcli.spec.source.located import Area
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, dotted, shown
 from manipcli.spec.source.yaml import parse
 from manipcli.spec.task import StepSpec

@@ -8,7 +8,7 @@ from dataclasses import replace
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
-from manipcli.spec.source.located import Located, validate
+from manipcli.spec.located import Located, validate
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at
 from manipcli.spec.task import StepSpec, TaskSpec
 

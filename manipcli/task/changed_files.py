@@ -11,9 +11,9 @@ from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.judge.drawn import Number
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Area, Located, Source, validate
 from manipcli.spec.override import Override, apply
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Area, Located, Source, validate
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode
 from manipcli.spec.task import TaskSpec
 from manipcli.task.vary import Varied

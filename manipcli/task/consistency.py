@@ -24,9 +24,9 @@ from manipcli.scene.scene_names import RESERVED
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.condition import ConditionSpec
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located
 from manipcli.spec.partial.partial_task import intended_ids
 from manipcli.spec.retry import retried
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import StepSpec, TaskSpec
 from manipcli.task.switches import foreseen
 from manipcli.task.unjudged import unjudged

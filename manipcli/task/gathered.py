@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from manipcli.core.errors import Finding, InvalidInput, Place
-from manipcli.spec.source.located import apart
+from manipcli.spec.located import apart
 
 T = TypeVar("T")
 

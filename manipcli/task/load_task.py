@@ -14,7 +14,7 @@ from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene_names import misnamed
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
-from manipcli.spec.source.located import Located
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task.changed_files import Files, out_of_range
 from manipcli.task.consistency import disagreements, not_there

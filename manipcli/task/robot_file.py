@@ -10,9 +10,9 @@ from manipcli.core.errors import Finding
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
 from manipcli.spec.load import load_robot, salvage_robot_file
+from manipcli.spec.located import Located
 from manipcli.spec.partial.partial_robot import is_whole
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 from manipcli.task.gathered import Gathered
 
 

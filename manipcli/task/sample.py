@@ -19,9 +19,9 @@ from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
 from manipcli.scene.build_scene import build_scene
 from manipcli.scene.scene import Scene
+from manipcli.spec.located import Located
 from manipcli.spec.override import Override, read_overrides
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.task import load_task as load
 from manipcli.task.changed_files import Changes, Files

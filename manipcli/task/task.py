@@ -11,8 +11,8 @@ from manipcli.judge.drawn import Drawn
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
 
 

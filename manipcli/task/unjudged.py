@@ -16,7 +16,7 @@ from manipcli.model.state import WorldState
 from manipcli.plan.steps import STEPS
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.source.located import Located
+from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
 TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "references": "controller_state"}

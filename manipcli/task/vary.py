@@ -27,9 +27,9 @@ from manipcli.judge.drawn import Drawn, Number
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.expression import quantity_of
 from manipcli.spec.fields import bounds_of, children, unit_of
+from manipcli.spec.located import Area, Located
 from manipcli.spec.quantity import Unit
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Area, Located
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
 

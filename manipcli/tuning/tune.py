@@ -22,9 +22,9 @@ from manipcli.preflight.gains import named_postures
 from manipcli.spec import load
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located
 from manipcli.spec.other_controllers import ComputedTorqueSpec
 from manipcli.spec.resolved import as_written
-from manipcli.spec.source.located import Located
 from manipcli.task.robot_file import read_robot
 from manipcli.tuning.extremes import climbed
 from manipcli.tuning.simulated_steps import simulated_answers

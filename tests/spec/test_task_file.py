@@ -18,12 +18,12 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.registry import Seam
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task, load_task_text
+from manipcli.spec.located import Located
 from manipcli.spec.quantity import Angle, JointValue, Length, Time
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import retried
 from manipcli.spec.robot import PoseSpec
 from manipcli.spec.schema import task_schema
-from manipcli.spec.source.located import Located
 from manipcli.spec.task import TaskSpec
 from manipcli.spec.unions import task_model
 

@@ -82,7 +82,7 @@ class KinematicEngine:
 
 
 def _version() -> str:
-    from manipcli import __version__
+    from manipcli.core.version import __version__
 
     return __version__
 

@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from manipcli.core.errors import Loc
 from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located, Source
 from manipcli.spec.ros.substitutions import open_substitutions
-from manipcli.spec.source.located import Located, Source
 from manipcli.spec.source.tree import MappingNode, Node, child, without
 
 _ROUNDS = 5

@@ -10,8 +10,8 @@ from dataclasses import replace
 from pydantic import ValidationError
 
 from manipcli.core.errors import Loc
+from manipcli.spec.located import Located, Source
 from manipcli.spec.robot import RobotSpec
-from manipcli.spec.source.located import Located, Source
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, without
 
 _LINKS = ("description", "args", "attach")

@@ -12,9 +12,9 @@ from pydantic import ValidationError
 
 from manipcli.core.errors import Finding, Loc
 from manipcli.core.text import nearest
+from manipcli.spec.explain import explain
+from manipcli.spec.located import Located, Source
 from manipcli.spec.override import step_ids
-from manipcli.spec.source.explain import explain
-from manipcli.spec.source.located import Located, Source
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at, without
 from manipcli.spec.task import StepSpec, TaskSpec
 

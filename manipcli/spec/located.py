@@ -10,11 +10,11 @@ from typing import Final, Generic, Literal, TypeVar
 
 from pydantic import ValidationError
 
-from manipcli import __version__
 from manipcli.core.errors import Finding, InvalidInput, Loc, Place, Severity
 from manipcli.core.text import listed, shorten
+from manipcli.core.version import __version__
 from manipcli.spec.base import Model
-from manipcli.spec.source.explain import explain
+from manipcli.spec.explain import explain
 from manipcli.spec.source.tree import (
     MappingNode,
     Node,
