@@ -15,12 +15,12 @@ from typing import Annotated, Final
 import typer
 from typer.exceptions import TyperException
 
-from manipcli.cli import (
+from manipcli.cli import console
+from manipcli.cli.commands import (
     at,
     bless,
     check,
     check_urdf,
-    console,
     diff,
     graph,
     info,
@@ -36,7 +36,7 @@ from manipcli.cli import (
     tune,
     view,
 )
-from manipcli.cli import list as list_
+from manipcli.cli.commands import list as list_
 from manipcli.core import collector
 from manipcli.core.errors import ExitCode, Finding, ManipcliError
 from manipcli.core.version import __version__

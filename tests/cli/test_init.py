@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from manipcli.cli.app import main
-from manipcli.cli.init import FILES, TEMPLATES
+from manipcli.cli.commands.init import FILES, TEMPLATES
 
 ROOT = Path(__file__).parents[2]
 

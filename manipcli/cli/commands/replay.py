@@ -89,7 +89,7 @@ def replay(
     _check_options(verify=verify, shows=shows, verifies=verifies)
     with Interrupts() as interrupts:
         if verify:
-            from manipcli.cli.verify import verify as verified
+            from manipcli.cli.commands.verify import verify as verified
 
             return verified(
                 log,

@@ -14,7 +14,7 @@ from manipcli.cli import console
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
 from manipcli.core.text import listed
 
-TEMPLATES: Final = Path(__file__).parent / "project"
+TEMPLATES: Final = Path(__file__).parents[1] / "project"
 FILES: Final = {
     "README.md": "README.md",
     ".gitignore": "gitignore",
