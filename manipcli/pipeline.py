@@ -1,35 +1,36 @@
 """READ FIRST: the whole program. Files -> task -> plan -> recording -> verdict.
 
-`run_task` is the sentence; each word of it is a function of the stage that does it. The recording is the only witness:
-the verdict of a run is that of its log, read back from the file before it gets its name.
+`run_task` is the sentence; each stage is a function of the layer that does it. The recording is the only witness: the
+verdict is computed from the log, read back from its file before the file gets its name.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Unpack
 
-from manipcli.core.errors import Finding, NotPlannable, SimulationFailed
-from manipcli.core.stopwatch import Stopwatch
-from manipcli.judge.steps import RunStatus
+from manipcli.core.errors import Finding, NotPlannable
+from manipcli.core.stopwatch import timed
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.gains import gain_findings
-from manipcli.record.faults import RecordingFailed
 from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
-from manipcli.run.execute import Progress, controllers, simulate
-from manipcli.run.run_log import default_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
+from manipcli.run.execute import build_manager, simulate
+from manipcli.run.libraries import load_libraries
+from manipcli.run.observer import SILENT, Progress
+from manipcli.run.run_log import default_log, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.task.controller_rows import controllers_of
-from manipcli.task.load_task import load_libraries
+from manipcli.task.load_task import LoadOptions, load_task
 from manipcli.task.plan_task import Plan, plan_task, refused
-from manipcli.task.sample import load_task
 from manipcli.task.task import Task
 from manipcli.task.vocabulary import meanings
 
@@ -54,83 +55,40 @@ __all__ = [
 def run_task(
     path: Path,
     *,
-    overrides: Sequence[str] = (),
-    seed: int | None = None,
-    sample: int | None = None,
     log: Path | None = None,
     force: bool = False,
     embed_meshes: bool = False,
-    package_path: Sequence[Path] = (),
-    allow_outside: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = SILENT,
+    **options: Unpack[LoadOptions],
 ) -> RunReport:
     """Load, plan, simulate, record and judge a task.
 
     Args:
         path: the task file.
-        overrides: `scene.cup.mass=80 g`, as after `--set`.
-        seed: instead of the task's.
-        sample: which one of its `vary:`; None for the task as it is written.
-        log: where the log goes; default `runs/<task>.mcap`, which is replaced.
+        log: where the log is written; default `runs/<task>.mcap`, which is replaced.
         force: replace `log` if it exists.
-        embed_meshes: put the files of all meshes into the log, so that it is shown without any package.
-        package_path, allow_outside: see `load_task`.
-        progress: told of steps and ticks.
+        embed_meshes: put the files of all meshes into the log, so that it can be shown without any package.
+        progress: is called with warnings, steps and ticks.
+        options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the log, and how long what took. A step that cannot be planned (nothing was simulated, there
-        is no log), a simulation that left the plausible, or an interruption is in the verdict, too.
+        The verdict on the log, and the duration of each stage. A step that cannot be planned (nothing was simulated,
+        there is no log), a simulation that diverged, or an interruption is part of the verdict.
 
     Raises:
         InvalidInput: a file or the log's path cannot be used; nothing was simulated.
         RecordingFailed: the disk refused more of the log.
     """
-    began = time.perf_counter()
-    task = load_task(
-        path, overrides=overrides, seed=seed, sample=sample, package_path=package_path, allow_outside=allow_outside
-    )
-    warnings = tuple(finding for finding in task.findings if finding.severity == "warning")
-    if progress is not None and warnings:
-        progress.warned(warnings)
-    load_libraries(task)
-    loaded = time.perf_counter()
-    try:
-        plan = plan_task(task, doing=_told(progress))
-    except NotPlannable as refusal:
-        took = time.perf_counter() - began
-        timing = Timing(load=loaded - began, plan=began + took - loaded, simulate=0.0, judge=0.0)
-        return RunReport(
-            refused(task, refusal), wall_time=took, real_time_factor=None, log=None, timing=timing, warnings=warnings
-        )
-    doubts = gain_findings(task, plan)
-    planned = time.perf_counter()
-    if progress is not None and doubts:
-        progress.warned(doubts)
-
+    task, loading = timed(_load, path, progress, options)
+    (plan, warnings), planning = timed(_plan, task, progress)
+    if isinstance(plan, Verdict):
+        return RunReport(plan, Timing(load=loading, plan=planning), warnings=warnings)
     where = log if log is not None else default_log(task)
-    try:
-        verdict, simulated, planning = _recorded(
-            task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
-        )
-    except RecordingFailed as failure:
-        failure.known = known_of(task, failure.partial)
-        raise
-    judged = time.perf_counter()
-    timing = Timing(
-        load=loaded - began,
-        plan=planned - loaded + planning,
-        simulate=simulated - planned - planning,
-        judge=judged - simulated,
+    verdict, timing = _record(
+        task, plan, where, overwrite=force or log is None, embed_meshes=embed_meshes, progress=progress
     )
-    return RunReport(
-        verdict=verdict,
-        wall_time=judged - began,
-        real_time_factor=verdict.simulated_time / timing.simulate,
-        log=str(where),
-        timing=timing,
-        warnings=(*warnings, *doubts),
-        meshes=mesh_files(task),
-    )
+    timing = replace(timing, load=loading, plan=planning + timing.plan)
+    return RunReport(verdict, timing, log=str(where), warnings=warnings, meshes=mesh_files(task))
 
 
 def verify_log(
@@ -139,19 +97,20 @@ def verify_log(
     allow_different: bool = False,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = SILENT,
 ) -> Verification:
     """Plan, simulate and record again what a log holds, and compare the two logs.
 
     Args:
         log: the log of a run, or what a killed run left.
         allow_different: also with another version of manipcli or of the engine, or other meshes.
-        package_path, allow_outside: where meshes are looked for that it does not carry.
-        progress: told of steps and ticks.
+        package_path: where meshes are looked for that the log does not carry.
+        allow_outside: see `LoadOptions`.
+        progress: is called with steps and ticks.
 
     Raises:
-        InvalidInput: the log lacks something, or versions or meshes are others.
-        NotPlannable: a step cannot be planned any more.
+        InvalidInput: the log lacks something, or versions or meshes differ.
+        NotPlannable: a step can no longer be planned.
     """
     began = time.perf_counter()
     recording = open_recording(log)
@@ -160,40 +119,41 @@ def verify_log(
         raise refused_as_unlike(recorded.unlike)
     plan = plan_task(recorded.task)
     with TemporaryDirectory(prefix="manipcli-") as folder:
-        again = Path(folder) / "again.mcap"
-        verdict, _, _ = _recorded(
-            recorded.task, plan, again, overwrite=False, embed_meshes=recorded.embedded, progress=progress
+        repeated = Path(folder) / "repeated.mcap"
+        verdict, _ = _record(
+            recorded.task, plan, repeated, overwrite=False, embed_meshes=recorded.embedded, progress=progress
         )
         if any(finding.code == INTERRUPTED for finding in verdict.errors):
             raise KeyboardInterrupt
-        return compared(recording, log, again, unlike=recorded.unlike, began=began)
+        return compared(recording, log, repeated, unlike=recorded.unlike, began=began)
 
 
-def _told(progress: Progress | None) -> Callable[[str], None]:
-    """Who is told what is being done."""
-    return progress.doing if progress is not None else lambda _: None
+def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
+    task = load_task(path, **options)
+    progress.warned(task.warnings)
+    load_libraries(task)
+    return task
 
 
-def _recorded(
-    task: Task, plan: Plan, where: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress | None
-) -> tuple[Verdict, float, float]:
-    """Simulate into a log that is judged before it gets its name; the verdict, when the simulation was over, and how
-    long it was held up by planning."""
-    manager = controllers(task, plan.planner.kinematics)
-    replanning = Stopwatch()
-    recorder = open_log(task, plan, manager, where, overwrite=overwrite, embed_meshes=embed_meshes)
+def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Finding, ...]]:
+    """The plan, or the verdict on a task that has none; and every warning before the run."""
     try:
-        status, cause = RunStatus.COMPLETE, ""
-        try:
-            simulate(task, plan, manager, recorder, progress, replanning)
-        except SimulationFailed as failure:
-            status, cause = RunStatus.FAILED, str(failure)
-        except KeyboardInterrupt:
-            status, cause = RunStatus.INTERRUPTED, "interrupted by the user"
-        recorder.metadata("run", run_metadata(task, status=status, cause=cause))
-        simulated = time.perf_counter()
-        verdict = judge_log(recorder.partial_path, being_written=True, doing=_told(progress))
+        plan = plan_task(task, doing=progress.doing)
+    except NotPlannable as refusal:
+        return refused(task, refusal), task.warnings
+    doubts = gain_findings(task, plan)
+    progress.warned(doubts)
+    return plan, (*task.warnings, *doubts)
+
+
+def _record(
+    task: Task, plan: Plan, path: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress
+) -> tuple[Verdict, Timing]:
+    """Simulate into a log that is judged before it gets its name."""
+    manager = build_manager(task, plan.planner.kinematics)
+    with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
+        end, simulating = timed(simulate, task, plan, manager, recorder, progress)
+        recorder.metadata("run", run_metadata(task, status=end.status, cause=end.cause))
+        verdict, judging = timed(judge_log, recorder.partial_path, being_written=True, doing=progress.doing)
         recorder.finish(verdict_metadata(verdict))
-    finally:
-        recorder.close_partial()
-    return verdict, simulated, replanning.seconds
+    return verdict, Timing(plan=end.replanning, simulate=simulating - end.replanning, judge=judging)

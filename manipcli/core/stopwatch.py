@@ -1,9 +1,21 @@
-"""How long something took that happens now and then."""
+"""Wall time of a call, and of work that happens now and then."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from types import TracebackType
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def timed(stage: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T, float]:
+    """The result of a call, and its wall time [s]."""
+    began = time.perf_counter()
+    result = stage(*args, **kwargs)
+    return result, time.perf_counter() - began
 
 
 class Stopwatch:

@@ -19,8 +19,8 @@ from manipcli.spec import load
 from manipcli.spec.condition import COMBINATIONS, QUANTIFIERS
 from manipcli.spec.schema import controllers_schema, robot_schema, task_schema
 from manipcli.spec.source.tree import Plain
+from manipcli.task.load_task import load_task
 from manipcli.task.robot_file import read_robot
-from manipcli.task.sample import load_task
 from manipcli.task.task import Task
 from manipcli.task.vocabulary import task_spec
 

@@ -14,10 +14,15 @@ from manipcli.judge.verdict import INTERRUPTED, Verdict
 class Timing:
     """Wall time of each part of a run [s]."""
 
-    load: float
-    plan: float
-    simulate: float
-    judge: float
+    load: float = 0.0
+    plan: float = 0.0
+    simulate: float = 0.0
+    judge: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """[s]."""
+        return self.load + self.plan + self.simulate + self.judge
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,21 +31,27 @@ class RunReport:
 
     Attributes:
         verdict: read from the log alone.
-        wall_time: [s] of the whole run.
-        real_time_factor: simulated time over the wall time of its simulation; None where nothing was.
+        timing: wall time of each stage.
         log: path of the log, as text; None where nothing was run, or it was not kept.
-        timing: the parts of `wall_time`.
         warnings: what was doubted before the run began: about its files, and about gains.
         meshes: files of the robot and of the scene by the URIs that the log has for them, to draw the run with.
     """
 
     verdict: Verdict
-    wall_time: float
-    real_time_factor: float | None
-    log: str | None
     timing: Timing
+    log: str | None = None
     warnings: tuple[Finding, ...] = ()
     meshes: Mapping[str, Path] = field(default_factory=dict)
+
+    @property
+    def wall_time(self) -> float:
+        """[s] of all stages."""
+        return self.timing.total
+
+    @property
+    def real_time_factor(self) -> float | None:
+        """Simulated time over the wall time of the simulation; None where nothing was simulated."""
+        return self.verdict.simulated_time / self.timing.simulate if self.timing.simulate else None
 
 
 def exit_code(verdict: Verdict) -> ExitCode:

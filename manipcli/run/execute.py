@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -11,6 +12,7 @@ from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
+from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.record.recorder import Recorder
 from manipcli.run.live_conditions import Live
@@ -24,15 +26,13 @@ from manipcli.simulate.session import Session
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
-__all__ = ["Progress", "controllers", "simulate"]
-
 SETTLED_SPEED: Final = 0.02
 """Bodies slower than this [m/s] have settled."""
 SETTLED_SHIFT: Final = 0.01
 """A body that moves further than this [m] while settling was put where it cannot stay."""
 
 
-def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
+def build_manager(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
     """The task's controllers, for its robot, gravity and control period.
 
     Args:
@@ -48,20 +48,45 @@ def controllers(task: Task, kinematics: Kinematics | None = None) -> ControllerM
     )
 
 
+@dataclass(frozen=True, slots=True)
+class SimulationEnd:
+    """How a simulation ended; `replanning`: wall time [s] spent planning steps again."""
+
+    status: RunStatus
+    cause: str
+    replanning: float
+
+
 def simulate(
+    task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress
+) -> SimulationEnd:
+    """Run the plan in the task's engine, up to its end, a failure of the physics or an interruption.
+
+    Everything that happened is in the recorder afterwards.
+    """
+    replanning = Stopwatch()
+    status, cause = RunStatus.COMPLETE, ""
+    try:
+        _run_steps(task, plan, manager, recorder, progress, replanning)
+    except SimulationFailed as failure:
+        status, cause = RunStatus.FAILED, str(failure)
+    except KeyboardInterrupt:
+        status, cause = RunStatus.INTERRUPTED, "interrupted by the user"
+    return SimulationEnd(status, cause, replanning.seconds)
+
+
+def _run_steps(
     task: Task,
     plan: Plan,
     manager: ControllerManager,
     recorder: Recorder,
-    progress: Progress | None,
+    progress: Progress,
     replanning: Stopwatch,
 ) -> None:
-    """Run the plan in the task's engine; what happens is in the recorder afterwards, also when it raises.
-
-    `replanning` runs while steps are planned again.
+    """Open the world, let it settle, and run every step.
 
     Raises:
-        SimulationFailed: the world does not stand still before the start, or leaves the plausible.
+        SimulationFailed: the world does not settle before the start, or the simulation diverges.
     """
     simulation, true = task.spec.simulation, task.true
     settings = EngineSettings(

@@ -51,6 +51,20 @@ class Progress(Protocol):
         ...
 
 
+class _Silent:
+    """Shows nothing."""
+
+    def doing(self, what: str) -> None: ...
+    def warned(self, findings: Sequence[Finding]) -> None: ...
+    def step_started(self, step: PlannedStep, index: int, total: int) -> None: ...
+    def told(self, text: str, *, detail: bool) -> None: ...
+    def tick(self, simulated_time: float, wall: float) -> None: ...
+    def step_ended(self, outcome: StepOutcome) -> None: ...
+
+
+SILENT: Final = _Silent()
+
+
 @dataclass(frozen=True, slots=True)
 class _Goal:
     """A goal on its way, and the number by which the log knows it."""
@@ -63,7 +77,7 @@ class _Goal:
 class Onlooker:
     """Hands every tick to the recorder and to live conditions, and now and then the time to who shows the progress."""
 
-    def __init__(self, recorder: Recorder, live: Live, progress: Progress | None, period: float) -> None:
+    def __init__(self, recorder: Recorder, live: Live, progress: Progress, period: float) -> None:
         self._recorder = recorder
         self._live = live
         self._progress = progress
@@ -83,7 +97,7 @@ class Onlooker:
             if due or goal.handle.result is not None:
                 self._follow(tick)
                 break
-        if self._progress is not None and tick % PROGRESS_TICKS == 0:
+        if tick % PROGRESS_TICKS == 0:
             self._progress.tick(tick * self._period, wall_clock.perf_counter() - self._began)
 
     def contacts(self, tick: int, contacts: tuple[Contact, ...]) -> None:

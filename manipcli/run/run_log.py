@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
@@ -19,7 +20,7 @@ from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
-from manipcli.record.faults import RecordingRefused
+from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.recorder import Recorder
 from manipcli.record.recording import EMBEDDED
@@ -50,14 +51,16 @@ def default_log(task: Task) -> Path:
     return RUNS / f"{task.name}.mcap"
 
 
+@contextmanager
 def open_log(
     task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool
-) -> Recorder:
+) -> Iterator[Recorder]:
     """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
     meshes, too, so that the log is shown without any package.
 
     Raises:
         RecordingRefused: nothing can or may be written there; above all not over a file that the task is made from.
+        RecordingFailed: the disk refused more of the log; what could be written stays readable.
     """
     engine = ENGINES[task.spec.simulation.engine]
     meshes = mesh_files(task)
@@ -74,7 +77,7 @@ def open_log(
         (SCENE, JSON, scene_to_json(task.true.scene)),
         (PLAN_FILE, JSON, plan.to_json()),
     ]
-    return Recorder(
+    recorder = Recorder(
         path,
         robot=task.robot,
         scene=task.true.scene,
@@ -95,6 +98,19 @@ def open_log(
         selection=Selection(task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out),
         overwrite=overwrite,
     )
+    try:
+        yield recorder
+    except RecordingFailed as failure:
+        simulation = task.spec.simulation
+        failure.known = {
+            "task": task.name,
+            "seed": simulation.seed,
+            "engine": simulation.engine,
+            "log": str(failure.partial),
+        }
+        raise
+    finally:
+        recorder.close_partial()
 
 
 def run_metadata(task: Task, **end: str) -> dict[str, str]:
@@ -151,12 +167,6 @@ def _portable_robot(spec: RobotSpec) -> RobotSpec:
     """The robot file without folders of this machine in the names of its descriptions."""
     attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
     return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
-
-
-def known_of(task: Task, log: Path) -> Mapping[str, str | int]:
-    """What a report says of a run that has no verdict."""
-    simulation = task.spec.simulation
-    return {"task": task.name, "seed": simulation.seed, "engine": simulation.engine, "log": str(log)}
 
 
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:

@@ -75,7 +75,7 @@ class StepsRun:
         session: Session,
         recorder: Recorder,
         live: Live,
-        progress: Progress | None,
+        progress: Progress,
         *,
         told: Callable[[str, GoalHandle], None],
         replanning: Stopwatch,
@@ -107,11 +107,9 @@ class StepsRun:
         total = len(self._plan.steps)
         planned_start = self._plan.start
         for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
-            if self._progress is not None:
-                self._progress.step_started(planned, index, total)
+            self._progress.step_started(planned, index, total)
             outcome = self._step(index, step, planned, planned_start)
-            if self._progress is not None:
-                self._progress.step_ended(outcome)
+            self._progress.step_ended(outcome)
             if outcome.outcome != "done" and not outcome.tolerated:
                 break
             planned_start = planned.plan.end
@@ -330,8 +328,7 @@ class StepsRun:
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
 
     def _tell(self, text: str, *, detail: bool) -> None:
-        if self._progress is not None:
-            self._progress.told(text, detail=detail)
+        self._progress.told(text, detail=detail)
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
         self._recorder.event(

@@ -16,7 +16,7 @@ from manipcli.spec.override import Override, apply
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode
 from manipcli.spec.task import TaskSpec
-from manipcli.task.vary import Varied
+from manipcli.task.vary import Varied, bind
 
 M = TypeVar("M", bound=Model)
 
@@ -46,6 +46,19 @@ class Files:
         return Files(
             _changed(self.task, overrides), _changed(self.robot, overrides), _changed(self.controllers, overrides)
         )
+
+
+def bound(files: Files) -> tuple[Varied, ...]:
+    """Everything that the task varies, in the order of its file.
+
+    Raises:
+        InvalidInput: every key and every range of `vary:` that the files refuse.
+    """
+    varied, wrong = bind(files.task, files.robot, files.controllers)
+    findings = (*wrong, *out_of_range(files, varied))
+    if findings:
+        raise InvalidInput(findings)
+    return varied
 
 
 def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Finding, ...]:

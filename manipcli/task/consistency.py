@@ -42,6 +42,21 @@ OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL14
 """Findings about a controllers file that speak of joints which are not there, or not its own."""
 
 
+def consistent(
+    task: Located[TaskSpec], controllers: Located[ControllersSpec], robot: RobotModel, scene: Scene
+) -> tuple[Finding, ...]:
+    """Warnings and notes about three sound files together.
+
+    Raises:
+        InvalidInput: every error of `disagreements`.
+    """
+    found = disagreements(task, controllers, robot, scene)
+    errors = [finding for finding in found if finding.severity == "error"]
+    if errors:
+        raise InvalidInput(errors)
+    return found
+
+
 def disagreements(
     task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
 ) -> tuple[Finding, ...]:

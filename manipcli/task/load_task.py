@@ -1,125 +1,110 @@
-"""Files to a task: what the user wrote, and what it means for this robot and scene."""
+"""Task file to checked task: one column of calls. What goes wrong is reported by `second_chances`."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
+from typing import TypedDict, Unpack
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import InvalidInput
 from manipcli.description.packages import Packages
-from manipcli.plan import retimer
+from manipcli.model.build_robot import build_robot
 from manipcli.scene.build_scene import build_scene
-from manipcli.scene.scene_names import misnamed
-from manipcli.simulate.engines import ENGINES
-from manipcli.spec import load
-from manipcli.spec.located import Located
-from manipcli.spec.task import TaskSpec
-from manipcli.task.changed_files import Files, out_of_range
-from manipcli.task.consistency import disagreements, not_there
-from manipcli.task.gathered import Gathered
-from manipcli.task.placeholders import named_robot, named_scene
-from manipcli.task.robot_file import gather_robot
+from manipcli.spec.load import load_controllers, load_robot
+from manipcli.spec.load import load_task as load_task_file
+from manipcli.task.changed_files import Files, bound
+from manipcli.task.consistency import consistent
+from manipcli.task.named_file import named_file
+from manipcli.task.sample import draw_sample
+from manipcli.task.second_chances import every_finding
 from manipcli.task.task import Task
-from manipcli.task.vary import bind
+from manipcli.task.vary import Varied
 from manipcli.task.vocabulary import task_spec
 
 
-def load_task(
+class FileOptions(TypedDict, total=False):
+    """How the files of a task are read; a missing key means its default.
+
+    Attributes:
+        overrides: `scene.cup.mass=80 g`, as after `--set`.
+        seed: replaces the seed of the task.
+        package_path: more folders in which packages are looked for.
+        allow_outside: files may lie outside packages and the folders of the files that name them.
+    """
+
+    overrides: Sequence[str]
+    seed: int | None
+    package_path: Sequence[Path]
+    allow_outside: bool
+
+
+class LoadOptions(FileOptions, total=False):
+    """The same, and which sample of the task is meant.
+
+    Attributes:
+        sample: a number from 0, of `vary:`; None for the task as written. What `overrides` set is not drawn; its
+            `offset` or `scale` is, about the value that they set.
+    """
+
+    sample: int | None
+
+
+def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOptions]) -> Task:
+    """Read a task and everything it names.
+
+    Args:
+        path: the task file.
+        sample: see `LoadOptions`.
+        options: see `FileOptions`.
+
+    Raises:
+        InvalidInput: every error of all three files at once; errors of the scene's geometry once the task file is
+            sound. Or there is no such sample, or a drawn value is refused.
+    """
+    try:
+        task, varied = _as_written(path, **options)
+    except InvalidInput as first:
+        raise every_finding(path, first, **options) from None
+    if sample is None:
+        return task
+    return draw_sample(
+        task,
+        varied,
+        sample,
+        path,
+        overrides=options.get("overrides", ()),
+        package_path=options.get("package_path", ()),
+        allow_outside=options.get("allow_outside", False),
+    )
+
+
+def _as_written(
     path: Path,
     *,
     overrides: Sequence[str] = (),
     seed: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
-) -> Task:
-    """Read a task and everything it names.
-
-    Args:
-        path: the task file.
-        overrides: `scene.cup.mass=80 g`, as after `--set`.
-        seed: instead of the task's.
-        package_path: more folders to look for packages in.
-        allow_outside: files may lie outside of packages and the folders of the files that name them.
+) -> tuple[Task, tuple[Varied, ...]]:
+    """The task as its files state it, and what `vary:` changes.
 
     Raises:
-        InvalidInput: every error of all three files at once; of the scene's geometry only once the task file is sound.
+        InvalidInput: the errors of the first stage that has any.
     """
-    gathered = Gathered()
-    model = task_spec()
-    task = gathered(lambda: load.load_task(path, model=model, overrides=overrides, seed=seed))
-    read = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
-    if read is None:
-        raise gathered.refusal()
-    gathered.unknown = read.source.unknown
-    if task is None:
-        gathered.findings += (*read.findings, *misnamed(read.spec, lambda loc: read.place(*loc)))
-    robot_path = gathered(lambda: _named_file(read, path, "robot"))
-    controllers_path = gathered(lambda: _named_file(read, path, "controllers"))
-    robot_read = robot_path and gather_robot(
-        robot_path, gathered, overrides=overrides, package_path=package_path, allow_outside=allow_outside
+    file = load_task_file(path, model=task_spec(), overrides=overrides, seed=seed)
+    robot_path, controllers_path = named_file(file, path, "robot"), named_file(file, path, "controllers")
+    robot_file = load_robot(robot_path, overrides=overrides)
+    robot, notes = build_robot(
+        robot_file.spec,
+        file=robot_path,
+        package_path=package_path,
+        allow_outside=allow_outside,
+        source=robot_file.source,
     )
-    robot_file, built = (robot_read.file, robot_read.robot) if robot_read else (None, None)
-    controllers_file = controllers_path and gathered(
-        lambda: load.load_controllers(controllers_path, overrides=overrides)
-    )
-    controllers_read = controllers_file or (
-        controllers_path and load.salvage_controllers_file(controllers_path, overrides=overrides)
-    )
+    controllers_file = load_controllers(controllers_path, overrides=overrides)
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    scene = None
-    if task is not None:
-        whole = task
-        scene = gathered(lambda: build_scene(whole.spec, place=lambda loc: whole.place(*loc), packages=packages))
-    told: tuple[Finding, ...] = ()
-    if built:
-        found = disagreements(read, controllers_read or None, built[0], scene or named_scene(read.spec))
-        gathered.findings += [finding for finding in found if finding.severity == "error"]
-        told = tuple(finding for finding in found if finding.severity != "error")
-    else:
-        gathered.findings += not_there(read, named_robot(read.spec), scene or named_scene(read.spec))
-    if task is not None and robot_file and controllers_file:
-        varied, wrong = bind(task, robot_file, controllers_file)
-        gathered.findings += (*wrong, *out_of_range(Files(task, robot_file, controllers_file), varied))
-    if task is None or scene is None or not (robot_file and controllers_file and built) or gathered.findings:
-        raise gathered.refusal()
-    robot, notes = built
-    return Task(
-        file=task,
-        robot_file=robot_file,
-        controllers_file=controllers_file,
-        robot=robot,
-        scene=scene,
-        findings=(*task.findings, *robot_file.findings, *controllers_file.findings, *notes, *told),
-    )
-
-
-def load_libraries(task: Task) -> None:
-    """Import now what planning, simulating and recording would import at their first use, so that the time of each of
-    them is its own."""
-    for name in ("coal", "pinocchio", "ruckig", "mcap.records", "mcap.opcode", "zstandard"):
-        import_module(name)
-    retimer.library()
-    ENGINES[task.spec.simulation.engine].prepare()
-
-
-def _named_file(task: Located[TaskSpec], path: Path, key: str) -> Path | None:
-    """The file that the task names under `key`, relative to the task; None where what it names has been refused.
-
-    Raises:
-        InvalidInput: it is not there; told at the place where it is named.
-    """
-    if not task.source.untouched(key):
-        return None
-    named: str = getattr(task.spec, key)
-    found = Path(os.path.normpath(path.parent / named))
-    if not found.is_file():
-        if found.is_dir():
-            message, hint = f"'{found}' is a folder; expected a YAML file", "name the YAML file in it"
-        elif found.exists():
-            message, hint = f"'{found}' is no regular file; expected a YAML file", None
-        else:
-            message, hint = f"there is no file '{found}'", load.sibling(found)
-        raise InvalidInput([task.source.finding(231, (key,), message, hint=hint)])
-    return found
+    scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
+    warnings = consistent(file, controllers_file, robot, scene)
+    varied = bound(Files(file, robot_file, controllers_file))
+    findings = (*file.findings, *robot_file.findings, *controllers_file.findings, *notes, *warnings)
+    return Task(file, robot_file, controllers_file, robot, scene, findings), varied

@@ -7,7 +7,6 @@ controllers keep what the files say (`Varied.only_world`).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,46 +22,45 @@ from manipcli.spec.located import Located
 from manipcli.spec.override import Override, read_overrides
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
-from manipcli.task import load_task as load
 from manipcli.task.changed_files import Changes, Files
+from manipcli.task.named_file import named_file
 from manipcli.task.task import Task, Truth
-from manipcli.task.vary import Varied, bind, draw
+from manipcli.task.vary import Varied, draw
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
 SceneOf = Callable[[Located[TaskSpec]], Scene]
 
 
-def load_task(
+def draw_sample(
+    task: Task,
+    varied: Sequence[Varied],
+    number: int,
     path: Path,
     *,
     overrides: Sequence[str] = (),
-    seed: int | None = None,
-    sample: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> Task:
-    """Read a task and everything it names; see `flow.load.load_task`.
+    """Sample `number` of a task; what `overrides` set is not drawn, but its `offset` or `scale` is.
 
     Args:
-        sample: which one of `vary:`; None for the task as it is written. What `overrides` set is not drawn; its
-            `offset` or `scale` is, about the value that they set.
+        task: as its files state it.
+        varied: what its `vary:` changes.
+        number: which sample, from 0.
+        path: the task file; `overrides`, `package_path`, `allow_outside`: as it was loaded.
 
     Raises:
-        InvalidInput: also where nothing varies, or a drawn value cannot be.
+        InvalidInput: there is no such sample, or a drawn value is refused.
     """
-    task = load.load_task(path, overrides=overrides, seed=seed, package_path=package_path, allow_outside=allow_outside)
-    if sample is None:
-        return task
-    robot_path = Path(os.path.normpath(path.parent / task.spec.robot))
-    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
-    if sample < 0:
-        message = f"there is no sample {sample}: they count from 0"
+    if number < 0:
+        message = f"there is no sample {number}: they count from 0"
         raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
-    varied, _ = bind(task.file, task.robot_file, task.controllers_file)
     if not varied:
-        message = f"there is no sample {sample}: task '{task.name}' has no `vary:`"
+        message = f"there is no sample {number}: task '{task.name}' has no `vary:`"
         raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
-    drawn = _but_for(draw(varied, task.spec.simulation.seed, sample), varied, read_overrides(overrides))
+    robot_path = named_file(task.file, path, "robot")
+    packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+    drawn = _but_for(draw(varied, task.spec.simulation.seed, number), varied, read_overrides(overrides))
     return sampled(
         task,
         varied,

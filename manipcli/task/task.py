@@ -49,6 +49,11 @@ class Task:
         return self.truth or Truth(self.robot, self.scene, self.controllers_file)
 
     @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Its findings without notes."""
+        return tuple(finding for finding in self.findings if finding.severity == "warning")
+
+    @property
     def name(self) -> str:
         """As in `task:`."""
         return self.file.spec.task

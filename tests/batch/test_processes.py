@@ -290,8 +290,6 @@ def test_the_verdict_arrives_whole_and_only_what_failed_keeps_its_log(
 ) -> None:
     sent = RunReport(
         replace(VERDICT, verdict=verdict),
-        wall_time=1.0,
-        real_time_factor=1.0,
         log="x",
         timing=Timing(0, 0, 1, 0),  # type: ignore[arg-type]
     )
@@ -464,7 +462,7 @@ def test_the_command_that_does_it_again_can_be_pasted_into_a_shell() -> None:
 
 
 def test_what_is_worse_than_its_baseline_is_seen_again_by_testing(tmp_path: Path) -> None:
-    good = RunReport(VERDICT, wall_time=1.0, real_time_factor=1.0, log="x", timing=Timing(0, 0, 1, 0))
+    good = RunReport(VERDICT, Timing(0, 0, 1, 0), log="x")
     end = pickle.dumps(End(good, troubles=(Trouble("worse than the baseline: the task takes 2 s"),)))
     (report,) = run(jobs(tmp_path, f"import pickle; parent.send(pickle.loads({end!r}))"))
     assert (report.outcome, report.command) == ("failed", "manipcli test t0.yaml")

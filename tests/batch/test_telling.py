@@ -48,7 +48,7 @@ def job(tmp_path: Path) -> Job:
 def test_a_broken_watch_is_told_at_its_line(tmp_path: Path) -> None:
     (trouble,) = troubles(job(tmp_path), VERDICT)
     assert str(trouble.place) == "t/nod.yaml:7:5"
-    report = RunReport(VERDICT, wall_time=1.0, real_time_factor=1.0, log="x", timing=Timing(0, 0, 1, 0))
+    report = RunReport(VERDICT, Timing(0, 0, 1, 0), log="x")
     (case,) = [
         one for one in fromstring(junit(job(tmp_path), report)).iter("testcase") if one.find("failure") is not None
     ]

@@ -45,7 +45,7 @@ PASSED = Verdict(
 
 def _report(verdict: Verdict) -> RunReport:
     return RunReport(
-        verdict, wall_time=3.0, real_time_factor=8.0, log="runs/pour.mcap", timing=Timing(0.1, 0.2, 2.5, 0.2)
+        verdict, Timing(0.1, 0.2, 2.5, 0.2), log="runs/pour.mcap"
     )
 
 

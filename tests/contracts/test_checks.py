@@ -14,7 +14,7 @@ from manipcli.description.packages import Packages
 from manipcli.spec.load import load_robot
 
 ROOT = Path(__file__).parents[2]
-MODEL = ROOT / "manipcli" / "model"
+DESCRIPTION = ROOT / "manipcli" / "description"
 CODE = re.compile(r"\b(?:URDF|XACRO)\d{3}\b")
 ROBOTS = sorted((ROOT / "robots").glob("*/robot.yaml"))
 WRITTEN_LATER = {"URDF040", "URDF041"}
@@ -54,12 +54,12 @@ def test_codes_and_names_are_unique_and_every_member_explains_itself() -> None:
 
 
 def test_every_code_that_can_be_told_is_a_check() -> None:
-    used = {code for path in MODEL.glob("*.py") for code in CODE.findall(path.read_text(encoding="utf-8"))}
+    used = {code for path in DESCRIPTION.rglob("*.py") for code in CODE.findall(path.read_text(encoding="utf-8"))}
     assert used - WRITTEN_LATER <= {check.code for check in CHECKS}
 
 
 def test_every_check_of_every_file_is_registered() -> None:
-    written = "".join(path.read_text(encoding="utf-8") for path in (MODEL / "checks").glob("*.py"))
+    written = "".join(path.read_text(encoding="utf-8") for path in (DESCRIPTION / "lint" / "checks").glob("*.py"))
     assert sorted(re.findall(r'^ +(?:code=)?"((?:URDF|XACRO)\d{3})",$', written, re.M)) == sorted(
         c.code for c in CHECKS
     )

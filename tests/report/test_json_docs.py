@@ -29,7 +29,7 @@ VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
     drawn=Drawn(3, (("scene.cup.mass", 0.25),)), cuts=Cuts({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
-RUN = RunReport(VERDICT, 3.0, 8.0, "runs/pour.mcap", Timing(0.1, 0.2, 2.5, 0.2))
+RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 CASE = CaseReport(
     Case("a.yaml", "a"), "failed", 1.0, "", run=RUN, warnings=(WRONG,), troubles=(Trouble("x", Place("a.yaml", 1, 1)),)
 )

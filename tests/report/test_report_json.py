@@ -24,7 +24,7 @@ VERDICT = Verdict(
     ),
     expectations=(ExpectationOutcome("near", "failed", -0.01, "m", 20.1),),
 )
-REPORT = RunReport(VERDICT, 3.0, 8.0, "runs/pour.mcap", Timing(0.1, 0.2, 2.5, 0.2))
+REPORT = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 
 
 def test_the_documented_names_are_there() -> None:

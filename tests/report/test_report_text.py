@@ -91,7 +91,7 @@ def test_a_task_without_expectations_says_so() -> None:
 
 
 def test_a_run_says_how_fast_it_was() -> None:
-    report = RunReport(PASSED, 3.0, 8.25, "x.mcap", Timing(0.1, 0.2, 2.5, 0.2))
+    report = RunReport(PASSED, Timing(0.1, 0.2, 2.5, 0.2), "x.mcap")
     assert "20.50 s simulated, 3.00 s real (8.2 x real time" in render_run(report)
     assert "plan 0.20 s" in render_run(report, verbose=True)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Array
-from manipcli.run.execute import controllers
+from manipcli.run.execute import build_manager
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session
@@ -45,7 +45,7 @@ def session(tmp_path: Path) -> Session:
     start = start_position(task).copy()
     start[task.robot.indices(JOINTS)] = [0.3, 1.2, 0.2, -0.4, 0.1, 0.3, 0.0]
     engine = ENGINES["pybullet"].open(task.robot, task.scene, EngineSettings(1e-3, 1, start))
-    running = Session(robot=task.robot, scene=task.scene, engine=engine, manager=controllers(task), period=1e-3)
+    running = Session(robot=task.robot, scene=task.scene, engine=engine, manager=build_manager(task), period=1e-3)
     arm(running, 1000)
     return running
 

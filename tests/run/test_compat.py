@@ -8,7 +8,6 @@ import pytest
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.run.execute import controllers
 from manipcli.task.load_task import load_task
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"
@@ -18,7 +17,7 @@ PERIOD, ERROR, I_GAIN = 1e-3, 0.01, 50.0
 def first_command(compat: str, gain: float) -> float:
     """What joint_1 is commanded on the first tick of an error [N m], beside p e: the same for both."""
     gains = f"controllers.arm_controller.gains.joint_1.i={gain}"
-    manager = controllers(load_task(TASK, overrides=[f"robot.compat={compat}", gains]))
+    manager = build_manager(load_task(TASK, overrides=[f"robot.compat={compat}", gains]))
     arm = manager["arm_controller"]
     assert isinstance(arm, JointTrajectoryController)
     n = len(arm.joints)

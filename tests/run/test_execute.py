@@ -15,7 +15,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.step import Motion
 from manipcli.record.reading import read_recording
-from manipcli.run import execute
+from manipcli.run import execute, observer
 from manipcli.run import step_loop as steps_run
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +34,7 @@ Run = Callable[..., Verdict]
 def run(tmp_path: Path) -> Run:
     """Runs a task given as text; the log is `small.mcap` in the test's folder."""
 
-    def run_text(text: str, *overrides: str, progress: execute.Progress | None = None) -> Verdict:
+    def run_text(text: str, *overrides: str, progress: observer.Progress = observer.SILENT) -> Verdict:
         file = tmp_path / "small.yaml"
         file.write_text(HEAD + text)
         log = tmp_path / "small.mcap"

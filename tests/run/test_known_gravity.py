@@ -13,9 +13,9 @@ from manipcli.core.units import EARTH_GRAVITY
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.pipeline import run_task, verify_log
-from manipcli.run.execute import controllers
+from manipcli.run.execute import build_manager
+from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task, start_position
-from manipcli.task.sample import load_task
 from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -55,7 +55,7 @@ class _AtRest:
 def _held(task: Task, kinematics: Kinematics | None = None) -> Array:
     """(n) the efforts that the controllers command at the start, at rest and where their references are."""
     q = start_position(task)
-    manager = controllers(task, kinematics)
+    manager = build_manager(task, kinematics)
     return np.array(manager.update(0.0, _AtRest(q, np.zeros_like(q), np.zeros_like(q))).effort)
 
 

@@ -15,7 +15,7 @@ from manipcli.judge.verdict import Verdict
 from manipcli.record.reading import read_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.report import json as json_report
-from manipcli.run.observer import Progress
+from manipcli.run.observer import SILENT, Progress
 from manipcli.simulate.executor import REST
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +39,7 @@ Run = Callable[..., Verdict]
 def run(tmp_path: Path) -> Run:
     """Runs a task given as text; the log is `small.mcap` in the test's folder, and judged again it says the same."""
 
-    def run_text(text: str, progress: Progress | None = None) -> Verdict:
+    def run_text(text: str, progress: Progress = SILENT) -> Verdict:
         file, log = tmp_path / "small.yaml", tmp_path / "small.mcap"
         file.write_text(HEAD + text)
         report = pipeline.run_task(file, log=log, force=True, progress=progress)

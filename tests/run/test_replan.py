@@ -17,7 +17,7 @@ from manipcli.model.collision import Carried
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.run import replan
-from manipcli.run.execute import controllers
+from manipcli.run.execute import build_manager
 from manipcli.run.replan import COMMANDED, LOST, Measured, after
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
@@ -92,7 +92,7 @@ def world_at(task: Task, plan: Plan) -> WorldOf:
     def made(step: int) -> World:
         engine = KinematicEngine(task.robot, task.scene, EngineSettings(0.001, 1, plan.start.position))
         session = Session(
-            robot=task.robot, scene=task.scene, engine=engine, manager=controllers(task, plan.planner.kinematics),
+            robot=task.robot, scene=task.scene, engine=engine, manager=build_manager(task, plan.planner.kinematics),
             period=0.001,
         )  # fmt: skip
         world = World(task, plan, session, Measured(session, plan.planner, ReplanSpec(), physics=True))

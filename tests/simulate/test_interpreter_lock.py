@@ -21,7 +21,7 @@ import pytest
 from manipcli.control.action import GripperGoal
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.run.execute import controllers
+from manipcli.run.execute import build_manager
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.session import Session
@@ -69,7 +69,7 @@ def session() -> Iterator[Session]:
     task = load_task(HOME)
     settings = EngineSettings(step=0.001, substeps=1, start=plan_task(task).start.position)
     engine = ENGINES["pybullet"].open(task.robot, task.scene, settings)
-    yield Session(robot=task.robot, scene=task.scene, engine=engine, manager=controllers(task), period=0.001)
+    yield Session(robot=task.robot, scene=task.scene, engine=engine, manager=build_manager(task), period=0.001)
     engine.close()
 
 

@@ -369,7 +369,7 @@ def test_the_floor_of_a_scene_that_cannot_be_built_is_no_body_to_pick(tmp_path: 
 
 @pytest.mark.parametrize(
     ("named", "told", "hint"),
-    [("/dev/null", "is no regular file", None), ("robots", "is a folder", "name the YAML file in it")],
+    [("/dev/null", "is not a regular file", None), ("robots", "is a folder", "name the YAML file in it")],
 )
 def test_what_is_there_and_no_file_is_not_called_absent(
     tmp_path: Path, named: str, told: str, hint: str | None

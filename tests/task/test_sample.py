@@ -13,8 +13,8 @@ from manipcli.pipeline import run_task, verify_log
 from manipcli.record.reading import open_recording
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
+from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
-from manipcli.task.sample import load_task
 from manipcli.task.task import Task
 
 ROOT = Path(__file__).parents[2]

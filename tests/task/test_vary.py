@@ -14,7 +14,7 @@ from scipy import stats
 
 from manipcli.core.errors import InvalidInput
 from manipcli.judge.drawn import Drawn, Number
-from manipcli.task.sample import load_task
+from manipcli.task.load_task import load_task
 from manipcli.task.vary import bind, deviate, draw
 
 ROOT = Path(__file__).parents[2]

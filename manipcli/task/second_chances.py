@@ -1,0 +1,169 @@
+"""Every error of a task or robot file at once, after loading it has failed.
+
+A file that is refused is read once more without its faulty values, so that one mistake hides no other: names are
+checked against what is left, or against placeholders. Nothing here is ever planned or simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.description.packages import Packages
+from manipcli.model.build_robot import build_robot
+from manipcli.model.robot import RobotModel
+from manipcli.scene.build_scene import build_scene
+from manipcli.scene.scene_names import misnamed
+from manipcli.spec import load
+from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.spec.located import Located, apart
+from manipcli.spec.partial.partial_robot import is_whole
+from manipcli.spec.robot import RobotSpec
+from manipcli.spec.task import TaskSpec
+from manipcli.task.changed_files import Files, out_of_range
+from manipcli.task.consistency import disagreements, not_there
+from manipcli.task.named_file import named_file
+from manipcli.task.placeholders import named_robot, named_scene
+from manipcli.task.vary import bind
+from manipcli.task.vocabulary import task_spec
+
+T = TypeVar("T")
+
+
+def every_finding(
+    path: Path,
+    first: InvalidInput,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> InvalidInput:
+    """All errors of a task and of the files it names, in the order of files and lines.
+
+    Args:
+        path: the task file.
+        first: why loading it stopped.
+        overrides, seed, package_path, allow_outside: as it was loaded.
+    """
+    errors = _Errors()
+    model = task_spec()
+    task = errors.of(lambda: load.load_task(path, model=model, overrides=overrides, seed=seed))
+    partial = task or load.salvage_task(path, model=model, overrides=overrides, seed=seed)
+    if partial is None:
+        return errors.refusal(first)
+    errors.unknown = partial.source.unknown
+    if task is None:
+        errors.found += (*partial.findings, *misnamed(partial.spec, lambda loc: partial.place(*loc)))
+    robot_path = _named(errors, partial, path, "robot")
+    controllers_path = _named(errors, partial, path, "controllers")
+    robot = _Robot.read(robot_path, errors, overrides, package_path, allow_outside)
+    controllers_file, partial_controllers = _controllers(errors, controllers_path, overrides)
+    scene = None
+    if task is not None:
+        packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
+        scene = errors.of(lambda: build_scene(task.spec, place=lambda loc: task.place(*loc), packages=packages))
+    known_scene = scene or named_scene(partial.spec)
+    if robot.model is not None:
+        found = disagreements(partial, partial_controllers, robot.model, known_scene)
+        errors.found += [finding for finding in found if finding.severity == "error"]
+    else:
+        errors.found += not_there(partial, named_robot(partial.spec), known_scene)
+    if task is not None and robot.file is not None and controllers_file is not None:
+        varied, wrong = bind(task, robot.file, controllers_file)
+        errors.found += (*wrong, *out_of_range(Files(task, robot.file, controllers_file), varied))
+    return errors.refusal(first)
+
+
+def every_robot_finding(
+    path: Path,
+    first: InvalidInput,
+    *,
+    overrides: Sequence[str] = (),
+    package_path: Sequence[Path] = (),
+    allow_outside: bool = False,
+) -> InvalidInput:
+    """All errors of a robot file and of its descriptions; arguments as of `every_finding`."""
+    errors = _Errors()
+    _Robot.read(path, errors, overrides, package_path, allow_outside)
+    return errors.refusal(first)
+
+
+class _Errors:
+    """Findings of several stages. `unknown`: places whose value is not known, as of `Source`."""
+
+    def __init__(self) -> None:
+        self.found: list[Finding] = []
+        self.unknown: frozenset[Place] = frozenset()
+
+    def of(self, stage: Callable[[], T]) -> T | None:
+        """The result of a stage, or None where it refused its input."""
+        try:
+            return stage()
+        except InvalidInput as invalid:
+            self.found += invalid.findings
+            return None
+
+    def refusal(self, first: InvalidInput) -> InvalidInput:
+        """All findings in the order of files and lines; `first` where reading once more finds none."""
+        if not self.found:
+            return first
+        files = list(dict.fromkeys(finding.place.file for finding in self.found if finding.place is not None))
+
+        def position(finding: Finding) -> tuple[int, int, int]:
+            place = finding.place
+            return (-1, 0, 0) if place is None else (files.index(place.file), place.line, place.column)
+
+        return InvalidInput(sorted(apart(self.found, self.unknown), key=position))
+
+
+@dataclass(frozen=True, slots=True)
+class _Robot:
+    """A robot file and its robot. `file` is None where the file is refused; `model` is None where a name that others
+    use may be missing from it."""
+
+    file: Located[RobotSpec] | None
+    model: RobotModel | None
+
+    @classmethod
+    def read(
+        cls,
+        path: Path | None,
+        errors: _Errors,
+        overrides: Sequence[str],
+        package_path: Sequence[Path],
+        allow_outside: bool,
+    ) -> _Robot:
+        if path is None:
+            return cls(None, None)
+        file = errors.of(lambda: load.load_robot(path, overrides=overrides))
+        partial = file or load.salvage_robot_file(path, overrides=overrides)
+        if partial is None:
+            return cls(None, None)
+        building = _Errors()
+        built = building.of(
+            lambda: build_robot(
+                partial.spec, file=path, package_path=package_path, allow_outside=allow_outside, source=partial.source
+            )
+        )
+        # Notes on values that are not stated may be about values that were left out.
+        errors.found += [one for one in building.found if file is not None or one.severity == "error"]
+        return cls(file, built[0] if built is not None and is_whole(partial) else None)
+
+
+def _named(errors: _Errors, task: Located[TaskSpec], path: Path, key: str) -> Path | None:
+    """The file that the task names; None where it is missing, or the name itself was refused."""
+    return errors.of(lambda: named_file(task, path, key)) if task.source.untouched(key) else None
+
+
+def _controllers(
+    errors: _Errors, path: Path | None, overrides: Sequence[str]
+) -> tuple[Located[ControllersSpec] | None, Located[ControllersSpec] | None]:
+    """The controllers file, and what is left of it where it is refused."""
+    if path is None:
+        return None, None
+    file = errors.of(lambda: load.load_controllers(path, overrides=overrides))
+    return file, file or load.salvage_controllers_file(path, overrides=overrides)
