@@ -44,9 +44,7 @@ PASSED = Verdict(
 
 
 def _report(verdict: Verdict) -> RunReport:
-    return RunReport(
-        verdict, Timing(0.1, 0.2, 2.5, 0.2), log="runs/pour.mcap"
-    )
+    return RunReport(verdict, Timing(0.1, 0.2, 2.5, 0.2), log="runs/pour.mcap")
 
 
 @pytest.fixture

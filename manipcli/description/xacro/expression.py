@@ -15,16 +15,7 @@ from typing import Final, cast
 
 from manipcli.core.text import did_you_mean
 from manipcli.description.bounds import bounds
-from manipcli.description.xacro.expression_values import (
-    Beyond,
-    Clock,
-    Held,
-    Refused,
-    Value,
-    bounded,
-    size_of,
-    too_large,
-)
+from manipcli.description.xacro.values import Beyond, Clock, Held, Refused, Value, bounded, size_of, too_large
 
 MAX_EXPRESSION: Final = 10_000
 MAX_EXPONENT: Final = 64

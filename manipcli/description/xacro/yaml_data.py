@@ -10,7 +10,7 @@ from typing import Final
 from manipcli.core.errors import Place
 from manipcli.description.bounds import bounds
 from manipcli.description.located_xml import shown_path
-from manipcli.description.xacro.expression_values import Beyond, Clock, Refused, too_large
+from manipcli.description.xacro.values import Beyond, Clock, Refused, too_large
 
 MAX_NUMBER: Final = 400
 _PLAIN: Final = "load_yaml reads plain data: numbers, text, lists and mappings"

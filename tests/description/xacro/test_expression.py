@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manipcli.description.xacro.expression import Evaluator
-from manipcli.description.xacro.expression_values import Beyond, Refused, math_symbols, python_symbols
+from manipcli.description.xacro.values import Beyond, Refused, math_symbols, python_symbols
 
 OWN = {"x": 3, "text": "a b", "data": {"joint": {"lower": -1.5}}, "_y": 2.0}
 NAMES = {**math_symbols(), **python_symbols(), **OWN}
