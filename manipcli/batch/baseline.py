@@ -121,8 +121,8 @@ def measured(verdict: Verdict, log: Path) -> Measures:
         log: of the run.
     """
     from manipcli.flow.log import recorded_robot
+    from manipcli.judge.measures.step_measures import step_measures
     from manipcli.record.reading import open_recording
-    from manipcli.report.step_measures import step_measures
 
     found: Measures = {("duration",): Measure(verdict.simulated_time, "s")}
     for step in verdict.steps:

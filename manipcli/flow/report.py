@@ -23,6 +23,7 @@ from manipcli.flow.log import (
 )
 from manipcli.flow.replay import open_playback
 from manipcli.flow.vocabulary import task_spec
+from manipcli.judge.measures.facts import run_facts
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.conditions.at_pose import SLIDE, AtPoseSpec
@@ -33,7 +34,6 @@ from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback
 from manipcli.replay.shots import Shots, telling
-from manipcli.report.facts import run_facts
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong

@@ -6,8 +6,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
-from manipcli.report.facts import JointFacts, RunFacts, Use
-from manipcli.report.holds import HoldFacts, Slip, Spread
+from manipcli.judge.measures.facts import JointFacts, RunFacts, Use
+from manipcli.judge.measures.holds import HoldFacts, Slip, Spread
 from manipcli.report.html_parts import heading, meter, number, of_limit, percent, seek, table
 from manipcli.report.markup import Markup, element, joined
 from manipcli.report.quantity import quantity

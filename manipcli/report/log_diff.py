@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.text import number_of
+from manipcli.judge.measures.step_measures import StepMeasures
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
 from manipcli.record.compare import Comparison
@@ -21,7 +22,6 @@ from manipcli.report.comparison import (
 )
 from manipcli.report.json import Json, dumps, number
 from manipcli.report.quantity import quantity
-from manipcli.report.step_measures import StepMeasures
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
 

@@ -13,12 +13,12 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen, wrapped
 from manipcli.judge.cuts import Cuts
+from manipcli.judge.measures.holds import HoldFacts, HoldMeter, find_holds
+from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.record.recording import Recording, Span
-from manipcli.replay.sampling import references
-from manipcli.report.holds import HoldFacts, HoldMeter, find_holds
 
 BUCKETS = 240
 """Parts of the run of each of which the largest error is kept."""

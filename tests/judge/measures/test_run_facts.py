@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform, frozen
+from manipcli.judge.measures.facts import RunFacts, run_facts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import Box, Geometry, Joint, JointLimits, Link, RobotModel, Tool
 from manipcli.model.scene import Body, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
-from manipcli.report.facts import RunFacts, run_facts
 
 PERIOD = 0.001
 OMEGA = 0.5
