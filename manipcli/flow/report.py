@@ -233,7 +233,7 @@ def limit_of(spec: Model, unit: str) -> float | None:
     """
     match spec:
         case SlipSpec() | UnmovedSpec() if unit == "rad":
-            return spec.turn
+            return spec.rotation
         case AtPoseSpec() if unit == "m":
             return spec.slide or SLIDE
         case ContactForceSpec(above=float()):

@@ -31,7 +31,7 @@ def grasps(facts: RunFacts) -> Markup | None:
                 _forces(hold),
                 element("small", links),
                 _slip(hold.slip, "m"),
-                _slip(hold.turn, "rad"),
+                _slip(hold.rotation, "rad"),
                 seek(one.grasped),
             )
         )
@@ -42,7 +42,7 @@ def grasps(facts: RunFacts) -> Markup | None:
     return element(
         "section",
         heading("grasps", "Grasps", about),
-        table(("object", "contact force", "links", "slip", "turn", "from"), rows, stacks=True),
+        table(("object", "contact force", "links", "slip", "rotation", "from"), rows, stacks=True),
     )
 
 
