@@ -2,35 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from manipcli.flow.load import load_task
-
-
-@dataclass(frozen=True, slots=True)
-class ControllerRow:
-    """One controller, at the start of a task.
-
-    Attributes:
-        name, type: as in the controllers file.
-        active: whether it is, at the start.
-        joints: that it commands or reads.
-        interfaces: that it claims of each of its joints while it is active.
-        update_rate: [Hz].
-    """
-
-    name: str
-    type: str
-    active: bool
-    joints: tuple[str, ...]
-    interfaces: tuple[str, ...]
-    update_rate: float
-
-    @property
-    def wanted(self) -> tuple[str, ...]:
-        """The `joint/interface` that it claims while it is active."""
-        return tuple(f"{joint}/{interface}" for joint in self.joints for interface in self.interfaces)
+from manipcli.report.controllers import ControllerRow
 
 
 def controllers_of(path: Path) -> tuple[ControllerRow, ...]:

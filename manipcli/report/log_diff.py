@@ -15,12 +15,11 @@ from manipcli.report.comparison import (
     Names,
     counted,
     entries_lines,
-    entry_object,
     first_text,
     messages_object,
     topics_table,
 )
-from manipcli.report.json import Json, dumps, number
+from manipcli.report.json import Json, dumps, number, plain
 from manipcli.report.quantity import quantity
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
@@ -135,7 +134,7 @@ def render_json(made: LogDiff) -> str:
             "same": made.same,
             "tolerance": made.tolerance,
             "notes": list(made.notes),
-            "made_from": [entry_object(one) for one in made.entries],
+            "made_from": plain(made.entries),
             "runs": None if made.sides is None else [_side_object(side) for side in made.sides],
             "steps": [] if made.sides is None else [_pair_object(a, b) for a, b in _paired(*made.sides)],
             **messages_object(made.messages),
