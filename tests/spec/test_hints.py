@@ -8,6 +8,9 @@ import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.vocabulary import task_spec
+from manipcli.model.conditions import CONDITIONS
+from manipcli.plan.steps import STEPS
+from manipcli.spec.base import Model
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.yaml import parse
 
@@ -198,6 +201,12 @@ def test_a_key_that_was_renamed_is_refused_with_its_new_name(block: str, key: st
     assert finding.place is not None and finding.place.column == column
     assert finding.hint == f"write `{now}`, as `{key}` is called now"
     load_task_text(TASK + block.replace(f"{key}: ", f"{now}: "), "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize("spec", [member.spec for seam in (STEPS, CONDITIONS) for member in seam])
+def test_a_renamed_key_leads_to_one_that_there_is(spec: type[Model]) -> None:
+    assert not spec.renamed.keys() & spec.model_fields.keys()
+    assert set(spec.renamed.values()) <= spec.model_fields.keys()
 
 
 def test_of_a_controller_of_any_type_only_the_type_is_asked_for() -> None:
