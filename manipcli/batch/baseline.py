@@ -120,9 +120,9 @@ def measured(verdict: Verdict, log: Path) -> Measures:
         verdict: of the run.
         log: of the run.
     """
+    from manipcli.judge.measures.step_measures import step_measures
     from manipcli.logs.recorded_files import recorded_robot
     from manipcli.record.reading import open_recording
-    from manipcli.report.step_measures import step_measures
 
     found: Measures = {("duration",): Measure(verdict.simulated_time, "s")}
     for step in verdict.steps:

@@ -15,7 +15,7 @@ import pytest
 
 if TYPE_CHECKING:
     from manipcli.batch.job import Settings
-    from manipcli.report.judged_run import JudgedRun
+    from manipcli.report.run_report import JudgedRun
     from manipcli.report.suite import Case, CaseReport
 
 SUFFIXES = (".yaml", ".yml")
@@ -186,7 +186,7 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
 
         from manipcli.batch.discovery import read_case, shown_path
         from manipcli.core.errors import InvalidInput
-        from manipcli.report.judged_run import JudgedRun
+        from manipcli.report.run_report import JudgedRun
         from manipcli.report.suite_text import render_case
 
         beside, below = request.path.parent / path, request.config.rootpath / path

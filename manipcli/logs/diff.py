@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
+from manipcli.judge.measures.step_measures import step_measures
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_robot
@@ -14,7 +15,6 @@ from manipcli.record.compare_entries import compare_entries
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.log_diff import LogDiff, LogSide
-from manipcli.report.step_measures import step_measures
 
 OUTCOME = ("verdict", JOINTS, ACTUATORS, LIMITS)
 """Metadata that says what came of a run, which is judged and measured anew."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform
+from manipcli.judge.measures.reference import references
 from manipcli.judge.steps import step_outcomes
 from manipcli.logs.recorded_files import recorded_robot
 from manipcli.model.kinematics import Kinematics
@@ -25,7 +26,6 @@ from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
 from manipcli.record.snapshot import snapshot
 from manipcli.record.units import joint_units
-from manipcli.replay.sampling import references
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 
 

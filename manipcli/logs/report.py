@@ -15,6 +15,7 @@ from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.conditions.members.moved import UnmovedSpec
 from manipcli.conditions.members.slip import SlipSpec
 from manipcli.core.version import __version__
+from manipcli.judge.measures.facts import run_facts
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
@@ -25,7 +26,6 @@ from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback
 from manipcli.replay.shots import Shots, telling
-from manipcli.report.facts import run_facts
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
@@ -227,7 +227,7 @@ def limit_of(spec: Model, unit: str) -> float | None:
     """
     match spec:
         case SlipSpec() | UnmovedSpec() if unit == "rad":
-            return spec.turn
+            return spec.rotation
         case AtPoseSpec() if unit == "m":
             return spec.slide or SLIDE
         case ContactForceSpec(above=float()):

@@ -59,7 +59,7 @@ def refuse_endless(positions: Array, limits: MotionLimits, duration: float = 0.0
     word, joint = ("velocity", "acceleration", "jerk")[which], limits.names[k]
     raise NotPlannable(
         f"with the {word} limit of joint '{joint}' the motion takes more than {LONGEST:g} s",
-        hint="raise that limit, or the `speed` of the step; no motion is planned that takes longer",
+        hint="raise that limit, or the `velocity_scaling` of the step; no motion is planned that takes longer",
     )
 
 

@@ -84,7 +84,8 @@ def throttled(joint: Joint, place: Place, needed: Array, velocity: Array) -> Fin
     unit, at = joint.effort_unit, f"{abs(velocity[worst]):.3g} {joint.unit}/s"
     message = f"{joint.name}: at {at} the planned motions need {abs(needed[worst]):.3g} {unit}; the "
     message += f"soft limit of its velocity (k_velocity {digits(soft.k_velocity)}) leaves {left[worst]:.3g} {unit}"
-    hint = f"it will lag behind; a lower `speed` of the step, or limits.{joint.name}.k_velocity: 0 in the robot file"
+    hint = "it will lag behind; a lower `velocity_scaling` of the step, or "
+    hint += f"limits.{joint.name}.k_velocity: 0 in the robot file"
     return Finding("CTRL169", message, place, hint, "warning")
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen
+from manipcli.judge.measures.reference import references
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
-from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, joined
+from manipcli.record.recording import ContactSnapshot, Recording, Span, joined
 from manipcli.replay.playback import PlotTable, force_table, joint_tables
 
 
@@ -107,19 +108,6 @@ class _Contacts:
 
     def finish(self) -> tuple[tuple[Contact, ...], ...]:
         return tuple(self._found)
-
-
-def references(traces: Sequence[ControllerTrace], joints: Sequence[str], count: int) -> Array:
-    """(T, n) the reference position of each joint from the controller that moves it then; NaN where none does."""
-    found = np.full((count, len(joints)), np.nan)
-    index = {name: k for k, name in enumerate(joints)}
-    for trace in traces:
-        columns = [index[name] for name in trace.joints if name in index]
-        mine = [k for k, name in enumerate(trace.joints) if name in index]
-        led = trace.reference_position[:, mine]  # NaN while the controller is not active
-        found[:, columns] = np.where(np.isnan(led), found[:, columns], led)
-    found.flags.writeable = False
-    return found
 
 
 def plot_tables(recording: Recording, robot: RobotModel | None) -> tuple[PlotTable, ...]:

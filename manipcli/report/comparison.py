@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from manipcli.core.text import number_of, shorten, shorten_apart
 from manipcli.record.compare import Comparison, Difference, TopicComparison
 from manipcli.record.compare_entries import EntryDifference
-from manipcli.report.json import Json, number
+from manipcli.report.json import Json, picked
 from manipcli.report.table import table
 
 Names = tuple[str, str]
@@ -78,41 +78,27 @@ def entries_lines(entries: Sequence[EntryDifference], names: Names) -> list[str]
     return lines
 
 
-def topic_object(one: TopicComparison) -> Json:
-    return {
-        "name": one.name,
-        "type": one.type,
-        "messages": list(one.messages),
-        "different": one.different,
-        "only": list(one.only),
-        "first": None if one.first is None else difference_object(one.first),
-        "not_compared": one.why or None,
-    }
-
-
-def difference_object(one: Difference) -> Json:
-    """Values as they are: not rounded, for a difference may be small."""
-    return {
-        "time": number(one.time),
-        "topic": one.topic,
-        "field": one.field,
-        "message": one.index,
-        "a": _plain(one.a),
-        "b": _plain(one.b),
-        "by": _plain(one.by),
-    }
-
-
 def messages_object(found: Comparison) -> dict[str, Json]:
     return {
         "messages": found.messages,
-        "first": None if found.first is None else difference_object(found.first),
-        "topics": [topic_object(one) for one in found.topics],
+        "first": _difference(found.first),
+        "topics": [
+            {
+                **picked(one, "name type messages different only"),
+                "first": _difference(one.first),
+                "not_compared": one.why or None,
+            }
+            for one in found.topics
+        ],
     }
 
 
-def entry_object(one: EntryDifference) -> Json:
-    return {"kind": one.kind, "name": one.name, "where": one.where, "a": one.a, "b": one.b, "count": one.count}
+def _difference(one: Difference | None) -> Json:
+    """Values as they are: not rounded, for a difference may be small."""
+    if one is None:
+        return None
+    exact = {key: _plain(getattr(one, key)) for key in ("a", "b", "by")}
+    return {**picked(one, "time topic field"), "message": one.index, **exact}
 
 
 def _plain(value: float | int | str | None) -> Json:

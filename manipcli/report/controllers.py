@@ -3,69 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
-from manipcli.report.json import dumps
+from manipcli.report.json import dumps, picked
 from manipcli.report.table import table
+from manipcli.task.controller_rows import ControllerRow
 
 MOST = 3
 """So many joints of a controller are named in the table, and the last."""
 
 
-class Row(Protocol):
-    """A controller, at the start of a task."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def type(self) -> str: ...
-    @property
-    def active(self) -> bool: ...
-    @property
-    def joints(self) -> tuple[str, ...]: ...
-    @property
-    def interfaces(self) -> tuple[str, ...]: ...
-    @property
-    def wanted(self) -> tuple[str, ...]: ...
-    @property
-    def update_rate(self) -> float: ...
-
-
-def render_text(rows: Sequence[Row]) -> str:
+def render_text(rows: Sequence[ControllerRow]) -> str:
     """A line a controller."""
     return table(
         ("controller", "type", "at the start", "rate", "claims"),
-        [(row.name, row.type, _state(row), f"{row.update_rate:g} Hz", _claims(row)) for row in rows],
+        [(row.name, row.type, row.state, f"{row.update_rate:g} Hz", _claims(row)) for row in rows],
         right=("rate",),
     )
 
 
-def render_json(task: str, rows: Sequence[Row]) -> str:
+def render_json(task: str, rows: Sequence[ControllerRow]) -> str:
     """`interfaces` are those that a controller claims while it is active, `claimed` those that it does at the start."""
-    return dumps(
+    controllers = [
         {
-            "task": task,
-            "controllers": [
-                {
-                    "name": row.name,
-                    "type": row.type,
-                    "state": _state(row),
-                    "joints": list(row.joints),
-                    "interfaces": list(row.wanted),
-                    "claimed": list(row.wanted if row.active else ()),
-                    "update_rate": row.update_rate,
-                }
-                for row in rows
-            ],
+            **picked(row, "name type state joints"),
+            "interfaces": list(row.wanted),
+            "claimed": list(row.wanted if row.active else ()),
+            "update_rate": row.update_rate,
         }
-    )
+        for row in rows
+    ]
+    return dumps({"task": task, "controllers": controllers})
 
 
-def _state(row: Row) -> str:
-    return "active" if row.active else "inactive"
-
-
-def _claims(row: Row) -> str:
+def _claims(row: ControllerRow) -> str:
     if not row.wanted:
         return "nothing"
     names = list(row.joints)

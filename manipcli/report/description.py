@@ -11,7 +11,7 @@ from manipcli.core.text import listed, number_of, shorten
 from manipcli.description.lint.check import Check
 from manipcli.description.lint.guess_groups import GuessedGroup
 from manipcli.description.lint.summary import Summary
-from manipcli.report.json import Json, dumps, finding_object
+from manipcli.report.json import Json, dumps, picked, plain
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, describe
 
@@ -121,7 +121,7 @@ def render_json(
         {
             "verdict": "passed" if passed else "failed",
             "files": [file],
-            "findings": [finding_object(finding) for finding in findings],
+            "findings": plain(findings),
             "left_out": dict(left_out),
             "summary": _summary_object(summary) if summary is not None else None,
             "tree": list(tree),
@@ -133,28 +133,17 @@ def _summary_object(summary: Summary) -> Mapping[str, Json]:
     return {
         "name": summary.name,
         "root": summary.root or None,
-        "links": summary.links,
-        "joints": summary.joints,
+        **picked(summary, "links joints"),
         "joint_types": {kind or "": number for kind, number in summary.types},
         "moving_joints": summary.moving,
         "dof": summary.dof,
         "mimic_joints": summary.mimics,
         "transmissions": summary.transmissions,
-        "groups": [
-            {
-                "kind": group.kind,
-                "joints": list(group.joints),
-                "mimics": list(group.mimics),
-                "base": group.base,
-                "tip": group.tip or None,
-            }
-            for group in summary.groups
-        ],
+        "groups": [{**picked(group, "kind joints mimics base"), "tip": group.tip or None} for group in summary.groups],
         "mass": _finite(summary.mass),
         "moving_links_without_mass": summary.massless,
         "reach": _finite(summary.reach),
-        "meshes": summary.meshes,
-        "meshes_found": summary.meshes_found,
+        **picked(summary, "meshes meshes_found"),
     }
 
 

@@ -11,37 +11,26 @@ from manipcli.report.html_parts import heading
 from manipcli.report.markup import Markup, document, element, joined
 from manipcli.report.run_page import RunPage
 
-_NAMES = (
-    ("cause", "Cause"),
-    ("expectations", "Expectations"),
-    ("warnings", "Warnings"),
-    ("replay", "Replay"),
-    ("steps", "Steps"),
-    ("grasps", "Grasps"),
-    ("joints", "Joints"),
-    ("energy", "Energy"),
-    ("files", "Files"),
-    ("provenance", "Provenance"),
-)
-
 
 def render_page(page: RunPage) -> str:
     """The file. The same value gives the same bytes."""
     facts = page.facts
+    measured = (numbers.grasps, numbers.joints, numbers.energy)
+    grasps, joints, energy = (section(facts) if facts is not None else None for section in measured)
     shown = {
-        "cause": sections.causes(page),
-        "expectations": sections.expectations(page),
-        "warnings": sections.warnings(page),
-        "replay": _replay(page),
-        "steps": sections.steps(page),
-        "grasps": numbers.grasps(facts) if facts is not None else None,
-        "joints": numbers.joints(facts) if facts is not None else None,
-        "energy": numbers.energy(facts) if facts is not None else None,
-        "files": sections.sources(page),
-        "provenance": sections.provenance(page),
+        "Cause": sections.causes(page),
+        "Expectations": sections.expectations(page),
+        "Warnings": sections.warnings(page),
+        "Replay": _replay(page),
+        "Steps": sections.steps(page),
+        "Grasps": grasps,
+        "Joints": joints,
+        "Energy": energy,
+        "Files": sections.sources(page),
+        "Provenance": sections.provenance(page),
     }
     back = element("a", "All runs", href=page.index) if page.index else None
-    links = (element("a", word, href=f"#{name}") for name, word in _NAMES if shown[name])
+    links = (element("a", name, href=f"#{name.lower()}") for name, section in shown.items() if section)
     own = files("manipcli.report").joinpath("page")
     style, script = (Markup(own.joinpath(name).read_text("utf-8")) for name in ("report.css", "report.js"))
     verdict = page.verdict

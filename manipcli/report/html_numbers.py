@@ -6,8 +6,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
-from manipcli.report.facts import JointFacts, RunFacts, Use
-from manipcli.report.holds import HoldFacts, Slip, Spread
+from manipcli.judge.measures.facts import JointFacts, RunFacts, Use
+from manipcli.judge.measures.holds import HoldFacts, Slip, Spread
 from manipcli.report.html_parts import heading, meter, number, of_limit, percent, seek, table
 from manipcli.report.markup import Markup, element, joined
 from manipcli.report.quantity import quantity
@@ -31,7 +31,7 @@ def grasps(facts: RunFacts) -> Markup | None:
                 _forces(hold),
                 element("small", links),
                 _slip(hold.slip, "m"),
-                _slip(hold.turn, "rad"),
+                _slip(hold.rotation, "rad"),
                 seek(one.grasped),
             )
         )
@@ -42,7 +42,7 @@ def grasps(facts: RunFacts) -> Markup | None:
     return element(
         "section",
         heading("grasps", "Grasps", about),
-        table(("object", "contact force", "links", "slip", "turn", "from"), rows, stacks=True),
+        table(("object", "contact force", "links", "slip", "rotation", "from"), rows, stacks=True),
     )
 
 

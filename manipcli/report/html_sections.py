@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from manipcli.core.text import number_of
 from manipcli.judge.drawn import value_text
+from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.replay.playback import Phase
-from manipcli.report.facts import RunFacts
 from manipcli.report.html_parts import (
     anchor,
     heading,

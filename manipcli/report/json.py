@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 
 from manipcli.core.errors import Finding
 from manipcli.judge.cuts import Cuts
-from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
@@ -21,35 +21,20 @@ Json = None | bool | int | float | str | Sequence["Json"] | Mapping[str, "Json"]
 
 def render_run(report: RunReport) -> str:
     """A run: its verdict, its log and its times."""
-    timing = report.timing
-    return dumps(
-        _object(
-            verdict=report.verdict.verdict,
-            judged=report.verdict,
-            wall_time=report.wall_time,
-            real_time_factor=report.real_time_factor,
-            log=report.log,
-            timing={
-                "load": number(timing.load),
-                "plan": number(timing.plan),
-                "simulate": number(timing.simulate),
-                "judge": number(timing.judge),
-            },
-            errors=(*report.verdict.errors, *report.warnings),
-        )
-    )
+    errors = (*report.verdict.errors, *report.warnings)
+    return dumps(_object(report.verdict, errors, **picked(report, "wall_time real_time_factor log timing")))
 
 
 def render_verdict(verdict: Verdict, log: str | None = None) -> str:
     """A log, judged; without one, a task that cannot be planned."""
-    return dumps(_object(verdict=verdict.verdict, judged=verdict, log=log, errors=verdict.errors))
+    return dumps(_object(verdict, verdict.errors, log=log))
 
 
 def render_errors(
     findings: Sequence[Finding], verdict: VerdictWord = "error", *, known: Mapping[str, Json] | None = None
 ) -> str:
     """A command that ended before there was anything to judge; `known`: what it knew of a run by then."""
-    return dumps({**_object(verdict=verdict, errors=findings), **(known or {})})
+    return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
 def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
@@ -59,7 +44,7 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
         {
             "verdict": "failed" if failed else "passed",
             "files": list(files),
-            "findings": [finding_object(finding) for finding in findings],
+            "findings": plain(findings),
         }
     )
 
@@ -69,48 +54,40 @@ def dumps(value: Json) -> str:
     return json.dumps(value, indent=2, allow_nan=False)
 
 
-def _object(
-    *,
-    verdict: VerdictWord,
-    judged: Verdict | None = None,
-    wall_time: float | None = None,
-    real_time_factor: float | None = None,
-    log: str | None = None,
-    timing: Json = None,
-    errors: Sequence[Finding],
-) -> dict[str, Json]:
-    """The one object, its keys always there."""
-    return {
-        "task": judged.task if judged is not None else None,
-        "verdict": verdict,
-        "text": judged.text if judged is not None else "",
-        "seed": judged.seed if judged is not None else None,
-        "engine": judged.engine if judged is not None else None,
-        "sample": _sample(judged.drawn) if judged is not None and judged.drawn is not None else None,
-        "simulated_time": number(judged.simulated_time) if judged is not None else None,
-        "wall_time": number(wall_time),
-        "real_time_factor": number(real_time_factor),
-        "log": log,
-        "timing": timing,
-        "saturated": saturated_object(judged.cuts if judged is not None else Cuts()),
-        "steps": [step_object(step) for step in (judged.steps if judged is not None else ())],
-        "expectations": [
-            {
-                "name": expectation.name,
-                "outcome": expectation.outcome,
-                "margin": number(expectation.margin),
-                "unit": expectation.unit,
-                "at": number(expectation.at),
-                "text": expectation.text,
-            }
-            for expectation in (judged.expectations if judged is not None else ())
-        ],
-        "errors": [finding_object(finding) for finding in errors],
-    }
+def plain(value: object) -> Json:
+    """A value as JSON: a dataclass by its fields, numbers as `number`."""
+    if isinstance(value, Finding):
+        return finding_object(value)
+    if isinstance(value, float):
+        return number(value)
+    if value is None or isinstance(value, int | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if is_dataclass(value):
+        return picked(value, " ".join(field.name for field in fields(value)))
+    assert isinstance(value, Sequence)
+    return [plain(one) for one in value]
 
 
-def _sample(drawn: Drawn) -> Json:
-    return {"number": drawn.number, "values": dict(drawn.values)}
+def picked(value: object, keys: str) -> dict[str, Json]:
+    """The attributes of a value that are called as the JSON `keys`, which spaces separate."""
+    return {key: plain(getattr(value, key)) for key in keys.split()}
+
+
+def _object(judged: Verdict | None, errors: Sequence[Finding], **known: Json) -> dict[str, Json]:
+    """The one object, its keys always there and in this order."""
+    empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
+    found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Cuts())}
+    found |= {"steps": [], "expectations": []}
+    if judged is not None:
+        found |= picked(judged, "task verdict text seed engine simulated_time")
+        found["saturated"] = saturated_object(judged.cuts)
+        found["steps"] = [step_object(step) for step in judged.steps]
+        found["expectations"] = [picked(one, "name outcome margin unit at text") for one in judged.expectations]
+        if judged.drawn is not None:
+            found["sample"] = {"number": judged.drawn.number, "values": dict(judged.drawn.values)}
+    return {**found, **known, "errors": plain(errors)}
 
 
 def saturated_object(cuts: Cuts) -> dict[str, Json]:
@@ -127,38 +104,17 @@ def _counted(counts: Mapping[str, int]) -> dict[str, Json]:
 
 
 def step_object(step: StepOutcome) -> dict[str, Json]:
-    return {
-        "id": step.id,
-        "verb": step.verb,
-        "outcome": step.outcome,
-        "started": number(step.started),
-        "ended": number(step.ended),
-        "planned_duration": number(step.planned_duration),
-        "text": step.text,
-        "tolerated": step.tolerated,
-        "attempts": [
-            {
-                "outcome": attempt.outcome,
-                "started": number(attempt.started),
-                "ended": number(attempt.ended),
-                "text": attempt.text,
-            }
-            for attempt in step.attempts
-        ],
-        "replanned": list(step.replanned),
-    }
+    return picked(step, "id verb outcome started ended planned_duration text tolerated attempts replanned")
 
 
 def finding_object(finding: Finding) -> dict[str, Json]:
     place = finding.place
+    written = place is not None and place.line > 0
     return {
-        "severity": finding.severity,
-        "code": finding.code,
+        **picked(finding, "severity code"),
         "file": place.file if place is not None else None,
-        "line": place.line if place is not None and place.line > 0 else None,
-        "column": place.column if place is not None and place.line > 0 else None,
-        "message": finding.message,
-        "hint": finding.hint,
+        **(picked(place, "line column") if written else {"line": None, "column": None}),
+        **picked(finding, "message hint"),
     }
 
 

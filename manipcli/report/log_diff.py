@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from manipcli.core.text import number_of
+from manipcli.judge.measures.step_measures import StepMeasures
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
 from manipcli.record.compare import Comparison
@@ -14,14 +15,12 @@ from manipcli.report.comparison import (
     Names,
     counted,
     entries_lines,
-    entry_object,
     first_text,
     messages_object,
     topics_table,
 )
-from manipcli.report.json import Json, dumps, number
+from manipcli.report.json import Json, dumps, number, plain
 from manipcli.report.quantity import quantity
-from manipcli.report.step_measures import StepMeasures
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS
 
@@ -135,7 +134,7 @@ def render_json(made: LogDiff) -> str:
             "same": made.same,
             "tolerance": made.tolerance,
             "notes": list(made.notes),
-            "made_from": [entry_object(one) for one in made.entries],
+            "made_from": plain(made.entries),
             "runs": None if made.sides is None else [_side_object(side) for side in made.sides],
             "steps": [] if made.sides is None else [_pair_object(a, b) for a, b in _paired(*made.sides)],
             **messages_object(made.messages),

@@ -44,8 +44,8 @@ class Limiting:
 def limiting(trajectory: JointTrajectory, robot: RobotModel) -> Limiting | None:
     """What a motion comes nearest to: the greatest |v| / v_max, |a| / a_max or |da/dt| / j_max of all joints and times.
 
-    A time-optimal motion at full speed uses all of one of them; at `speed: 0.5` half. None where the points carry none
-    of these, or no limit is stated.
+    A time-optimal motion at full speed uses all of one of them; at `velocity_scaling: 0.5` half. None where the
+    points carry none of these, or no limit is stated.
     """
     used: list[Limiting] = []
     jerks = None

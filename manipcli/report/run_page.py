@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from manipcli.core.errors import Finding
+from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.replay.playback import Playback
-from manipcli.report.facts import RunFacts
 
 
 @dataclass(frozen=True, slots=True)

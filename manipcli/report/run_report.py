@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from manipcli.core.errors import ExitCode, Finding
@@ -52,6 +52,30 @@ class RunReport:
     def real_time_factor(self) -> float | None:
         """Simulated time over the wall time of the simulation; None where nothing was simulated."""
         return self.verdict.simulated_time / self.timing.simulate if self.timing.simulate else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JudgedRun(RunReport):
+    """A run, and what `manipcli test` says of it.
+
+    Attributes:
+        passed: whether all that was expected is met, and nothing is worse than the baseline.
+        text: what went wrong and what did not, and where log and picture are.
+        picture: path of the picture of what went wrong, as text; None where nothing did.
+    """
+
+    passed: bool
+    text: str
+    picture: str | None
+
+    @staticmethod
+    def of(run: RunReport, *, passed: bool, text: str, picture: str | None) -> JudgedRun:
+        told = {field.name: getattr(run, field.name) for field in fields(RunReport)}
+        return JudgedRun(**told, passed=passed, text=text, picture=picture)
+
+    def __repr__(self) -> str:
+        """`<passed pour 'runs/pour.mcap'>`: what an assertion shows of it."""
+        return f"<{'passed' if self.passed else 'failed'} {self.verdict.task} {self.log!r}>"
 
 
 def exit_code(verdict: Verdict) -> ExitCode:

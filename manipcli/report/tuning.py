@@ -65,32 +65,20 @@ def _answer(answer: StepAnswer) -> list[str]:
 
 def render_json(robot: str, wish: Wish, joints: Sequence[Tuned], notes: Sequence[str]) -> str:
     """All numbers in SI."""
-    document = {
+    document: dict[str, object] = {
         "robot": robot,
         "bandwidth": wish.bandwidth,
         "damping": wish.damping,
         "period": wish.period,
-        "joints": [_joint(one) for one in joints],
-        "notes": list(notes),
     }
+    document |= {"joints": [_joint(one) for one in joints], "notes": list(notes)}
     return json.dumps(document, indent=2)
 
 
 def _joint(one: Tuned) -> dict[str, object]:
+    keys = "joint controller interface inertia least_inertia p i d i_clamp frequency damping bandwidth margin"
     return {
-        "joint": one.joint,
-        "controller": one.controller,
-        "interface": one.interface,
-        "inertia": one.inertia,
-        "least_inertia": one.least,
-        "p": one.p,
-        "i": one.i,
-        "d": one.d,
-        "i_clamp": one.i_clamp,
-        "frequency": one.frequency,
-        "damping": one.damping,
-        "bandwidth": one.bandwidth,
-        "margin": one.margin,
+        **{key: getattr(one, "least" if key == "least_inertia" else key) for key in keys.split()},
         "limited_by": one.limited_by or None,
         "predicted": _measures(one.predicted),
         "simulated": None if one.simulated is None else _measures(one.simulated),

@@ -13,12 +13,11 @@ from manipcli.report.comparison import (
     Names,
     counted,
     entries_lines,
-    entry_object,
     first_text,
     messages_object,
     topics_table,
 )
-from manipcli.report.json import dumps, finding_object, number
+from manipcli.report.json import dumps, number, plain
 from manipcli.report.text import FAIL, PASS
 
 _NAMES: Names = ("in the log", "again")
@@ -85,9 +84,9 @@ def render_json(made: Verification) -> str:
             "complete": not made.cut,
             "cut": made.cut or None,
             "versions": dict(made.versions),
-            "unlike": [finding_object(finding) for finding in made.unlike],
+            "unlike": plain(made.unlike),
             **messages_object(made.messages),
-            "entries": [entry_object(one) for one in made.entries],
+            "entries": plain(made.entries),
             "wall_time": number(made.wall_time),
         }
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from inspect import cleandoc
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -37,6 +38,9 @@ class Model(BaseModel):
     Its numbers, truth values and texts are strict: pydantic alone would read `true` as 1.0 and `"1.0"` as a number.
     A whole number is still a float where one is wanted, and a list is a tuple.
     """
+
+    renamed: ClassVar[Mapping[str, str]] = {}
+    """Keys of earlier versions, which are refused, and their names now."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

@@ -29,7 +29,7 @@ from manipcli.core.units import (
     format_quantity,
     parse_quantity,
 )
-from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode, dotted
+from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, dotted, mapped
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
 NAME = re.compile(r"[A-Za-z_]\w*")
@@ -209,7 +209,7 @@ def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list
         work.declared = list(block.entries)
         work.below = list(block.entries)
         for name, entry in block.entries.items():
-            node = work.node(entry.node, ("params", name))
+            node = mapped(entry.node, work.computed, ("params", name))
             work.below.remove(name)
             entries[name] = Entry(entry.key_place, node)
             if isinstance(node, ScalarNode) and node.place not in work.refused:
@@ -218,7 +218,7 @@ def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list
                 work.lost.add(name)
         root = root.with_entry("params", Entry(root.entries["params"].key_place, MappingNode(entries, block.place)))
     done = {
-        key: entry if key == "params" else Entry(entry.key_place, work.node(entry.node, (key,)))
+        key: entry if key == "params" else Entry(entry.key_place, mapped(entry.node, work.computed, (key,)))
         for key, entry in root.entries.items()
     }
     return MappingNode(done, root.place), work.findings, frozenset(work.unknown)
@@ -237,12 +237,7 @@ class _Substitution:
         self.refused = set(refused)
         self.unknown: set[Place] = set()
 
-    def node(self, node: Node, path: Loc) -> Node:
-        if isinstance(node, MappingNode):
-            entries = {k: Entry(e.key_place, self.node(e.node, (*path, k))) for k, e in node.entries.items()}
-            return MappingNode(entries, node.place)
-        if isinstance(node, SequenceNode):
-            return SequenceNode(tuple(self.node(item, (*path, k)) for k, item in enumerate(node.items)), node.place)
+    def computed(self, node: ScalarNode, path: Loc) -> ScalarNode:
         if not isinstance(node.value, str) or "$" not in node.value:
             return node
         if not is_expression(node.value):

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean, nearest
 from manipcli.core.units import ANGLE, LENGTH, NUMBER
+from manipcli.spec.base import Model
 from manipcli.spec.quantity import Unit
 from manipcli.spec.source import shape
 from manipcli.spec.source.tree import Node, ScalarNode
@@ -36,8 +37,11 @@ def other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str
 
 
 def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> str | None:
-    """The block around it that knows the key, else the nearest of the keys that are known where it stands."""
+    """The key's new name, the block around it that knows it, or the nearest of the keys that are known there."""
     key = str(path[-1])
+    for kind in shape.at(model, path[:-1], tags):
+        if isinstance(kind, type) and issubclass(kind, Model) and key in kind.renamed:
+            return f"write `{kind.renamed[key]}`, as `{key}` is called now"
     for k in range(len(path) - 2, 0, -1):
         if key in shape.keys_of(shape.at(model, path[:k], tags)):
             return f"`{key}` stands beside `{path[k]}`, not below it"

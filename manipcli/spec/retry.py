@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.spec.expression import escaped, no_params, substitute
 from manipcli.spec.located import Located, validate
-from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, child, node_at
+from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, child, mapped, node_at
 from manipcli.spec.task import StepSpec, TaskSpec
 
 
@@ -23,7 +22,7 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     changed = node_at(source.root, ("steps", index, "on_fail", "with"))
     if step.retry is None or not step.retry.with_ or not isinstance(changed, MappingNode):
         return step
-    root = _written(source.root)
+    root = mapped(source.root, _written)
     assert isinstance(root, MappingNode)
     params = child(root, "params")
     entries = {} if not isinstance(params, MappingNode) else dict(params.entries)
@@ -33,7 +32,7 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
             path = ("steps", index, "on_fail", "with", name)
             hint = did_you_mean(name, entries, kind="params") or no_params(name)
             told.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
-        entries[name] = Entry(entry.key_place, _escaped(entry.node))
+        entries[name] = Entry(entry.key_place, mapped(entry.node, _escaped))
     block = Entry(changed.place, MappingNode(entries, changed.place))
     changed_root = MappingNode({"params": block, **root.without("params").entries}, root.place)
     again, findings, unknown = substitute(changed_root)
@@ -44,38 +43,27 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
 def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
     """What was written, by its path, where a step that is tried again with other parameters needs it."""
     steps = [k for k, step in enumerate(file.spec.steps) if step.retry is not None and step.retry.with_]
-    if not steps:
-        return {}
+    found: dict[Loc, str] = {}
+
+    def note(node: ScalarNode, path: Loc) -> Node:
+        if node.written is not None and path[2:3] != ("on_fail",):
+            found[path] = node.written
+        return node
+
     root = file.source.root
-    found = dict(_expressions(child(root, "params"), ("params",)))
+    params = child(root, "params") if steps else None
+    if params is not None:
+        mapped(params, note, ("params",))
     for k in steps:
-        at: Loc = ("steps", k)
-        found.update((path, text) for path, text in _expressions(node_at(root, at), at) if path[2] != "on_fail")
+        mapped(node_at(root, ("steps", k)), note, ("steps", k))
     return found
 
 
-def _expressions(node: Node | None, path: Loc) -> Iterator[tuple[Loc, str]]:
-    if isinstance(node, MappingNode):
-        for key, entry in node.entries.items():
-            yield from _expressions(entry.node, (*path, key))
-    elif isinstance(node, SequenceNode):
-        for k, item in enumerate(node.items):
-            yield from _expressions(item, (*path, k))
-    elif node is not None and node.written is not None:
-        yield path, node.written
+def _written(node: ScalarNode, path: Loc) -> ScalarNode:
+    """The text before its expression was computed."""
+    return _escaped(node, path) if node.written is None else ScalarNode(node.written, node.place)
 
 
-def _written(node: Node) -> Node:
-    """The tree before expressions were computed."""
-    if isinstance(node, MappingNode):
-        return MappingNode({k: Entry(e.key_place, _written(e.node)) for k, e in node.entries.items()}, node.place)
-    if isinstance(node, SequenceNode):
-        return SequenceNode(tuple(map(_written, node.items)), node.place)
-    return _escaped(node) if node.written is None else ScalarNode(node.written, node.place)
-
-
-def _escaped(node: Node) -> Node:
+def _escaped(node: ScalarNode, path: Loc) -> ScalarNode:
     """A value that is to stay as it is."""
-    if isinstance(node, ScalarNode) and isinstance(node.value, str):
-        return ScalarNode(escaped(node.value), node.place)
-    return node
+    return ScalarNode(escaped(node.value), node.place) if isinstance(node.value, str) else node

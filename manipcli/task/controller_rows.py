@@ -28,6 +28,11 @@ class ControllerRow:
     update_rate: float
 
     @property
+    def state(self) -> str:
+        """`active` or `inactive`."""
+        return "active" if self.active else "inactive"
+
+    @property
     def wanted(self) -> tuple[str, ...]:
         """The `joint/interface` that it claims while it is active."""
         return tuple(f"{joint}/{interface}" for joint in self.joints for interface in self.interfaces)

@@ -26,9 +26,9 @@ from manipcli.batch.baseline import (
 )
 from manipcli.cli.app import main
 from manipcli.core.errors import InvalidInput
+from manipcli.judge.measures import step_measures
+from manipcli.judge.measures.step_measures import StepMeasures
 from manipcli.pipeline import run_task
-from manipcli.report import step_measures
-from manipcli.report.step_measures import StepMeasures
 from manipcli.spec.baseline import ToleranceSpec
 
 ROOT = Path(__file__).parents[2]

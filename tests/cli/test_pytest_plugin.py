@@ -251,7 +251,10 @@ def test_foreign_yaml_loads_nothing_but_the_first_look(pytester: pytest.Pytester
     )
     result = pytester.runpytest_subprocess(*LOADED, *ALONE, "-s")
     result.assert_outcomes(passed=1)
-    loaded = f"manipcli manipcli.batch manipcli.batch.first_look manipcli.cli {PLUGIN} manipcli.core manipcli.core.lazy manipcli.core.version"
+    loaded = (
+        f"manipcli manipcli.batch manipcli.batch.first_look manipcli.cli {PLUGIN} "
+        "manipcli.core manipcli.core.lazy manipcli.core.version"
+    )
     result.stdout.fnmatch_lines([f"*loaded {loaded}"])
 
 

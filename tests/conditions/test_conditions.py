@@ -309,13 +309,13 @@ def test_moved_and_unmoved_count_from_the_first_tick_that_is_shown() -> None:
 
 def test_a_turn_is_a_motion_too_and_the_lesser_share_decides() -> None:
     states = [state(time=0.1), state(time=0.2), state(poses={"cup": moved_by("cup", (0, 0, 0), (0, 0, 0.3))}, time=0.3)]
-    turned = read("unmoved", *states, object="cup", within=0.01, turn=0.2)
+    turned = read("unmoved", *states, object="cup", within=0.01, rotation=0.2)
     # Both turn about the cup's middle: 1 of 1 of the way is left, but of the turn less than nothing.
     worst = turned.found(1)
     assert (worst.margin, worst.unit, worst.at) == (pytest.approx(-0.1), "rad", 0.3)
-    assert worst.text == "'cup' turned by 17.2 deg; at most 11.5 deg"
-    assert read("moved", *states, object="cup", turn=0.2).margins[-1] == pytest.approx(0.1)
-    both = read("moved", *states, object="cup", turn=0.2, by=0.05).found(1)
+    assert worst.text == "'cup' rotated by 17.2 deg; at most 11.5 deg"
+    assert read("moved", *states, object="cup", rotation=0.2).margins[-1] == pytest.approx(0.1)
+    both = read("moved", *states, object="cup", rotation=0.2, by=0.05).found(1)
     assert (both.margin, both.unit) == (pytest.approx(-0.05), "m")
 
 
@@ -360,7 +360,7 @@ SPECS: list[tuple[str, dict[str, Any]]] = [
     ("outside", {"object": "stick", "of": "cup"}),
     ("above", {"object": "stick", "of": "cup", "by": 0.1}),
     ("above", {"object": "cup", "of": "tray"}),
-    ("moved", {"object": "cup", "by": 0.1, "turn": 0.1}),
+    ("moved", {"object": "cup", "by": 0.1, "rotation": 0.1}),
     ("unmoved", {"object": "cup", "within": 0.1}),
     ("at_rest", {"object": "tray"}),
     ("at_pose", {"pose": "home"}),

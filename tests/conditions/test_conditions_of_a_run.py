@@ -238,13 +238,13 @@ def test_slip_is_a_turn_too_and_a_new_grasp_begins_anew() -> None:
     # Let go for one tick: the same grasp; for 0.2 s: another.
     changes = ((0.1, GRIP), (0.3, []), (0.31, GRIP), (0.5, []), (0.7, GRIP))
     moments = replace(carried(np.zeros(T), 0.5 * TIMES), contacts=touching(*changes).contacts)
-    found = read("slip", moments, object="cube", within=0.01, turn=0.2)
+    found = read("slip", moments, object="cube", within=0.01, rotation=0.2)
     assert not found.applies[30]
     assert not found.applies[50:70].any()
     for k, since in ((49, 0.1), (99, 0.7)):
         told = found.found(k)
         assert (told.unit, told.margin) == ("rad", pytest.approx(0.2 - 0.5 * (TIMES[k] - since)))
-    assert "'cube' turned in the hand by" in found.found(49).text
+    assert "'cube' rotated in the hand by" in found.found(49).text
     # Where nothing slips at all, both have all of their tolerance left, and the first is told.
     assert (found.found(70).unit, found.found(70).margin) == ("m", pytest.approx(0.01))
 

@@ -105,16 +105,16 @@ def test_a_log_is_simulated_again_with_the_places_of_its_run(log: Path) -> None:
 @pytest.mark.parametrize(
     ("spec", "unit", "limit"),
     [
-        (SlipSpec(object="cup", within=0.002, turn=0.005), "m", 0.002),
-        (SlipSpec(object="cup", within=0.002, turn=0.005), "rad", 0.005),
-        (UnmovedSpec(object="cup", within=0.002, turn=0.01), "rad", 0.01),
+        (SlipSpec(object="cup", within=0.002, rotation=0.005), "m", 0.002),
+        (SlipSpec(object="cup", within=0.002, rotation=0.005), "rad", 0.005),
+        (UnmovedSpec(object="cup", within=0.002, rotation=0.01), "rad", 0.01),
         (AtPoseSpec(pose="open", within=0.02, slide=0.045), "rad", 0.02),
         (AtPoseSpec(pose="open", within=0.02, slide=0.045), "m", 0.045),
         (AtPoseSpec(pose="open"), "m", 0.005),
         (NearSpec(object="cup", to=(0.0, 0.0, 0.0), within=0.003), "m", 0.003),
         (ContactForceSpec(of="cup", below=20.0), "N", 20.0),
         (ContactForceSpec(of="cup", below=20.0, above=1.0), "N", None),
-        (MovedSpec(object="cup", by=0.1, turn=0.5), "rad", None),
+        (MovedSpec(object="cup", by=0.1, rotation=0.5), "rad", None),
     ],
 )
 def test_a_limit_is_that_which_the_margin_is_measured_from(spec: Model, unit: str, limit: float | None) -> None:

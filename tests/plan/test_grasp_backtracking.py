@@ -31,7 +31,7 @@ SCENE = """scene:
 """
 PICK = "  - pick: {object: block}\n"
 LIFT = "  - lift: {object: block, by: 15 cm}\n"
-PLACE = "  - place: {object: block, at: [0.5, 0.2], on: bin}\n"
+PLACE = "  - place: {object: block, at: [0.5, 0.2], onto: bin}\n"
 
 
 def task_of(folder: Path, steps: str, head: str = "") -> Task:
@@ -71,7 +71,7 @@ def test_what_cannot_be_lifted_as_it_is_held_is_taken_otherwise(tmp_path: Path) 
 def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_path: Path) -> None:
     """The refusal is that of the step that came furthest, and tells how many grasps there were."""
     task = task_of(
-        tmp_path, "  - move: {to: home}\n" + PICK + LIFT + "  - place: {object: block, at: [1.5, 0.0], on: far}\n"
+        tmp_path, "  - move: {to: home}\n" + PICK + LIFT + "  - place: {object: block, at: [1.5, 0.0], onto: far}\n"
     )
     told: list[str] = []
     with pytest.raises(NotPlannable) as refused:
@@ -92,7 +92,7 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
 
 def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: Path) -> None:
     told: list[str] = []
-    place = "  - place: {object: block, at: [1.5, 0.0], on: table}\n"
+    place = "  - place: {object: block, at: [1.5, 0.0], onto: table}\n"
     task = task_of(tmp_path, PICK.replace("block", "block, approach: {from: top}") + LIFT + place)
     with pytest.raises(NotPlannable) as refused:
         plan_task(task, doing=told.append)

@@ -146,7 +146,7 @@ def test_linear_is_straight_in_space_and_joint_in_the_joints(bench: Make) -> Non
 
 def test_half_speed_halves_velocity_and_acceleration(bench: Make) -> None:
     arm = bench()
-    fast, slow = (arm.plan("move", {"to": "zero", "speed": s}).motions[0].trajectory for s in (1.0, 0.5))
+    fast, slow = (arm.plan("move", {"to": "zero", "velocity_scaling": s}).motions[0].trajectory for s in (1.0, 0.5))
     assert np.abs(slow.velocities).max() <= 0.5 * max(arm.robot.joint(name).limits.velocity for name in ARM)
     for name, a in zip(slow.names, np.abs(slow.accelerations).max(axis=0), strict=True):
         assert a <= 0.5 * arm.robot.joint(name).limits.acceleration * 1.005
@@ -310,7 +310,7 @@ def test_what_stands_must_be_lifted_before_it_is_moved(bench: Make, story: Story
 def test_a_move_says_one_target(bench: Make) -> None:
     spec = STEPS["move"].spec
     home = {"to": "home"}
-    for wrong in ({}, {**home, "pose": {}}, {"to": {}}, {**home, "path": "linear"}, {**home, "speed": 0}):
+    for wrong in ({}, {**home, "pose": {}}, {"to": {}}, {**home, "path": "linear"}, {**home, "velocity_scaling": 0}):
         with pytest.raises(ValidationError):
             spec.model_validate(wrong)
     arm = bench()

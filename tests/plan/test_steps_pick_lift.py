@@ -148,7 +148,7 @@ def test_what_cannot_be_lifted_or_put_so_far_is_told_what_those_steps_can_do_abo
     arm.now = story.steps["pick"][1].end
     lift = arm.refused("lift", {"object": "cup", "by": 1.5})
     arm.now = story.steps["lift"][1].end
-    place = arm.refused("place", {"object": "cup", "at": [1.12, 0.45], "on": "desk"})
+    place = arm.refused("place", {"object": "cup", "at": [1.12, 0.45], "onto": "desk"})
     assert "the straight line ends" in lift.cause and "the straight line ends" in place.cause
     assert (lift.hint or "").startswith("lift it less, `by: ...`; or ")
     assert (place.hint or "").startswith("put it where the arm reaches, `at: [x, y]`; or ")

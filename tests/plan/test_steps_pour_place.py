@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.geometry import Transform
-from manipcli.plan.steps.place import _leaning
+from manipcli.plan.steps.place import _tilted
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
 Story = Any
@@ -170,11 +170,11 @@ def test_a_block_is_put_back_or_elsewhere_and_turned(bench: Make) -> None:
     panda.do("place", {"object": "block"})
     np.testing.assert_allclose(panda.body("block").matrix, panda.body("block", panda.start).matrix, atol=1e-4)
     panda.now = lifted
-    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "table"})
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "onto": "table"})
     np.testing.assert_allclose(panda.body("block").p, [0.5, 0.2, 0.225], atol=1e-4)
     np.testing.assert_allclose(panda.body("block").R, np.eye(3), atol=1e-3)
     panda.now = lifted
-    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "table", "yaw": "30 deg"})
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "onto": "table", "yaw": "30 deg"})
     assert panda.body("block").rpy[2] == pytest.approx(np.radians(30), abs=1e-3)
 
 
@@ -185,12 +185,12 @@ def test_a_support_that_was_moved_is_where_it_was_moved_to(bench: Make) -> None:
     panda = bench("panda", table + block + foot)
     panda.do("pick", {"object": "foot", "approach": {"from": "top"}})
     panda.do("lift", {"object": "foot"})
-    panda.do("place", {"object": "foot", "at": [0.6, 0.2], "on": "table"})
+    panda.do("place", {"object": "foot", "at": [0.6, 0.2], "onto": "table"})
     panda.do("pick", {"object": "block", "approach": {"from": "top"}})
     panda.do("lift", {"object": "block"})
-    refusal = panda.refused("place", {"object": "block", "at": [0.5, 0.1], "on": "foot"})
+    refusal = panda.refused("place", {"object": "block", "at": [0.5, 0.1], "onto": "foot"})
     assert refusal.cause == "[0.5, 0.1] m lies beside 'foot', whose middle is at [0.6, 0.2] m"
-    panda.do("place", {"object": "block", "at": [0.6, 0.2], "on": "foot"})
+    panda.do("place", {"object": "block", "at": [0.6, 0.2], "onto": "foot"})
     np.testing.assert_allclose(panda.body("block").p, [0.6, 0.2, 0.2 + 0.04 + 0.025], atol=2e-4)
 
 
@@ -201,23 +201,23 @@ def test_a_block_goes_inside_a_tray(bench: Make) -> None:
   tray: {tray: {size: [0.3, 0.3, 0.02], wall: 5 mm}, rests_on: table, at: [0.55, 0.2], fixed: true}
 """
     panda = held_block(bench, scene)
-    panda.do("place", {"object": "block", "at": [0.5, 0.2], "on": "tray"})
+    panda.do("place", {"object": "block", "at": [0.5, 0.2], "onto": "tray"})
     assert panda.body("block").p[2] == pytest.approx(0.2 + 0.005 + 0.025, abs=1e-4)
 
 
 def test_a_place_is_said_completely_and_consistently(bench: Make) -> None:
     arm = bench()
     assert arm.problems("place", {"object": "cup", "at": [0.7, 0]}) == [
-        (("at",), "[x, y] needs the body it is on", "add `on: BODY`")
+        (("at",), "[x, y] needs the body it is on", "add `onto: BODY`")
     ]
-    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "on": "deks"}) == [
-        (("on",), "'deks' is not in the scene", "did you mean 'desk'?")
+    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "onto": "deks"}) == [
+        (("onto",), "'deks' is not in the scene", "did you mean 'desk'?")
     ]
-    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "on": "cup"})[0][1] == (
+    assert arm.problems("place", {"object": "cup", "at": [0.7, 0], "onto": "cup"})[0][1] == (
         "'cup' cannot be placed on itself"
     )
-    assert [loc for loc, _, _ in arm.problems("place", {"object": "cup", "on": "desk", "yaw": 1.0})] == [
-        ("on",), ("yaw",)
+    assert [loc for loc, _, _ in arm.problems("place", {"object": "cup", "onto": "desk", "yaw": 1.0})] == [
+        ("onto",), ("yaw",)
     ]  # fmt: skip
     assert arm.problems("pour", {"object": "cup", "into": "cup"})[0][1] == "'cup' cannot be poured into itself"
     assert arm.problems("pour", {"object": "cup", "into": "trey"})[0][2] == "did you mean 'tray'?"
@@ -249,7 +249,7 @@ def test_bodies_of_every_shape_are_picked_and_placed(bench: Make, tmp_path: Any)
         panda = bench("panda", table + f"  thing: {{{shape}, rests_on: table, at: [0.5, -0.1]}}\n")
         panda.do("pick", {"object": "thing", "approach": {"from": "top"}})
         panda.do("lift", {"object": "thing"})
-        panda.do("place", {"object": "thing", "at": [0.5, 0.2], "on": "table"})
+        panda.do("place", {"object": "thing", "at": [0.5, 0.2], "onto": "table"})
         np.testing.assert_allclose(panda.body("thing").p, [0.5, 0.2, 0.2 + height], atol=2e-4)
 
 
@@ -270,12 +270,12 @@ def test_what_is_placed_in_an_open_urdf_stands_on_its_floor(bench: Make, tmp_pat
     panda = bench("panda", scene)
     panda.do("pick", {"object": "cube", "approach": {"from": "top"}})
     panda.do("lift", {"object": "cube"})
-    beside = panda.refused("place", {"object": "cube", "at": [0.5, 0.31], "on": "drawer"})
+    beside = panda.refused("place", {"object": "cube", "at": [0.5, 0.31], "onto": "drawer"})
     assert "lies beside 'drawer'" in beside.cause
-    through = panda.refused("place", {"object": "cube", "at": [0.5, -0.5], "on": "frame"})
+    through = panda.refused("place", {"object": "cube", "at": [0.5, -0.5], "onto": "frame"})
     assert "nothing of 'frame' lies below 'cube'" in through.cause
     assert through.hint == "choose `at` over a part of 'frame'"
-    panda.do("place", {"object": "cube", "at": [0.5, 0.2], "on": "drawer"})
+    panda.do("place", {"object": "cube", "at": [0.5, 0.2], "onto": "drawer"})
     np.testing.assert_allclose(panda.body("cube").p, [0.5, 0.2, 0.2 + 0.01 + 0.015], atol=3e-4)
 
 
@@ -316,7 +316,7 @@ def test_what_leans_stands_on_its_lowest_edge_however_it_is_turned(yaw: float, k
     X_WG = Transform.of(xyz=(0.5, 0.1, 0.45), rpy=(0.0, 0.0, np.radians(yaw)))
     X_WT = Transform.of(xyz=(0.5, 0.1, 0.45), R=np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]))
     X_OT = X_WG.inverse() @ X_WT
-    X_WO = _leaning(cast(Any, body), X_WG, X_OT, np.radians(4.0))
+    X_WO = _tilted(cast(Any, body), X_WG, X_OT, np.radians(4.0))
     angle = np.linspace(0.0, 2 * np.pi, 3600)
     rim = np.column_stack([0.04 * np.cos(angle), 0.04 * np.sin(angle), np.full(3600, -0.05)])
     corners = np.array([[x, y, -0.05] for x in (-0.02, 0.02) for y in (-0.1, 0.1)])
@@ -332,8 +332,8 @@ def test_what_is_in_the_way_of_a_place_is_told_with_what_a_place_can_do(bench: M
     block = "  block: {box: {size: [4 cm, 4 cm, 5 cm]}, mass: 80 g, rests_on: table, at: [0.5, -0.2]}\n"
     wall = "  wall: {box: {size: [0.5, 2 cm, 30 cm]}, rests_on: table, at: [0.55, 0], fixed: true}\n"
     tray = "  tray: {tray: {size: [20 cm, 13 cm, 5 cm]}, rests_on: table, at: [0.5, 0.2], fixed: true}\n"
-    over = {"object": "block", "at": [0.5, 0.2], "on": "table"}
-    into = {"object": "block", "at": [0.5, 0.2], "on": "tray"}
+    over = {"object": "block", "at": [0.5, 0.2], "onto": "table"}
+    into = {"object": "block", "at": [0.5, 0.2], "onto": "tray"}
     for thing, lift, spec, told, cure in (
         (wall, 0.14, over, "`clearance: ...`", {"clearance": [0.3, 0.4]}),
         (tray, 0.14, into, "`yaw: ...`", {"yaw": np.pi / 2}),
@@ -353,7 +353,7 @@ def test_a_hand_that_does_not_fit_where_it_lowers_is_told_to_take_the_object_hig
     desk = "\n  desk: {box: {size: [0.6, 1.0, 0.4]}, pose: {xyz: [0.85, 0, 0.2]}, fixed: true}\n"
     bottle = "  bottle: {cylinder: {radius: 3 cm, height: 20 cm}, mass: 150 g, rests_on: desk, at: [0.75, 0.0]}\n"
     bowl = "  bowl: {tray: {size: [0.2, 0.2, 0.08]}, rests_on: desk, at: [0.70, 0.32], fixed: true}\n"
-    spec = {"object": "bottle", "at": [0.70, 0.32], "on": "bowl"}
+    spec = {"object": "bottle", "at": [0.70, 0.32], "onto": "bowl"}
 
     def held(height: float) -> Any:
         arm = bench(scene=desk + bottle + bowl)

@@ -18,10 +18,10 @@ from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import frozen
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.measures.facts import JointFacts, Peak, RunFacts, StepFacts, Use
+from manipcli.judge.measures.holds import Hold, HoldFacts, Slip, Spread
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
-from manipcli.report.facts import JointFacts, Peak, RunFacts, StepFacts, Use
-from manipcli.report.holds import Hold, HoldFacts, Slip, Spread
 from manipcli.report.html import render_page
 from manipcli.report.html_parts import number, of_limit, signed
 from manipcli.report.markup import Markup, element, joined

@@ -8,6 +8,7 @@ import pytest
 from manipcli.control.controller import JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.plan.trajectory import JointTrajectory
+from manipcli.run.execute import build_manager
 from manipcli.task.load_task import load_task
 
 TASK = Path(__file__).parents[2] / "tasks" / "home.yaml"

@@ -135,7 +135,8 @@ def test_a_hand_presses_as_hard_as_asked_and_goes_on_from_there(tmp_path: Path) 
         tmp_path,
         f"""{PANDA}{TABLE}steps:
   - move: {{pose: {{xyz: [0.5, 0, 0.25], rpy: [180 deg, 0, 0]}}}}
-  - move: {{pose: {{xyz: [0, 0, 7 cm]}}, frame: tool, path: linear, speed: 0.02, touch: [table], guarded: true}}
+  - move:
+      {{pose: {{xyz: [0, 0, 7 cm]}}, frame: tool, path: linear, velocity_scaling: 0.02, touch: [table], guarded: true}}
     until: {{contact_force: {{pair: [robot, table], above: 20 N, mean_over: 50 ms}}}}
   - wait: 0.3 s
   - move: {{pose: {{xyz: [0, 0, -5 cm]}}, frame: tool, path: linear, touch: [table]}}
@@ -171,7 +172,12 @@ def test_what_a_guarded_move_carries_beyond_its_first_touch_is_still_held(tmp_pa
 steps:
   - pick: {{object: block, approach: {{from: top}}}}
   - lift: {{object: block, by: 4 cm}}
-  - move: {{pose: {{xyz: [0.5, 0, 0.27], rpy: [180 deg, 0, 0]}}, path: linear, speed: 0.1, touch: [toy], guarded: true}}
+  - move:
+      pose: {{xyz: [0.5, 0, 0.27], rpy: [180 deg, 0, 0]}}
+      path: linear
+      velocity_scaling: 0.1
+      touch: [toy]
+      guarded: true
     until: {{all: [{{moved: {{object: toy, by: 10 cm}}}}, {{at_rest: {{object: toy, below: 0.02 mm/s}}}}]}}
 """,
     )

@@ -51,10 +51,10 @@ expect:
   - always: {{above: {{object: cup, of: desk}}}}
   - always: {{rests_on: {{object: cup, of: desk}}}}
   - always: {{at_rest: {{object: ball}}}}
-  - always: {{moved: {{object: cup, by: 1 cm, turn: 1 deg}}}}
-  - always: {{unmoved: {{object: ball, within: 10 cm, turn: 3 deg}}}}
+  - always: {{moved: {{object: cup, by: 1 cm, rotation: 1 deg}}}}
+  - always: {{unmoved: {{object: ball, within: 10 cm, rotation: 3 deg}}}}
   - always: {{grasped: {{object: cup}}}}
-  - always: {{slip: {{object: cup, within: 5 mm, turn: 5 deg}}}}
+  - always: {{slip: {{object: cup, within: 5 mm, rotation: 5 deg}}}}
   - always: {{contact_force: {{pair: [robot, cup], below: 60 N, above: 1 N}}}}
   - always: {{contact_force: {{of: robot, below: 60 N, mean_over: 30 ms}}}}
   - always: {{collision: [robot, cup]}}

@@ -92,9 +92,9 @@ def test_degrees_and_millimetres_are_guessed(written: str, instead: str, hint: s
     ("block", "most"),
     [
         ("watch: [{always: {upright: {object: block, within: 30}}}]", "at most 180 deg, not 30"),
-        ("expect: [{unmoved: {object: block, within: 1 cm, turn: 30}}]", "at most 180 deg, not 30"),
-        ("expect: [{moved: {object: block, turn: 30}}]", "at most 180 deg, not 30"),
-        ("watch: [{always: {slip: {object: block, within: 1 cm, turn: 30}}}]", "at most 180 deg, not 30"),
+        ("expect: [{unmoved: {object: block, within: 1 cm, rotation: 30}}]", "at most 180 deg, not 30"),
+        ("expect: [{moved: {object: block, rotation: 30}}]", "at most 180 deg, not 30"),
+        ("watch: [{always: {slip: {object: block, within: 1 cm, rotation: 30}}}]", "at most 180 deg, not 30"),
         ("expect: [{at_pose: {pose: home, within: 30}}]", "at most 180 deg, not 30"),
         ("expect: [{tracking: {group: arm, within: 30}}]", "at most 3.1416 rad or m, not 30"),
         ("replan: {rotation: 30}", "at most 180 deg, not 30"),

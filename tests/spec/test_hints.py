@@ -6,7 +6,10 @@ import re
 
 import pytest
 
+from manipcli.conditions.members import CONDITIONS
 from manipcli.core.errors import Finding, InvalidInput
+from manipcli.plan.steps import STEPS
+from manipcli.spec.base import Model
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.source.yaml import parse
 from manipcli.task.vocabulary import task_spec
@@ -128,7 +131,7 @@ def test_a_key_of_the_file_is_not_told_to_stand_anywhere() -> None:
         ("steps: [{move: {to: home, touch: @}}]", "cup", "write", "[cup]"),
         ("steps: [wait: 1 s]\ntags: @", "slow", "write", "[slow]"),
         ("steps: [{switch_controllers: {activate: @}}]", "arm", "write", "[arm]"),
-        ("steps: [{move: {to: home, speed: @}}]", "30", "in percent? write", "'30 %'"),
+        ("steps: [{move: {to: home, velocity_scaling: @}}]", "30", "in percent? write", "'30 %'"),
         ("steps: [wait: 1 s]\nexpect: [{limits: {spare: @}}]", "20", "in percent? write", "'20 %'"),
     ],
 )
@@ -140,7 +143,7 @@ def test_what_is_told_to_be_written_is_taken(block: str, written: str, guess: st
 @pytest.mark.parametrize(
     "block",
     [
-        "steps: [{move: {to: home, speed: 300}}]",
+        "steps: [{move: {to: home, velocity_scaling: 300}}]",
         "steps: [{move: {pose: {xyz: cup}}}]",
         "steps: [wait: 1 s]\nreplan: yes",
     ],
@@ -169,7 +172,7 @@ CONTROLLERS = "controllers:\n  js: %s\n"
     ("step", "rest", "hint"),
     [
         ("", "seed: 4\n", "`seed` stands below `simulation`"),
-        (", speed: 0.5", "", "`speed` stands below `move`"),
+        (", velocity_scaling: 0.5", "", "`velocity_scaling` stands below `move`"),
         ("", "scene: {b: {sphere: {radius: 1}, mass: 1, xyz: [0, 0, 1]}}\n", "`xyz` stands below `pose`"),
         ("", "scene: {b: {mass: 1, size: [1, 1, 1]}}\n", "`size` stands below `box` or `tray`"),
         ("", "expect: [{no_collision: {pairs: [robot]}}]\n", "a pair is a list of its own: [[A, B]]"),
@@ -180,6 +183,30 @@ def test_where_a_key_belongs_and_how_a_pair_is_written(step: str, rest: str, hin
     with pytest.raises(InvalidInput) as error:
         load_task_text(WHOLE % (step, rest), "t.yaml", model=task_spec())
     assert any((finding.hint or "").startswith(hint) for finding in error.value.findings), error.value
+
+
+@pytest.mark.parametrize(
+    ("block", "key", "column", "now"),
+    [
+        ("steps: [{move: {to: home, speed: 0.5}}]", "speed", 27, "velocity_scaling"),
+        ("steps: [{lift: {object: cup, speed: 0.5}}]", "speed", 30, "velocity_scaling"),
+        ("steps: [{place: {object: cup, at: [0, 0], on: desk}}]", "on", 43, "onto"),
+        ("steps: [wait: 1 s]\nexpect: [{slip: {object: cup, within: 1 mm, turn: 1 deg}}]", "turn", 45, "rotation"),
+        ("steps: [wait: 1 s]\nwatch: [{never: {moved: {object: cup, turn: 1 deg}}}]", "turn", 39, "rotation"),
+    ],
+)
+def test_a_key_that_was_renamed_is_refused_with_its_new_name(block: str, key: str, column: int, now: str) -> None:
+    finding = told(block)
+    assert finding.code == "TASK201" and f"unknown key '{key}'" in finding.message
+    assert finding.place is not None and finding.place.column == column
+    assert finding.hint == f"write `{now}`, as `{key}` is called now"
+    load_task_text(TASK + block.replace(f"{key}: ", f"{now}: "), "t.yaml", model=task_spec())
+
+
+@pytest.mark.parametrize("spec", [member.spec for seam in (STEPS, CONDITIONS) for member in seam])
+def test_a_renamed_key_leads_to_one_that_there_is(spec: type[Model]) -> None:
+    assert not spec.renamed.keys() & spec.model_fields.keys()
+    assert set(spec.renamed.values()) <= spec.model_fields.keys()
 
 
 def test_of_a_controller_of_any_type_only_the_type_is_asked_for() -> None:
@@ -197,7 +224,7 @@ def test_a_list_of_one_length_is_asked_for_with_that_length() -> None:
 
 def test_where_a_plain_number_is_wanted_no_unit_is_proposed() -> None:
     with pytest.raises(InvalidInput) as error:
-        load_task_text(WHOLE.replace("home", "home, speed: fast") % ("", ""), "t.yaml", model=task_spec())
+        load_task_text(WHOLE.replace("home", "home, velocity_scaling: fast") % ("", ""), "t.yaml", model=task_spec())
     (finding,) = error.value.findings
     assert "expected a plain number (0.5, 50 %)" in finding.message
     assert finding.hint is None or "deg" not in finding.hint

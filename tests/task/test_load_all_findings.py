@@ -205,7 +205,7 @@ steps:
     until: {{inside: {{object: bal, of: cup}}}}
     timeout: 15 kg
   - place: {{object: cop, at: strt}}
-  - move: {{to: hom, speed: fast}}
+  - move: {{to: hom, velocity_scaling: fast}}
   - wait: soon
 """
     )
@@ -216,7 +216,7 @@ steps:
         (7, "steps[0].pick.object"), (7, "steps[0].pick.approach.from"), (7, "steps[0].pick.grasp.posture"),
         (8, "steps[1].pour.into"), (8, "steps[1].pour.tilt"), (9, "steps[1].until.inside.object"),
         (10, "steps[1].timeout"), (11, "steps[2].place.object"), (11, "steps[2].place.at"),
-        (12, "steps[3].move.to"), (12, "steps[3].move.speed"), (13, "steps[4].wait"),
+        (12, "steps[3].move.to"), (12, "steps[3].move.velocity_scaling"), (13, "steps[4].wait"),
     ]  # fmt: skip
 
 
@@ -247,14 +247,14 @@ steps:
   - move: {to: pre_$s}
   - move: {to: $zz}
   - id: a
-    move: {to: {joint_1: $h}, speed: 150 %}
+    move: {to: {joint_1: $h}, velocity_scaling: 150 %}
   - id: b
-    move: {to: {joint_1: $h}, speed: 50 %}
+    move: {to: {joint_1: $h}, velocity_scaling: 50 %}
     until: {step_done: {step: zz}}
     on_fail: {retry: 2, with: {h: -0.1 rad}}
 """,
     )
-    assert [place[:2] for place in found] == [(6, 16), (7, 16), (9, 38), (12, 31)]
+    assert [place[:2] for place in found] == [(6, 16), (7, 16), (9, 49), (12, 31)]
     assert "at most 1, not '150 %'" in found[2][2]
     text = "steps:\n  - move: {to: {joint_1: $h}}\n    until: {step_done: {step: zz}}\n"
     (once,) = findings(tmp_path, f"params: {{h: 0.1 rad}}\n{text}    on_fail: {{retry: 2, with: {{h: -0.1 rad}}}}\n")
@@ -304,7 +304,7 @@ def test_a_step_that_is_left_out_puts_no_other_out_of_order(tmp_path: Path) -> N
         tmp_path,
         """\
 steps:
-  - move: {to: home, speed: 7}
+  - move: {to: home, velocity_scaling: 7}
   - move: {to: zero}
     until: {step_done: {step: move_1}}
   - wait: 1 s

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,30 +19,34 @@ from manipcli.spec.quantity import AngleTolerance, Length
 
 
 class MovedSpec(Model):
-    """The object's centre is at least `by` away from where it was, or the object turned by at least `turn`; both where
-    both are given."""
+    """The object's centre is at least `by` away from where it was, or the object rotated by at least
+    `rotation`; both where both are given."""
+
+    renamed: ClassVar = {"turn": "rotation"}
 
     object: str = Field(description="A body of the scene that can move.")
     by: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="Least distance [m].")
-    turn: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
+    rotation: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
 
     @model_validator(mode="after")
     def _something(self) -> MovedSpec:
-        if self.by is None and self.turn is None:
-            raise problem("conflict", "say how far: `by` (a length), `turn` (an angle), or both")
+        if self.by is None and self.rotation is None:
+            raise problem("conflict", "say how far: `by` (a length), `rotation` (an angle), or both")
         return self
 
 
 class UnmovedSpec(Model):
-    """The object's centre is at most `within` away from where it was, and the object turned by at most `turn`."""
+    """The object's centre is at most `within` away from where it was, and the object rotated by at most `rotation`."""
+
+    renamed: ClassVar = {"turn": "rotation"}
 
     object: str = Field(description="A body of the scene that can move.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
-    turn: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
+    rotation: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
 
 
 Change = tuple[Array, Array]
-"""(T,) how far the centre moved [m], and by how much the body turned [rad]."""
+"""(T,) how far the centre moved [m], and by how much the body rotated [rad]."""
 
 
 def since_first(world: World, name: str) -> Callable[[Moments], Change]:
@@ -62,36 +66,36 @@ def since_first(world: World, name: str) -> Callable[[Moments], Change]:
 
 
 def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
-    """How far the centre is from where it was, minus `by` [m]; how far it turned, minus `turn` [rad]; the lesser."""
+    """How far the centre is from where it was, minus `by` [m]; its rotation minus `rotation` [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
     def look(moments: Moments) -> Reading:
-        far, turned = changed(moments)
+        far, rotated = changed(moments)
         readings = []
         if spec.by is not None:
             text = f"at least {readable(spec.by, 'm')}"
             say = _say(spec.object, "moved by", far, "m", text)
             readings.append(reading(far - spec.by, moments.times, unit="m", scale=spec.by, say=say))
-        if spec.turn is not None:
-            text = f"at least {readable(spec.turn, 'rad')}"
-            say = _say(spec.object, "turned by", turned, "rad", text)
-            readings.append(reading(turned - spec.turn, moments.times, unit="rad", scale=spec.turn, say=say))
+        if spec.rotation is not None:
+            text = f"at least {readable(spec.rotation, 'rad')}"
+            say = _say(spec.object, "rotated by", rotated, "rad", text)
+            readings.append(reading(rotated - spec.rotation, moments.times, unit="rad", scale=spec.rotation, say=say))
         return least(readings)
 
     return look
 
 
 def gauge_unmoved(spec: UnmovedSpec, world: World) -> Gauge:
-    """`within` minus the distance of the centre from where it was [m]; `turn` minus the angle of the rotation [rad]."""
+    """`within` minus the distance of the centre from where it was [m]; `rotation` minus its rotation [rad]."""
     changed = since_first(world, spec.object)
 
     def look(moments: Moments) -> Reading:
-        far, turned = changed(moments)
+        far, rotated = changed(moments)
         say = _say(spec.object, "moved by", far, "m", f"at most {readable(spec.within, 'm')}")
         readings = [reading(spec.within - far, moments.times, unit="m", scale=spec.within, say=say)]
-        if spec.turn is not None:
-            say = _say(spec.object, "turned by", turned, "rad", f"at most {readable(spec.turn, 'rad')}")
-            readings.append(reading(spec.turn - turned, moments.times, unit="rad", scale=spec.turn, say=say))
+        if spec.rotation is not None:
+            say = _say(spec.object, "rotated by", rotated, "rad", f"at most {readable(spec.rotation, 'rad')}")
+            readings.append(reading(spec.rotation - rotated, moments.times, unit="rad", scale=spec.rotation, say=say))
         return least(readings)
 
     return look
@@ -123,5 +127,5 @@ UNMOVED = Condition(
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     scope="always",
-    example="unmoved: {object: vase, within: 2 mm, turn: 1 deg}",
+    example="unmoved: {object: vase, within: 2 mm, rotation: 1 deg}",
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -35,11 +35,13 @@ LET_GO = 0.1
 
 
 class SlipSpec(Model):
-    """Since it was grasped the object moved in the hand by at most `within`, and turned by at most `turn`."""
+    """Since it was grasped the object moved in the hand by at most `within`, and rotated by at most `rotation`."""
+
+    renamed: ClassVar = {"turn": "rotation"}
 
     object: str = Field(description="A body of the scene that can move.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest motion of its centre [m].")
-    turn: AngleTolerance | None = Field(default=None, description="Largest turn [rad], to pi. Default: any.")
+    rotation: AngleTolerance | None = Field(default=None, description="Largest rotation [rad], to pi. Default: any.")
     grip: Annotated[Force, Field(gt=0)] = Field(
         default=0.1, description="It is held while two links press on it with at least this [N]. Default 0.1 N."
     )
@@ -58,11 +60,11 @@ class _Hold:
         self._last = -np.inf
 
     def slipped(self, moments: Moments, held: Mask) -> tuple[Array, Array]:
-        """(T,) motion [m] and turn [rad] since it was taken; zero where it is not held."""
-        far, turned = np.zeros(len(held)), np.zeros(len(held))
+        """(T,) motion [m] and rotation [rad] since it was taken; zero where it is not held."""
+        far, rotated = np.zeros(len(held)), np.zeros(len(held))
         ticks = np.flatnonzero(held)
         if not len(ticks):
-            return far, turned
+            return far, rotated
         p, R = self._in_hand(moments, ticks)
         times = moments.times[ticks]
         anew = np.flatnonzero(np.diff(times, prepend=self._last) > LET_GO)
@@ -72,8 +74,8 @@ class _Hold:
                 self._taken = p[first], R[first]
             one = ticks[first:last]
             far[one] = np.linalg.norm(p[first:last] - self._taken[0], axis=-1)
-            turned[one] = _angle(self._taken[1].T @ R[first:last])
-        return far, turned
+            rotated[one] = _angle(self._taken[1].T @ R[first:last])
+        return far, rotated
 
     def _in_hand(self, moments: Moments, ticks: npt.NDArray[np.intp]) -> tuple[Array, Array]:
         """p_LC (T, 3) of the object's centre C, and R_LO (T, 3, 3)."""
@@ -97,7 +99,8 @@ def hand(spec: SlipSpec, robot: RobotModel) -> str:
 
 
 def gauge(spec: SlipSpec, world: World) -> Gauge:
-    """`within` minus the motion of the object's centre in the hand [m]; `turn` minus its turn there [rad]; the lesser.
+    """`within` minus the motion of the object's centre in the hand [m]; `rotation` minus its rotation there [rad]; the
+    lesser.
 
     It counts from the first tick that is looked at on which the object is held, and says nothing while it is not. A
     hand that still closes moves the object: for what slips from then on, say `during:` with the steps after the grasp.
@@ -106,7 +109,7 @@ def gauge(spec: SlipSpec, world: World) -> Gauge:
 
     def look(moments: Moments) -> Reading:
         held = moments.of_contacts(lambda contacts: held_force(contacts, spec.object)) >= spec.grip
-        far, turned = hold.slipped(moments, held)
+        far, rotated = hold.slipped(moments, held)
         idle = f"the robot never held '{spec.object}' between two links with {readable(spec.grip, 'N')}"
 
         def moved(k: int) -> str:
@@ -117,15 +120,15 @@ def gauge(spec: SlipSpec, world: World) -> Gauge:
                 spec.within - far, moments.times, unit="m", scale=spec.within, say=moved, applies=held, idle=idle
             )
         ]  # fmt: skip
-        if spec.turn is not None:
-            limit = spec.turn
+        if spec.rotation is not None:
+            limit = spec.rotation
 
             def twisted(k: int) -> str:
-                turn = readable(float(turned[k]), "rad")
-                return f"'{spec.object}' turned in the hand by {turn}; within {readable(limit, 'rad')}"
+                angle = readable(float(rotated[k]), "rad")
+                return f"'{spec.object}' rotated in the hand by {angle}; within {readable(limit, 'rad')}"
 
             readings.append(
-                reading(limit - turned, moments.times, unit="rad", scale=limit, say=twisted, applies=held, idle=idle)
+                reading(limit - rotated, moments.times, unit="rad", scale=limit, say=twisted, applies=held, idle=idle)
             )
         return least(readings)
 
@@ -153,5 +156,5 @@ SLIP = Condition(
     check=check,
     absent=lambda spec, world: untouchable(world) or unmoving(world, (spec.object,)),
     scope="always",
-    example="slip: {object: cup, within: 5 mm, turn: 5 deg}",
+    example="slip: {object: cup, within: 5 mm, rotation: 5 deg}",
 )

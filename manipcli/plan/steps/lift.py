@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -18,7 +18,7 @@ from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
-from manipcli.plan.steps.move import Speed
+from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
@@ -28,9 +28,11 @@ _LESS = "lift it less, `by: ...`; or take it in another way: `approach: {yaw: ..
 class LiftSpec(Model):
     """Raise what is held straight up, by a height in a range of which the middle is tried first."""
 
+    renamed: ClassVar = RENAMED
+
     object: str = Field(description="What is held and lifted.")
     by: Annotated[Range, Field(description="Height [m].")] = (0.08, 0.2)
-    speed: Speed = 0.5
+    velocity_scaling: VelocityScaling = 0.5
 
 
 def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
@@ -42,7 +44,7 @@ def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft = Draft(planner, situation, verb="lift")
         up = Transform.of(xyz=(0.0, 0.0, height))
         try:
-            draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.speed, allowed=under)
+            draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.velocity_scaling, allowed=under)
         except NotPlannable as refusal:
             raise NotPlannable(refusal.cause, hint=_LESS if refusal.reason == "line" else refusal.hint) from refusal
         return draft.plan()

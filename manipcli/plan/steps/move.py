@@ -1,11 +1,11 @@
 """`move`: the robot to a named pose, to joint positions, or the tool to a pose in a frame.
 
 - move: {to: home}
-- move: {to: {joint_1: 30 deg, joint_4: -1.2}, speed: 0.5}
+- move: {to: {joint_1: 30 deg, joint_4: -1.2}, velocity_scaling: 0.5}
 - move: {pose: {xyz: [0, 0, 0.2], rpy: [180 deg, 0, 0]}, frame: tray, path: linear}
 - move: {point: [0.4, 0.1, 0.3], pointing: [0, 0, -1]}
 - move: {pose: {xyz: [0, 0, 12 cm]}, frame: tool, path: linear, touch: [box]}
-- move: {pose: {xyz: [0, 0, 5 cm]}, frame: tool, path: linear, speed: 0.02, touch: [button], guarded: true}
+- move: {pose: {xyz: [0, 0, 5 cm]}, frame: tool, path: linear, velocity_scaling: 0.02, touch: [button], guarded: true}
   until: {contact_force: {pair: [robot, button], above: 5 N, mean_over: 50 ms}}
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -34,7 +34,10 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import JointValue, Share
 from manipcli.spec.robot import PoseSpec, Vector3
 
-Speed = Annotated[Share, Field(gt=0, le=1, description="Share of the velocity, acceleration and jerk limits.")]
+VelocityScaling = Annotated[
+    Share, Field(gt=0, le=1, description="Share of the velocity, acceleration and jerk limits.")
+]
+RENAMED = {"speed": "velocity_scaling"}
 
 
 class MoveSpec(Model):
@@ -56,6 +59,8 @@ class MoveSpec(Model):
     waits for `until` as other steps do.
     """
 
+    renamed: ClassVar = RENAMED
+
     to: str | dict[str, JointValue] | None = Field(None, description="A named pose, or joint positions by name.")
     pose: PoseSpec | None = Field(None, description="Where the tool goes, in `frame`.")
     point: Vector3 | None = Field(
@@ -70,7 +75,7 @@ class MoveSpec(Model):
         description="`linear`: the tool on a straight line. `joint`: straight in joint space, to the arm's nearest "
         "posture. `free`: the same, to another posture where the way to the nearest one is not free. Default `free`.",
     )
-    speed: Speed = 1.0
+    velocity_scaling: VelocityScaling = 1.0
     touch: tuple[str, ...] = Field((), description="Bodies that the hand, and what it holds, may touch. Default: none.")
     guarded: bool = Field(False, description="Stop as soon as the step's `until` holds. Default false.")
 
@@ -113,16 +118,16 @@ def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
         values = dict(zip(pose.joints, pose.positions, strict=True))
         arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
         chosen = arm if situation.closed and arm else values
-        draft.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.speed)
+        draft.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
-        draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.speed)
+        draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
     else:
         X_WT, leaving = _goal(spec, planner, situation)
         if spec.path == "linear":
-            draft.straight("move", X_WT, speed=spec.speed, leaving=leaving)
+            draft.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            draft.reach("move", X_WT, speed=spec.speed, free=spec.path == "free", leaving=leaving)
+            draft.reach("move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving)
     planned = draft.plan()
     (motion,) = planned.motions
     end = planned.end

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Annotated, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +25,7 @@ from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
-from manipcli.plan.steps.move import Speed
+from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, too_wide
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
@@ -99,11 +99,13 @@ class PickSpec(Model):
     open: from the other side, with the hand turned over, from above.
     """
 
+    renamed: ClassVar = RENAMED
+
     object: str = Field(description="What to take.")
     approach: ApproachSpec = Field(ApproachSpec(), description="From where the hand comes.")
     grasp: PickGraspSpec = Field(PickGraspSpec(), description="How the hand closes.")
     open: str = Field("open", description="The pose of the hand while approaching.")
-    speed: Speed = Field(
+    velocity_scaling: VelocityScaling = Field(
         1.0,
         description="Share of the velocity, acceleration and jerk limits in reaching; the straight approach: half.",
     )
@@ -148,8 +150,8 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequenc
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise NotPlannable(refusal.cause, hint=hint)
-        draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.speed, hand=spec.open)
-        draft.straight("approach", X_WG, speed=spec.speed / 2)
+        draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
+        draft.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
         draft.close(
             spec.grasp.posture,
             force=spec.grasp.force,
@@ -186,7 +188,7 @@ def _clear(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
         draft = Draft(planner, situation)
         draft.open(spec.open, around=spec.object)
         X_WT = backed_off(planner.tool_pose(situation), *candidate)
-        draft.withdraw(X_WT, spec.object, speed=spec.speed / 2, grazing=True)
+        draft.withdraw(X_WT, spec.object, speed=spec.velocity_scaling / 2, grazing=True)
         return draft.plan()
 
     ways = itertools.product(spread(spec.approach.distance), slopes())

@@ -1,7 +1,7 @@
 """`place`: set a held object down, let go, and withdraw.
 
 - place: {object: cup, at: start}
-- place: {object: block, at: [0.5, 0.2], on: table, yaw: 90 deg}
+- place: {object: block, at: [0.5, 0.2], onto: table, yaw: 90 deg}
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -26,7 +26,7 @@ from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
-from manipcli.plan.steps.move import Speed
+from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.scene.drop_test import FORMED, landing
 from manipcli.scene.scene import Body, Scene
@@ -36,8 +36,8 @@ from manipcli.spec.quantity import Length, Turn
 
 UPRIGHT = np.cos(np.radians(5.0))
 """What stands straighter than this (cosine of its tilt) can be placed on."""
-LEANS = tuple(np.radians([0.0, 2.0, 4.0]))
-"""How far [rad] an object may lean when it is let go."""
+TILTS = tuple(np.radians([0.0, 2.0, 4.0]))
+"""How far [rad] an object may tilt when it is let go."""
 ROUND = ("cup", "cylinder", "sphere")
 """Bodies as wide along their diagonal as along their axes."""
 POINTING = 0.5
@@ -60,11 +60,13 @@ class PlaceSpec(Model):
     At [x, y] it stands upright, also what was picked lying. It fails where the hand does not let go.
     """
 
+    renamed: ClassVar = {**RENAMED, "on": "onto"}
+
     object: str = Field(description="What is held and put down.")
     at: Literal["start"] | tuple[Length, Length] = Field(
-        "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `on`."
+        "start", description="`start`: where it stood at the start; or [x, y] in the world, on the body `onto`."
     )
-    on: str | None = Field(
+    onto: str | None = Field(
         None,
         description="The body that takes the object at [x, y]: on its top, or inside a tray; in or on a URDF or a mesh "
         "where it is met from above.",
@@ -73,7 +75,7 @@ class PlaceSpec(Model):
     clearance: Annotated[Range, Field(description="Height from which it is lowered straight [m].")] = (0.04, 0.1)
     retreat: Annotated[Range, Field(description="How far the hand withdraws straight [m].")] = (0.12, 0.18)
     posture: str = Field("open", description="The pose to which the hand opens.")
-    speed: Speed = Field(
+    velocity_scaling: VelocityScaling = Field(
         0.5, description="Share of the velocity, acceleration and jerk limits in carrying; lowering takes half of it."
     )
 
@@ -83,7 +85,7 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
 
     Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
     latter alone where the open hand is too near to it anyhow, as around one that sits deep in it. Where the arm would
-    come too near to something, the object is put down leaning a little, the arm higher: it stands up when let go.
+    come too near to something, the object is put down a little tilted, the arm higher: it stands up when let go.
     """
     planner.held(situation, spec.object)
     planner.free_start(situation)
@@ -91,40 +93,40 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
     X_OT = planner.held_in_tool(situation).inverse()
     lowered: dict[tuple[float, float], Draft | NotPlannable] = {}
 
-    def lower(lean: float, clearance: float) -> Draft:
+    def lower(tilt: float, clearance: float) -> Draft:
         """Down at the place; found once for all ways to withdraw."""
-        X_WL = _leaning(planner.scene.body(spec.object), X_WG, X_OT, lean)
+        X_WL = _tilted(planner.scene.body(spec.object), X_WG, X_OT, tilt)
         X_WT = X_WL @ X_OT
         draft = Draft(planner, situation)
         with _hinted(_OVER):
-            draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
+            draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
         support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
         with _hinted(_LOWER):
-            draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
+            draft.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
         return draft
 
     def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
-        lean, grazing, clearance, retreat, slope = candidate
-        if (lean, clearance) not in lowered:
+        tilt, grazing, clearance, retreat, slope = candidate
+        if (tilt, clearance) not in lowered:
             try:
-                lowered[lean, clearance] = lower(lean, clearance)
+                lowered[tilt, clearance] = lower(tilt, clearance)
             except NotPlannable as refusal:
-                lowered[lean, clearance] = refusal
-        down = lowered[lean, clearance]
+                lowered[tilt, clearance] = refusal
+        down = lowered[tilt, clearance]
         if isinstance(down, NotPlannable):
             raise NotPlannable(down.cause, hint=down.hint)
         draft = down.copy()
         with _hinted(_ROOMIER):
             draft.open(spec.posture, must_arrive=True)
         X_WT = planner.tool_pose(draft.now)
-        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
+        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
         planned = draft.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
     near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
-    leans = LEANS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
-    candidates = itertools.product(leans, (True,) if near else (False, True), *ways)
+    tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
+    candidates = itertools.product(tilts, (True,) if near else (False, True), *ways)
     return first_feasible(attempt, candidates, what=f"no way to place '{spec.object}'")
 
 
@@ -145,19 +147,19 @@ def _horizontal(X_WT: Transform) -> Array | None:
     return np.array([x, y, 0.0]) / length if length > POINTING else None
 
 
-def _leaning(body: Body, X_WG: Transform, X_OT: Transform, lean: float) -> Transform:
-    """X_WO of a body that stands at X_WG, tilted on its far edge by `lean` [rad], so that the arm behind the tool is
+def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transform:
+    """X_WO of a body that stands at X_WG, tilted on its far edge by `tilt` [rad], so that the arm behind the tool is
     higher."""
     h = _horizontal(X_WG @ X_OT)
-    if h is None or lean == 0.0:
+    if h is None or tilt == 0.0:
         return X_WG
     foot = X_WG @ Transform.of(xyz=(body.centre[0], body.centre[1], body.centre[2] - body.size[2] / 2))
     x, y, _ = np.abs(X_WG.R.T @ h)
     width, depth, _ = body.size
     edge = max(width, depth) / 2 if body.kind in ROUND else (x * width + y * depth) / 2
     # z x h turns h downwards; the far edge stays on the ground.
-    R = matrix_from_axis_angle(np.cross([0.0, 0.0, 1.0], h), lean)
-    up = np.array([0.0, 0.0, edge * np.sin(lean)])
+    R = matrix_from_axis_angle(np.cross([0.0, 0.0, 1.0], h), tilt)
+    up = np.array([0.0, 0.0, edge * np.sin(tilt)])
     about = Transform.of(xyz=foot.p + up, R=R) @ Transform.of(xyz=-foot.p)
     return about @ X_WG
 
@@ -167,18 +169,18 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
     body = planner.scene.body(spec.object)
     if spec.at == "start":
         return body.X_WO
-    assert spec.on is not None  # `check` asks for it
-    X_WU = planner.body_pose(situation, spec.on)
-    under = planner.scene.body(spec.on)
+    assert spec.onto is not None  # `check` asks for it
+    X_WU = planner.body_pose(situation, spec.onto)
+    under = planner.scene.body(spec.onto)
     if X_WU.R[2, 2] < UPRIGHT:
-        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.on}', which is tilted", loc=("on",))
+        raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.onto}', which is tilted", loc=("onto",))
     floor, size = _surface(under)
     x, y, _ = X_WU.inverse().apply([*spec.at, 0.0]) - under.centre
     if abs(x) > size[0] / 2 or abs(y) > size[1] / 2:
         raise NotPlannable(
-            f"[{spec.at[0]:g}, {spec.at[1]:g}] m lies beside '{spec.on}', whose middle is at "
+            f"[{spec.at[0]:g}, {spec.at[1]:g}] m lies beside '{spec.onto}', whose middle is at "
             f"[{X_WU.p[0]:g}, {X_WU.p[1]:g}] m",
-            hint=f"`at` is in the world; '{spec.on}' offers {size[0]:g} m x {size[1]:g} m about its middle",
+            hint=f"`at` is in the world; '{spec.onto}' offers {size[0]:g} m x {size[1]:g} m about its middle",
             loc=("at",),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
@@ -190,8 +192,8 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
     deeper = landing(body, X_WG, under, X_WU)
     if deeper is None:
         raise NotPlannable(
-            f"nothing of '{spec.on}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
-            hint=f"choose `at` over a part of '{spec.on}'",
+            f"nothing of '{spec.onto}' lies below '{spec.object}' at [{spec.at[0]:g}, {spec.at[1]:g}] m",
+            hint=f"choose `at` over a part of '{spec.onto}'",
             loc=("at",),
         )
     return Transform.of(xyz=(0.0, 0.0, -deeper)) @ X_WG
@@ -211,16 +213,16 @@ def check(spec: PlaceSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ..
     """Unknown bodies and postures; a place without a support."""
     found = unknown_body(scene, spec.object, ("object",), movable=True)
     found += unknown_posture(robot, spec.posture, ("posture",))
-    if spec.on is not None and spec.on == spec.object:
-        found += (Problem(loc=("on",), message=f"'{spec.object}' cannot be placed on itself"),)
-    elif spec.on is not None:
-        found += unknown_body(scene, spec.on, ("on",))
+    if spec.onto is not None and spec.onto == spec.object:
+        found += (Problem(loc=("onto",), message=f"'{spec.object}' cannot be placed on itself"),)
+    elif spec.onto is not None:
+        found += unknown_body(scene, spec.onto, ("onto",))
     elif spec.at != "start":
-        found += (Problem(loc=("at",), message="[x, y] needs the body it is on", hint="add `on: BODY`"),)
+        found += (Problem(loc=("at",), message="[x, y] needs the body it is on", hint="add `onto: BODY`"),)
     if spec.at == "start":
         found += tuple(
             Problem(loc=(word,), message=f"`{word}` goes with `at: [x, y]`", hint="`at: start` says it all")
-            for word, value in (("on", spec.on), ("yaw", spec.yaw))
+            for word, value in (("onto", spec.onto), ("yaw", spec.yaw))
             if value is not None
         )
     return found

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -31,7 +31,7 @@ from manipcli.plan.draft import Draft
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
 from manipcli.plan.step import Situation, StepMember, StepPlan
-from manipcli.plan.steps.move import Speed
+from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Angle, Pause
@@ -44,12 +44,16 @@ UP = np.array([0.0, 0.0, 1.0])
 class PourSpec(Model):
     """Carry what is held over a container, tilt it about a horizontal axis of the hand, wait, and tilt it back."""
 
+    renamed: ClassVar = RENAMED
+
     object: str = Field(description="The container that is held and tilted.")
     into: str = Field(description="The container that receives.")
     tilt: Annotated[Angle, Field(gt=0, le=math.pi, description="How far to tilt [rad].")] = math.radians(120)
     dwell: Annotated[Pause, Field(ge=0, description="How long to stay tilted [s], to 1 h; `until` prolongs it.")] = 1.0
     clearance: Annotated[Range, Field(description="Lip above the receiving rim [m].")] = (0.04, 0.12)
-    speed: Speed = Field(0.5, description="Share of the velocity, acceleration and jerk limits, carrying and tilting.")
+    velocity_scaling: VelocityScaling = Field(
+        0.5, description="Share of the velocity, acceleration and jerk limits, carrying and tilting."
+    )
 
 
 def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
@@ -72,8 +76,8 @@ def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
         draft = Draft(planner, situation)
-        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.speed)
-        draft.turn("tilt", a, theta, speed=spec.speed)
+        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
+        draft.turn("tilt", a, theta, speed=spec.velocity_scaling)
         draft.dwell("dwell", spec.dwell)
         if spec.tilt > math.pi / 2:
             draft.spill(spec.into)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from manipcli.core.errors import Loc, Place
@@ -71,6 +72,16 @@ def plain(node: Node) -> Plain:
     if isinstance(node, SequenceNode):
         return [plain(item) for item in node.items]
     return node.value
+
+
+def mapped(node: Node, change: Callable[[ScalarNode, Loc], Node], path: Loc = ()) -> Node:
+    """The tree with `change(scalar, its path)` in the place of each scalar."""
+    if isinstance(node, MappingNode):
+        entries = {k: Entry(e.key_place, mapped(e.node, change, (*path, k))) for k, e in node.entries.items()}
+        return MappingNode(entries, node.place)
+    if isinstance(node, SequenceNode):
+        return SequenceNode(tuple(mapped(item, change, (*path, k)) for k, item in enumerate(node.items)), node.place)
+    return change(node, path)
 
 
 def child(node: Node, part: str | int) -> Node | None:

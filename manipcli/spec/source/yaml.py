@@ -29,7 +29,7 @@ import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
 import yaml
 
@@ -67,22 +67,14 @@ def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Fi
         InvalidInput: with every finding up to the first syntax error.
     """
     if len(data) > MAX_BYTES:
-        message = f"the file is larger than {MAX_BYTES // 1_000_000} MB"
-        raise InvalidInput([Finding("YAML103", message, Place(name, 1, 1))])
+        raise _refusal("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", Place(name, 1, 1))
     text = _decode(data, name) if isinstance(data, bytes) else data
     text = text.removeprefix("\ufeff")
     control = _CONTROL.search(text)
     if control is not None:
-        raise InvalidInput(
-            [
-                Finding(
-                    "YAML102",
-                    f"control character U+{ord(control.group()):04X}",
-                    _place_at(text, control.start(), name),
-                    hint="remove it, or write it as an escape in double quotes",
-                )
-            ]
-        )
+        message = f"control character U+{ord(control.group()):04X}"
+        hint = "remove it, or write it as an escape in double quotes"
+        raise _refusal("YAML102", message, _place_at(text, control.start(), name), hint)
     composer = _Composer(name=name, text=text, infinite=infinite)
     try:
         root = composer.document(_events(text))
@@ -97,35 +89,23 @@ def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Fi
     return root
 
 
+def _refusal(code: str, message: str, place: Place, hint: str | None = None) -> InvalidInput:
+    return InvalidInput([Finding(code, message, place, hint=hint)])
+
+
 def _decode(data: bytes, name: str) -> str:
-    start = Place(name, 1, 1)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)) or b"\0" in data[:4]:
-        raise InvalidInput(
-            [
-                Finding(
-                    "YAML101",
-                    "the file is not UTF-8 but looks like UTF-16 or UTF-32",
-                    start,
-                    hint="save it as UTF-8: iconv -f utf-16 -t utf-8",
-                )
-            ]
-        )
+        message = "the file is not UTF-8 but looks like UTF-16 or UTF-32"
+        raise _refusal("YAML101", message, Place(name, 1, 1), "save it as UTF-8: iconv -f utf-16 -t utf-8")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8").removeprefix("\ufeff")
-        raise InvalidInput(
-            [
-                Finding(
-                    "YAML101",
-                    f"the byte 0x{data[error.start]:02x} is not UTF-8",
-                    _place_at(before, len(before), name),
-                    hint="this is a binary file, and no YAML"
-                    if b"\0" in data
-                    else "the file looks like latin-1; save it as UTF-8: iconv -f latin1 -t utf-8",
-                )
-            ]
-        ) from None
+        hint = "the file looks like latin-1; save it as UTF-8: iconv -f latin1 -t utf-8"
+        if b"\0" in data:
+            hint = "this is a binary file, and no YAML"
+        message = f"the byte 0x{data[error.start]:02x} is not UTF-8"
+        raise _refusal("YAML101", message, _place_at(before, len(before), name), hint) from None
 
 
 def _place_at(text: str, index: int, name: str) -> Place:
@@ -137,34 +117,7 @@ def _place_at(text: str, index: int, name: str) -> Place:
 
 def _events(text: str) -> Iterator[yaml.Event]:
     """PyYAML's parser alone: libyaml's where the wheel has it, else the Python one."""
-    parser = _parser(text)
-    while parser.check_event():
-        event = parser.get_event()
-        if event is not None:
-            yield event
-
-
-class _PurePythonParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
-    """Text to events, without resolver, composer and constructor."""
-
-    def __init__(self, text: str) -> None:
-        yaml.reader.Reader.__init__(self, text)
-        yaml.scanner.Scanner.__init__(self)
-        yaml.parser.Parser.__init__(self)
-
-
-class _Parser(Protocol):
-    def check_event(self) -> bool: ...
-
-    def get_event(self) -> yaml.Event | None: ...
-
-
-def _parser(text: str) -> _Parser:
-    if not yaml.__with_libyaml__:
-        return _PurePythonParser(text)
-    from yaml._yaml import CParser  # the compiled part, which not every build of PyYAML has
-
-    return CParser(text)
+    return yaml.parse(text, Loader=yaml.CBaseLoader if yaml.__with_libyaml__ else yaml.BaseLoader)
 
 
 _CLEARER: tuple[tuple[str, str, str | None], ...] = (

@@ -80,7 +80,7 @@ class HoldFacts:
         touching: number of links that touch it.
         links: their names, the one with the largest force first.
         slip: of the middle of the body in the tool frame since `grasped` [m]; None where that is not known.
-        turn: of the body in the tool frame since then [rad].
+        rotation: of the body in the tool frame since then [rad].
     """
 
     hold: Hold
@@ -88,7 +88,7 @@ class HoldFacts:
     touching: Spread
     links: tuple[str, ...]
     slip: Slip | None
-    turn: Slip | None
+    rotation: Slip | None
 
 
 def find_holds(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], float]:
@@ -197,7 +197,7 @@ class HoldMeter:
         self._touching = _Weighted()
         self._links: dict[str, float] = {}
         self._now: tuple[float, dict[str, float]] | None = None
-        self._slip, self._turn = _Farthest(), _Farthest()
+        self._slip, self._rotation = _Farthest(), _Farthest()
         self._origin: tuple[Array, Array] | None = None
 
     def add(self, span: Span, bodies: Mapping[str, int]) -> None:
@@ -222,7 +222,7 @@ class HoldMeter:
         self._slip.add(times[mine], np.linalg.norm(p_TC - p0, axis=1))
         between = quat_product(q0 * (-1.0, -1.0, -1.0, 1.0), q_TO)
         angle = 2.0 * np.arctan2(np.linalg.norm(between[:, :3], axis=1), np.abs(between[:, 3]))
-        self._turn.add(times[mine], angle)
+        self._rotation.add(times[mine], angle)
 
     def _contacts(self, snapshot: ContactSnapshot) -> None:
         self._pass(snapshot.time)
@@ -254,7 +254,7 @@ class HoldMeter:
             touching=self._touching.spread(),
             links=tuple(sorted(self._links, key=lambda link: -self._links[link])),
             slip=self._slip.found(),
-            turn=self._turn.found(),
+            rotation=self._rotation.found(),
         )
 
 

@@ -10,12 +10,12 @@ import pytest
 
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.judge.measures.facts import RunFacts, run_facts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
 from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
-from manipcli.report.facts import RunFacts, run_facts
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry
 
@@ -162,10 +162,10 @@ def test_a_slip_is_that_of_the_middle_of_the_body_in_the_tool_frame(facts: RunFa
     (held,) = facts.holds
     hold = held.hold
     assert (hold.body, hold.grasped, hold.lifted, hold.until, hold.ended) == ("cup", 0.8, 1.0, 2.5, "set down")
-    assert held.slip is not None and held.turn is not None
+    assert held.slip is not None and held.rotation is not None
     assert held.slip.most == pytest.approx(0.004, abs=1e-9) and held.slip.at == pytest.approx(1.501)
     assert held.slip.last == pytest.approx(0.001, abs=1e-9)
-    assert (held.turn.most, held.turn.last) == pytest.approx((0.05, 0.05), abs=1e-6)
+    assert (held.rotation.most, held.rotation.last) == pytest.approx((0.05, 0.05), abs=1e-6)
 
 
 def test_contact_forces_are_weighted_by_time(facts: RunFacts) -> None:
@@ -234,5 +234,5 @@ def test_a_body_of_which_no_pose_is_recorded_has_no_slip() -> None:
     (span,) = recording.spans
     unknown = replace(span.states, body_position=np.full_like(span.states.body_position, np.nan))
     found = run_facts(replace(recording, spans=(replace(span, states=unknown),)), _robot(), _scene(), STEPS)
-    assert [(one.slip, one.turn) for one in found.holds] == [(None, None)]
+    assert [(one.slip, one.rotation) for one in found.holds] == [(None, None)]
     assert found.holds[0].force.most == 6.0

@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen, wrapped
 from manipcli.judge.cuts import Cuts
+from manipcli.judge.measures.holds import HoldFacts, HoldMeter, find_holds
+from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording, Span
-from manipcli.replay.sampling import references
-from manipcli.report.holds import HoldFacts, HoldMeter, find_holds
 from manipcli.scene.scene import Scene
 
 BUCKETS = 240

@@ -7,11 +7,11 @@ import pytest
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Joint, JointLimits, Link
+from manipcli.judge.measures.step_measures import step_measures
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.recording import ContactSnapshot, Recording, Span
-from manipcli.report.step_measures import step_measures
 
 PERIOD = 0.001
 RADIUS = 0.5
