@@ -41,7 +41,7 @@ def controlled_joints(subject: Subject) -> Iterator[ControlledJoint]:
         for joint in component.all("joint"):
             yield ControlledJoint(
                 component=component.attributes.get("name", ""),
-                name=joint.attributes.get("name", "").strip(),
+                name=joint.name,
                 element=joint,
                 commands=joint.all("command_interface"),
             )
@@ -56,7 +56,7 @@ def transmissions(subject: Subject) -> Iterator[WrittenTransmission]:
             kind = element.first("type") or element.first("plugin")
             if kind is not None and kind.text:
                 yield WrittenTransmission(
-                    name=element.attributes.get("name", "").strip() or "(without a name)",
+                    name=element.name or "(without a name)",
                     type=kind.text.strip().rpartition("/")[2],
                     ros1=ros1,
                     element=element,

@@ -31,6 +31,11 @@ class Element:
     place: Place | None
     text_place: Place | None = None
 
+    @property
+    def name(self) -> str:
+        """Its attribute `name` without blanks around; '' where it has none."""
+        return self.attributes.get("name", "").strip()
+
     def all(self, tag: str) -> tuple[Element, ...]:
         return tuple(child for child in self.children if child.tag == tag)
 

@@ -35,7 +35,7 @@ def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
     """The elements of a tag directly below <robot>, by name; the first of several."""
     found: dict[str, Element] = {}
     for element in root.all(tag):
-        found.setdefault(element.attributes.get("name", "").strip(), element)
+        found.setdefault(element.name, element)
     return found
 
 

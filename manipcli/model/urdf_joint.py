@@ -192,7 +192,7 @@ def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -
 
 
 def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
-    name = element.attributes.get("name", "").strip() or "(without a name)"
+    name = element.name or "(without a name)"
     kind = element.first("type") or element.first("plugin")
     if kind is None or not kind.text:
         message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.errors import Finding
-from manipcli.model.check import Check, Subject, found_while_reading
+from manipcli.model.check import Subject, check, found_while_reading
 from manipcli.model.mesh import SUFFIXES
 from manipcli.model.mesh_facts import mesh_facts, scaled_box
 from manipcli.model.mesh_fault import UnusableMesh
@@ -23,8 +23,12 @@ SMALLEST: Final = 0.001
 MANY_TRIANGLES: Final = 200_000
 
 
+@check("URDF033", "missing-visual", "assets", "warning", bad=one_link('filename="package://missing_package/a.stl"'))
 def _missing_visual(subject: Subject) -> Iterator[Finding]:
-    """Visual meshes and textures that are not found."""
+    """A visual mesh or a texture is not found.
+
+    The link is not drawn; PyBullet refuses the whole robot for it, so engines are given none.
+    """
     yield from found_while_reading("URDF033")(subject)
     for element, _ in known_elements(subject.description.root):
         uri = element.attributes.get("filename", "").strip()
@@ -35,8 +39,19 @@ def _missing_visual(subject: Subject) -> Iterator[Finding]:
                 yield Finding("URDF033", f"texture: {error.message}", element.place, error.hint, "warning")
 
 
+@check(
+    "URDF203",
+    "mesh-suffix",
+    "assets",
+    "warning",
+    bad=one_link('filename="a.obj"'),
+    files=lambda: {"a.obj": binary_stl(TETRAHEDRON)},
+)
 def _mesh_suffix(subject: Subject) -> Iterator[Finding]:
-    """Names of mesh files that say another format than the file has."""
+    """The name of a mesh file says another format than the file has.
+
+    Most programs go by the name and fail, or draw nothing; here the content decides.
+    """
     for mesh in named_meshes(subject):
         facts = mesh.facts
         if facts is None or mesh.path is None:
@@ -50,8 +65,12 @@ def _mesh_suffix(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF203", message, mesh.element.place, f"name it *{ending}", "warning")
 
 
+@check("URDF204", "absolute-mesh", "assets", "warning", bad=one_link('filename="file:///home/somebody/robot/base.stl"'))
 def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
-    """Meshes named by an absolute path."""
+    """A mesh is named by an absolute path.
+
+    The description works on the machine it was written on and on no other.
+    """
     for mesh in named_meshes(subject):
         uri = mesh.uri
         windows = bool(PureWindowsPath(uri).drive)
@@ -62,8 +81,19 @@ def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
             )
 
 
+@check(
+    "URDF206",
+    "mesh-unit",
+    "assets",
+    "warning",
+    bad=one_link('filename="a.stl"'),
+    files=lambda: {"a.stl": binary_stl(TETRAHEDRON * 300.0)},
+)
 def _mesh_unit(subject: Subject) -> Iterator[Finding]:
-    """Meshes of a size that no part of a robot has."""
+    """A mesh is longer than 10 m or shorter than 1 mm: another unit?
+
+    STL and OBJ state no unit and URDF counts in metres; an arm of 300 m is one drawn in millimetres.
+    """
     for mesh in named_meshes(subject):
         facts = mesh.facts
         if facts is None:
@@ -78,8 +108,19 @@ def _mesh_unit(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF206", message, mesh.element.place, hint, "warning")
 
 
+@check(
+    "URDF207",
+    "mesh-triangles",
+    "assets",
+    "warning",
+    bad=one_link('filename="a.stl"', role="collision"),
+    files=lambda: {"a.stl": binary_stl(np.tile(TETRAHEDRON, (MANY_TRIANGLES // 4 + 1, 1, 1)))},
+)
 def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
-    """Collision meshes of more triangles than a collision needs."""
+    """A collision mesh has more than 200 000 triangles.
+
+    Every load reads it all (seconds for a million), for a hull that needs a hundred. 2 000 000 are refused.
+    """
     for mesh in named_meshes(subject):
         facts = mesh.facts
         if mesh.role == "collision" and facts is not None and facts.triangles > MANY_TRIANGLES:
@@ -89,8 +130,19 @@ def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
             )
 
 
+@check(
+    "URDF208",
+    "ascii-stl",
+    "assets",
+    "note",
+    bad=one_link('filename="a.stl"'),
+    files=lambda: {"a.stl": ascii_tetrahedron()},
+)
 def _ascii_stl(subject: Subject) -> Iterator[Finding]:
-    """STL files written as text."""
+    """An STL file is written as text.
+
+    PyBullet, among others, takes it for empty without a word; engines get a binary one here.
+    """
     for mesh in named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.format == "stl-ascii":
@@ -98,8 +150,19 @@ def _ascii_stl(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF208", message, mesh.element.place, "save it as binary STL", "note")
 
 
+@check(
+    "URDF209",
+    "mirrored-mesh",
+    "assets",
+    "note",
+    bad=one_link('filename="a.stl" scale="1 -1 1"'),
+    files=lambda: {"a.stl": binary_stl(TETRAHEDRON)},
+)
 def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
-    """Meshes with a negative scale."""
+    """A mesh is mirrored by a negative scale.
+
+    Legal and common for left and right parts; some programs draw such a mesh inside out.
+    """
     for mesh in named_meshes(subject):
         if min(mesh.scale) < 0.0:
             shown = " ".join(f"{value:g}" for value in mesh.scale)
@@ -107,8 +170,20 @@ def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF209", message, mesh.element.place, None, "note")
 
 
+@check(
+    "URDF211",
+    "collada-up-axis",
+    "assets",
+    "note",
+    bad=one_link('filename="a.dae"'),
+    files=lambda: {"a.dae": collada_tetrahedron(up_axis="Y_UP")},
+)
 def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
-    """Collada files that state another up axis than z."""
+    """A Collada file states an up axis other than z, or none.
+
+    RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and three.js
+    turn the mesh. Only a file with z up looks the same everywhere.
+    """
     for mesh in named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.up_axis != "Z_UP":
@@ -117,8 +192,19 @@ def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF211", message, mesh.element.place, "export it with z up: programs differ", "note")
 
 
+@check(
+    "URDF212",
+    "unusable-visual",
+    "assets",
+    "warning",
+    bad=one_link('filename="text.stl"'),
+    files=lambda: {"text.stl": b"<!DOCTYPE html><html>404 not found</html>"},
+)
 def _unusable_visual(subject: Subject) -> Iterator[Finding]:
-    """Visual meshes whose files hold no mesh."""
+    """A visual mesh is damaged, empty, too large, or of a format that is not read.
+
+    The link is not drawn. An engine that reads it may crash, so it is given none.
+    """
     for mesh in named_meshes(subject):
         if mesh.role == "collision" or mesh.path is None:
             continue
@@ -127,109 +213,3 @@ def _unusable_visual(subject: Subject) -> Iterator[Finding]:
         except UnusableMesh as error:
             message = f"visual mesh '{mesh.uri}' {error.reason}"
             yield Finding("URDF212", message, mesh.element.place, error.hint, "warning")
-
-
-MESH_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF033",
-        name="missing-visual",
-        tier="assets",
-        severity="warning",
-        summary="A visual mesh or a texture is not found",
-        reason="The link is not drawn; PyBullet refuses the whole robot for it, so engines are given none.",
-        bad=one_link('filename="package://missing_package/a.stl"'),
-        find=_missing_visual,
-    ),
-    Check(
-        code="URDF203",
-        name="mesh-suffix",
-        tier="assets",
-        severity="warning",
-        summary="The name of a mesh file says another format than the file has",
-        reason="Most programs go by the name and fail, or draw nothing; here the content decides.",
-        bad=one_link('filename="a.obj"'),
-        find=_mesh_suffix,
-        files=lambda: {"a.obj": binary_stl(TETRAHEDRON)},
-    ),
-    Check(
-        code="URDF204",
-        name="absolute-mesh",
-        tier="assets",
-        severity="warning",
-        summary="A mesh is named by an absolute path",
-        reason="The description works on the machine it was written on and on no other.",
-        bad=one_link('filename="file:///home/somebody/robot/base.stl"'),
-        find=_absolute_mesh,
-    ),
-    Check(
-        code="URDF206",
-        name="mesh-unit",
-        tier="assets",
-        severity="warning",
-        summary="A mesh is longer than 10 m or shorter than 1 mm: another unit?",
-        reason="STL and OBJ state no unit and URDF counts in metres; an arm of 300 m is one drawn in millimetres.",
-        bad=one_link('filename="a.stl"'),
-        find=_mesh_unit,
-        files=lambda: {"a.stl": binary_stl(TETRAHEDRON * 300.0)},
-    ),
-    Check(
-        code="URDF207",
-        name="mesh-triangles",
-        tier="assets",
-        severity="warning",
-        summary="A collision mesh has more than 200 000 triangles",
-        reason=(
-            "Every load reads it all (seconds for a million), for a hull that needs a hundred. 2 000 000 are refused."
-        ),
-        bad=one_link('filename="a.stl"', role="collision"),
-        find=_mesh_triangles,
-        files=lambda: {"a.stl": binary_stl(np.tile(TETRAHEDRON, (MANY_TRIANGLES // 4 + 1, 1, 1)))},
-    ),
-    Check(
-        code="URDF208",
-        name="ascii-stl",
-        tier="assets",
-        severity="note",
-        summary="An STL file is written as text",
-        reason="PyBullet, among others, takes it for empty without a word; engines get a binary one here.",
-        bad=one_link('filename="a.stl"'),
-        find=_ascii_stl,
-        files=lambda: {"a.stl": ascii_tetrahedron()},
-    ),
-    Check(
-        code="URDF209",
-        name="mirrored-mesh",
-        tier="assets",
-        severity="note",
-        summary="A mesh is mirrored by a negative scale",
-        reason="Legal and common for left and right parts; some programs draw such a mesh inside out.",
-        bad=one_link('filename="a.stl" scale="1 -1 1"'),
-        find=_mirrored_mesh,
-        files=lambda: {"a.stl": binary_stl(TETRAHEDRON)},
-    ),
-    Check(
-        code="URDF211",
-        name="collada-up-axis",
-        tier="assets",
-        severity="note",
-        summary="A Collada file states an up axis other than z, or none",
-        reason=(
-            "RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and "
-            "three.js turn the mesh. Only a file with z up looks the same everywhere."
-        ),
-        bad=one_link('filename="a.dae"'),
-        find=_collada_up_axis,
-        files=lambda: {"a.dae": collada_tetrahedron(up_axis="Y_UP")},
-    ),
-    Check(
-        code="URDF212",
-        name="unusable-visual",
-        tier="assets",
-        severity="warning",
-        summary="A visual mesh is damaged, empty, too large, or of a format that is not read",
-        reason="The link is not drawn. An engine that reads it may crash, so it is given none.",
-        bad=one_link('filename="text.stl"'),
-        find=_unusable_visual,
-        files=lambda: {"text.stl": b"<!DOCTYPE html><html>404 not found</html>"},
-    ),
-)

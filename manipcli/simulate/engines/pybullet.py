@@ -12,7 +12,7 @@ from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.batch_kinematics import still_links
-from manipcli.model.checks.too_many_joints import MAX_JOINTS
+from manipcli.model.checks.joints import MAX_JOINTS
 from manipcli.model.normalise import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
