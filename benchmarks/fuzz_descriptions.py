@@ -94,7 +94,7 @@ def gather() -> Seeds:
     import pybullet_data
 
     from manipcli.model.checks import CHECKS
-    from manipcli.model.mesh_stl import binary_stl
+    from manipcli.model.mesh_formats import binary_stl
     from manipcli.model.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_joint
 
     descriptions: list[tuple[str, bytes, dict[str, bytes]]] = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.mesh import read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.mesh_formats import UnusableMesh
 from manipcli.model.robot import Box, Cylinder, Mesh, Shape, Sphere
 
 if TYPE_CHECKING:

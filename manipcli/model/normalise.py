@@ -16,7 +16,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, Transform
-from manipcli.model.mesh_files import clean_mesh
+from manipcli.model.mesh import clean_mesh
 from manipcli.model.robot import (
     Box,
     Cylinder,

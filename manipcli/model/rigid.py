@@ -8,8 +8,8 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.model.located_xml import Element
-from manipcli.model.mesh_facts import mesh_facts, scaled_box
-from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.mesh import mesh_facts, scaled_box
+from manipcli.model.mesh_formats import UnusableMesh
 from manipcli.model.robot import Box, Cylinder, Geometry, Joint, Link, Mesh, Shape
 from manipcli.model.urdf import Parts
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from manipcli.model.located_xml import Element
-from manipcli.model.mesh_facts import mesh_facts
-from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.mesh import mesh_facts
+from manipcli.model.mesh_formats import UnusableMesh
 from manipcli.model.packages import Absent, NotFound, Outside, Packages, RemoteFile
 from manipcli.model.robot import Mesh
 from manipcli.model.urdf_numbers import Reader

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from manipcli.model.mesh import TriangleMesh, read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
+from manipcli.model.mesh_formats import UnusableMesh
 from manipcli.model.robot import Rgba
 from manipcli.replay.surface import Surface, smoothed
 

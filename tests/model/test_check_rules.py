@@ -9,7 +9,7 @@ import pytest
 
 from manipcli.core.errors import Finding
 from manipcli.model.examine import examine
-from manipcli.model.mesh_stl import binary_stl
+from manipcli.model.mesh_formats import binary_stl
 from manipcli.model.packages import Packages
 from manipcli.model.samples import CUBE, INERTIAL, LIMIT, MOTOR, TETRAHEDRON, one_joint, one_link, transmission
 from manipcli.model.zero_overlap import overlaps_at_zero

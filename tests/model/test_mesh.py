@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 
 from manipcli.core.errors import InvalidInput
 from manipcli.model import mesh as mesh_module
-from manipcli.model import mesh_collada, mesh_stl
+from manipcli.model import mesh_collada, mesh_formats
 from manipcli.model.coal_shape import coal_shape
-from manipcli.model.mesh import read_mesh
-from manipcli.model.mesh_fault import UnusableMesh
-from manipcli.model.mesh_files import clean_mesh
-from manipcli.model.mesh_stl import binary_stl
+from manipcli.model.mesh import clean_mesh, read_mesh
+from manipcli.model.mesh_formats import UnusableMesh, binary_stl
 from manipcli.model.robot import Mesh
 from manipcli.model.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron
 
@@ -183,7 +181,7 @@ def test_sizes_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with path.open("wb") as file:
         file.truncate(mesh_module.MAX_BYTES + 1)
     assert "at most 256 MB" in reason(path)
-    monkeypatch.setattr(mesh_stl, "MAX_TRIANGLES", 3)
+    monkeypatch.setattr(mesh_formats, "MAX_TRIANGLES", 3)
     assert "has 4 triangles; at most 3" in reason(write(tmp_path / "many.stl", binary_stl(TETRAHEDRON)))
     monkeypatch.setattr(mesh_collada, "MAX_TRIANGLES", 3)
     assert "more than 3 triangles" in reason(write(tmp_path / "many.dae", DAE))

@@ -1,26 +1,71 @@
 """Mesh files that are not what they seem, or that other programs read in another way."""
 
 from collections.abc import Iterator
-from pathlib import PurePosixPath, PureWindowsPath
-from typing import Final
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Final, Literal
 
 import numpy as np
 
 from manipcli.core.errors import Finding
 from manipcli.model.check import Subject, check, found_while_reading
-from manipcli.model.mesh import SUFFIXES
-from manipcli.model.mesh_facts import mesh_facts, scaled_box
-from manipcli.model.mesh_fault import UnusableMesh
-from manipcli.model.mesh_stl import binary_stl
-from manipcli.model.named_meshes import named_meshes
+from manipcli.model.located_xml import Element
+from manipcli.model.mesh import SUFFIXES, MeshFacts, mesh_facts, scaled_box
+from manipcli.model.mesh_formats import UnusableMesh, binary_stl
 from manipcli.model.packages import NotFound
 from manipcli.model.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_link
+from manipcli.model.urdf_numbers import finite
 from manipcli.model.urdf_schema import known_elements
 
 LARGEST: Final = 10.0
 SMALLEST: Final = 0.001
 """[m]: the longest edge of the box about a mesh lies between these."""
 MANY_TRIANGLES: Final = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class _NamedMesh:
+    """A <mesh> of a description: `path` is None where its file is not found."""
+
+    role: Literal["visual", "collision"]
+    element: Element
+    uri: str
+    scale: tuple[float, float, float]
+    path: Path | None
+
+    @property
+    def facts(self) -> MeshFacts | None:
+        """None where the file is not found or cannot be used."""
+        if self.path is None:
+            return None
+        try:
+            return mesh_facts(self.path)
+        except UnusableMesh:
+            return None
+
+
+def _named_meshes(subject: Subject) -> Iterator[_NamedMesh]:
+    """Every <mesh> that names a file, in the order of the description."""
+    for link in subject.description.root.all("link"):
+        for geometry in link.children:
+            holder = geometry.first("geometry") if geometry.tag in ("visual", "collision") else None
+            for element in holder.all("mesh") if holder is not None else ():
+                uri = element.attributes.get("filename", "").strip()
+                if not uri:
+                    continue
+                try:
+                    path = subject.packages.resolve(uri)
+                except NotFound:
+                    path = None
+                role: Literal["visual", "collision"] = "visual" if geometry.tag == "visual" else "collision"
+                yield _NamedMesh(role, element, uri, _scale(element), path)
+
+
+def _scale(element: Element) -> tuple[float, float, float]:
+    """As written; 1 where that is not three numbers, which reading tells."""
+    values = [finite(word) for word in element.attributes.get("scale", "").split()[:4]]
+    x, y, z = values if len(values) == 3 else (1.0, 1.0, 1.0)
+    return (1.0 if x is None else x, 1.0 if y is None else y, 1.0 if z is None else z)
 
 
 @check("URDF033", "missing-visual", "assets", "warning", bad=one_link('filename="package://missing_package/a.stl"'))
@@ -52,7 +97,7 @@ def _mesh_suffix(subject: Subject) -> Iterator[Finding]:
 
     Most programs go by the name and fail, or draw nothing; here the content decides.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is None or mesh.path is None:
             continue
@@ -71,7 +116,7 @@ def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
 
     The description works on the machine it was written on and on no other.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         uri = mesh.uri
         windows = bool(PureWindowsPath(uri).drive)
         if uri.startswith("file:") or PurePosixPath(uri).is_absolute() or windows:
@@ -94,7 +139,7 @@ def _mesh_unit(subject: Subject) -> Iterator[Finding]:
 
     STL and OBJ state no unit and URDF counts in metres; an arm of 300 m is one drawn in millimetres.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is None:
             continue
@@ -121,7 +166,7 @@ def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
 
     Every load reads it all (seconds for a million), for a hull that needs a hundred. 2 000 000 are refused.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         facts = mesh.facts
         if mesh.role == "collision" and facts is not None and facts.triangles > MANY_TRIANGLES:
             message = f"collision mesh '{mesh.uri}' has {facts.triangles} triangles; {MANY_TRIANGLES} are many"
@@ -143,7 +188,7 @@ def _ascii_stl(subject: Subject) -> Iterator[Finding]:
 
     PyBullet, among others, takes it for empty without a word; engines get a binary one here.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.format == "stl-ascii":
             message = f"mesh '{mesh.uri}' is an STL file of text, which some programs cannot read; here it is converted"
@@ -163,7 +208,7 @@ def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
 
     Legal and common for left and right parts; some programs draw such a mesh inside out.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         if min(mesh.scale) < 0.0:
             shown = " ".join(f"{value:g}" for value in mesh.scale)
             message = f"mesh '{mesh.uri}' is mirrored by its scale {shown}"
@@ -184,7 +229,7 @@ def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
     RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and three.js
     turn the mesh. Only a file with z up looks the same everywhere.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.up_axis != "Z_UP":
             said = f"the up axis {facts.up_axis}" if facts.up_axis else "no up axis, which stands for Y_UP"
@@ -205,7 +250,7 @@ def _unusable_visual(subject: Subject) -> Iterator[Finding]:
 
     The link is not drawn. An engine that reads it may crash, so it is given none.
     """
-    for mesh in named_meshes(subject):
+    for mesh in _named_meshes(subject):
         if mesh.role == "collision" or mesh.path is None:
             continue
         try:

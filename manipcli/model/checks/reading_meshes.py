@@ -1,7 +1,7 @@
 """What is found while collision meshes are read."""
 
 from manipcli.model.check import Check, reading_check
-from manipcli.model.mesh_stl import binary_stl
+from manipcli.model.mesh_formats import binary_stl
 from manipcli.model.samples import TETRAHEDRON, one_link
 from manipcli.model.urdf_mesh import WITHOUT_IT
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.errors import ManipcliError
 from manipcli.core.geometry import Transform
-from manipcli.model.mesh_files import clean_mesh
+from manipcli.model.mesh import clean_mesh
 from manipcli.model.normalise import MASSLESS, body_urdf
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Mesh, Mimic, RobotModel, Sphere
 from manipcli.model.scene import Body
