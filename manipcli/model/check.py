@@ -86,9 +86,9 @@ def found_while_reading(code: str) -> Find:
 
 
 def reading_check(
+    tier: Tier,
     code: str,
     name: str,
-    tier: Tier,
     summary: str,
     reason: str,
     bad: str,
@@ -96,5 +96,5 @@ def reading_check(
     severity: Severity = "error",
     files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
 ) -> Check:
-    """A check that reading makes anyway."""
+    """A check that reading makes anyway; a file of them binds the tier first."""
     return Check(code, name, tier, severity, summary, reason, bad, found_while_reading(code), files)

@@ -1,51 +1,50 @@
 """What is found while collision meshes are read."""
 
+from functools import partial
+
 from manipcli.model.check import Check, reading_check
 from manipcli.model.mesh_formats import binary_stl
 from manipcli.model.samples import TETRAHEDRON, one_link
 from manipcli.model.urdf_mesh import WITHOUT_IT
 
+assets_check = partial(reading_check, "assets")
+
 READING_MESHES: tuple[Check, ...] = (
-    reading_check(
+    assets_check(
         "URDF013",
         "missing-mesh",
-        "assets",
         "A collision mesh is not found",
         "A link without its collision shape passes through what it should hit. Many descriptions are published "
         f"without their meshes: {WITHOUT_IT}. A missing visual is a warning, URDF033.",
         one_link('filename="package://missing_package/a.stl"', role="collision"),
     ),
-    reading_check(
+    assets_check(
         "URDF200",
         "unusable-mesh",
-        "assets",
         "A collision mesh is damaged, empty, too large, or of a format that is not read",
         "An engine answers with a crash (an index out of range), with a shape somewhere else (a negative one), or "
         "with none at all, so that an arm passes through what it should hit.",
         one_link('filename="cut.stl"', role="collision"),
         files=lambda: {"cut.stl": b"cut off".ljust(80) + (12).to_bytes(4, "little") + bytes(50 * 11)},
     ),
-    reading_check(
+    assets_check(
         "URDF201",
         "remote-mesh",
-        "assets",
         "A mesh is named by http, ftp, data: or another address that is not read",
         "A description is data: nothing is fetched for it, and what it means may not change with a server.",
         one_link('filename="https://example.org/a.stl"'),
     ),
-    reading_check(
+    assets_check(
         "URDF202",
         "outside-mesh",
-        "assets",
         "A mesh lies outside of the description's folder and packages",
         "A description from somewhere else could name any file of this machine; links are followed before that is "
         "judged. `--allow-outside` permits it.",
         one_link('filename="/etc/passwd"'),
     ),
-    reading_check(
+    assets_check(
         "URDF210",
         "flat-mesh",
-        "assets",
         "A collision mesh is flat",
         "A collision shape is the hull of its points; a hull without a volume catches nothing.",
         one_link('filename="a.stl"', role="collision"),

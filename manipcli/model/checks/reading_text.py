@@ -1,39 +1,39 @@
 """What is found while the text of a description is read: its XML, elements, numbers and macros."""
 
+from functools import partial
+
 from manipcli.model.check import Check, reading_check
 from manipcli.model.samples import bare_joint, robot
 
+schema_check = partial(reading_check, "schema")
+
 READING_TEXT: tuple[Check, ...] = (
-    reading_check(
+    schema_check(
         "URDF001",
         "not-xml",
-        "schema",
         "The file cannot be read as XML",
         "Nothing of such a file can be trusted: parsers that go on anyway lose what follows the mistake.",
         robot('<link name="base">'),
     ),
-    reading_check(
+    schema_check(
         "URDF002",
         "not-a-robot",
-        "schema",
         "The root element is not <robot>",
         "Other formats (SDF, MJCF) look alike but say different things: none of their numbers may be read as those "
         "of a URDF.",
         '<sdf version="1.7"><model name="r"><link name="base"/></model></sdf>',
     ),
-    reading_check(
+    schema_check(
         "URDF003",
         "missing-name",
-        "schema",
         "A name or reference is missing, empty or not printable",
         "Links, joints and meshes are found by name; PyBullet calls every link without a name the same and joins "
         "the wrong ones.",
         robot('<link name="base"/><link/>'),
     ),
-    reading_check(
+    schema_check(
         "URDF004",
         "bad-number",
-        "schema",
         "A value is not a finite number, or larger than anything real",
         "PyBullet reads text, a decimal comma and a missing value as 0 without a word, and nan, inf or what is too "
         "large for single precision makes every state nan from the first step.",
@@ -42,79 +42,70 @@ READING_TEXT: tuple[Check, ...] = (
             '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
         ),
     ),
-    reading_check(
+    schema_check(
         "URDF008",
         "joint-type",
-        "schema",
         "The type of a joint is missing or unknown",
         "Nobody can say how such a joint moves; PyBullet ends the whole program where the type is missing.",
         bare_joint(kind="spherical"),
     ),
-    reading_check(
+    schema_check(
         "URDF012",
         "shape",
-        "schema",
         "A geometry has no shape, an unknown one, or one without extent",
         "PyBullet takes a size of 0 or less without a word and gives the link no inertia; without a shape nothing "
         "collides.",
         robot('<link name="base"><collision><geometry/></collision></link>'),
     ),
-    reading_check(
+    schema_check(
         "URDF051",
         "doctype",
-        "schema",
         "The file has a DOCTYPE",
         "Entities declared there can blow a small file up to gigabytes or read other files. A description needs "
         "none, and parsers disagree on them: PyBullet ignores them without a word.",
         '<!DOCTYPE robot [<!ENTITY size "0.1">]><robot name="r"><link name="base"/></robot>',
     ),
-    reading_check(
+    schema_check(
         "URDF052",
         "too-large",
-        "schema",
         "The file, its depth or its number of elements is beyond a bound",
         "Descriptions come from anywhere; one that was made to exhaust memory or the stack of a parser is stopped "
         "early.",
         f'<robot name="r">{"<link>" * 120}{"</link>" * 120}</robot>',
     ),
-    reading_check(
+    schema_check(
         "URDF058",
         "number-count",
-        "schema",
         "A value has too few or too many numbers",
         "PyBullet takes a vector of two or four numbers for 0 0 0 without a word: a link then sits where its parent"
         " is.",
         bare_joint('<origin xyz="0 0.1"/>'),
     ),
-    reading_check(
+    schema_check(
         "URDF059",
         "missing-attribute",
-        "schema",
         "A number that must be stated is missing",
         "Each program has an idea of its own of what a missing value means: 0, 1, or to refuse the file.",
         robot('<link name="base"><collision><geometry><sphere/></geometry></collision></link>'),
     ),
-    reading_check(
+    schema_check(
         "URDF060",
         "joint-ends",
-        "schema",
         "A joint has no parent or no child",
         "A joint joins two links; without both, the description is no tree.",
         robot('<link name="base"/><joint name="j" type="fixed"><parent link="base"/></joint>'),
     ),
-    reading_check(
+    schema_check(
         "URDF061",
         "several-shapes",
-        "schema",
         "A geometry has more than one shape",
         "Programs read the first and lose the others: what is drawn or collides is less than what was written.",
         robot('<link name="base"><visual><geometry><box size="1 1 1"/><sphere radius="1"/></geometry></visual></link>'),
         severity="warning",
     ),
-    reading_check(
+    schema_check(
         "URDF062",
         "foreign-shape",
-        "schema",
         "A shape is not one of URDF",
         "Each program knows other extensions and drops the rest: a capsule is two spheres and a cylinder; use those.",
         robot(
@@ -122,56 +113,50 @@ READING_TEXT: tuple[Check, ...] = (
         ),
         severity="warning",
     ),
-    reading_check(
+    schema_check(
         "URDF065",
         "unsupported-joint",
-        "schema",
         "A joint of several degrees of freedom is held fixed",
         "Floating and planar joints say that something else moves the link. PyBullet makes a floating joint a fixed"
         " one without a word, and gives a planar one no axis; so does manipcli hold it, but says it.",
         bare_joint(kind="floating"),
         severity="warning",
     ),
-    reading_check(
+    schema_check(
         "XACRO001",
         "xacro-expansion",
-        "schema",
         "A xacro file cannot be expanded",
         "An undefined property or macro, a missing or unknown parameter, a block nobody uses, a bad condition: the "
         "place is that of the innermost element, the hint names the macros around it.",
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${nmae}"/></robot>',
     ),
-    reading_check(
+    schema_check(
         "XACRO002",
         "xacro-refused",
-        "schema",
         "An expression or substitution asks for what a description may not do",
         "The usual evaluation of xacro runs any Python and reads any file. Here a description is data: expressions "
         "compute numbers and text, and only what they need for that is there.",
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="${load_yaml.__globals__}"/></robot>',
     ),
-    reading_check(
+    schema_check(
         "XACRO003",
         "xacro-argument",
-        "schema",
         "An argument is unknown, or has neither a value nor a default",
         "A misspelt argument would leave the default in place without a word.",
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg prefix)base"/></robot>',
     ),
-    reading_check(
+    schema_check(
         "XACRO004",
         "xacro-bound",
-        "schema",
         "An expansion is beyond a bound",
         "A macro that calls itself, or doubles ten times over, fills the memory; a file that includes itself ends "
         "the interpreter's stack.",
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="again"><xacro:again/>'
         "</xacro:macro><xacro:again/></robot>",
     ),
-    reading_check(
+    schema_check(
         "XACRO010",
         "xacro-warning",
-        "schema",
         "The description or its expansion gives a warning",
         "Authors of macros warn of deprecated files and of values that do not fit together.",
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="base${xacro.warning(0)}"/></robot>',
