@@ -5,7 +5,7 @@ from functools import partial
 from manipcli.model.check import Check, reading_check
 from manipcli.model.mesh_formats import binary_stl
 from manipcli.model.samples import TETRAHEDRON, one_link
-from manipcli.model.urdf_mesh import WITHOUT_IT
+from manipcli.model.urdf_link import WITHOUT_IT
 
 assets_check = partial(reading_check, "assets")
 
