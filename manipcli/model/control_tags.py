@@ -63,9 +63,3 @@ def transmissions(subject: Subject) -> Iterator[WrittenTransmission]:
                     joints=element.all("joint"),
                     actuators=element.all("actuator"),
                 )
-
-
-def role(element: Element) -> str:
-    """As ROS 1 writes it (an element) or ros2_control (an attribute); '' where it has none."""
-    child = element.first("role")
-    return (child.text if child is not None else element.attributes.get("role", "")).strip()

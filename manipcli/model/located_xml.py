@@ -42,8 +42,12 @@ class Element:
     def all(self, tag: str) -> tuple[Element, ...]:
         return tuple(child for child in self.children if child.tag == tag)
 
-    def first(self, tag: str) -> Element | None:
-        return next((child for child in self.children if child.tag == tag), None)
+    def first(self, *path: str) -> Element | None:
+        """The first child of a tag; of that, the first of the next tag of the path."""
+        at: Element | None = self
+        for tag in path:
+            at = next((child for child in at.children if child.tag == tag), None) if at is not None else None
+        return at
 
 
 def shown_path(path: Path) -> str:

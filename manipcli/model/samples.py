@@ -35,6 +35,18 @@ def one_joint(inside: str = LIMIT, *, kind: str = "revolute", tip: str = INERTIA
     return robot(f'<link name="base"/><link name="tip">{tip}</link>{joint}{more}')
 
 
+def another(inside: str = "", *, link: str = INERTIAL, origin: str = '<origin xyz="0 0 1"/>') -> str:
+    """Link `other` below `tip`, with joint `k` between them; for `more` of `one_joint`."""
+    ends = '<parent link="tip"/><child link="other"/>'
+    return f'<link name="other">{link}</link><joint name="k" type="revolute">{origin}{ends}{LIMIT}{inside}</joint>'
+
+
+def controlled(inside: str) -> str:
+    """A <ros2_control>; for `more` of `one_joint`."""
+    plugin = "<hardware><plugin>p/P</plugin></hardware>"
+    return f'<ros2_control name="c" type="system">{plugin}{inside}</ros2_control>'
+
+
 GEARED = '<joint name="j"><hardwareInterface>PositionJointInterface</hardwareInterface></joint>'
 MOTOR = '<actuator name="m"><mechanicalReduction>1</mechanicalReduction></actuator>'
 

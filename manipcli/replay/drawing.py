@@ -14,10 +14,11 @@ import numpy as np
 
 from manipcli.core.geometry import Transform
 from manipcli.core.text import listed
+from manipcli.model.mesh_formats import UnusableMesh
 from manipcli.model.robot import Box, Cylinder, Geometry, Inertial, Link, Mesh, Rgba, RobotModel, Shape, Sphere
 from manipcli.model.scene import Body, Scene
 from manipcli.replay.bones import bones
-from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
+from manipcli.replay.mesh_surfaces import mesh_surfaces
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 
 Layer = Literal["visual", "collision", "inertia"]
@@ -149,7 +150,7 @@ def _shapes(
     for k, geometry in enumerate(geometries):
         try:
             surfaces = shape_surfaces(geometry.shape, hull=layer == "collision")
-        except UnreadableMesh as error:
+        except UnusableMesh as error:
             missing.append(f"{layer} shape of '{frame}': {error}")
             continue
         for n, one in enumerate(surfaces):
@@ -165,7 +166,7 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
         hull: the convex hull of a mesh instead of its triangles.
 
     Raises:
-        UnreadableMesh: a mesh cannot be drawn.
+        UnusableMesh: a mesh cannot be drawn.
     """
     match shape:
         case Box():

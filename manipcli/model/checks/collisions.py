@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from manipcli.core.errors import Finding
 from manipcli.model.check import Subject, check
 from manipcli.model.rigid import elements_by_name, moved_bodies
-from manipcli.model.samples import CUBE, INERTIAL, LIMIT, one_joint
+from manipcli.model.samples import CUBE, INERTIAL, LIMIT, another, one_joint
 from manipcli.model.zero_overlap import overlaps_at_zero
 
 
@@ -36,18 +36,9 @@ def _no_collision(subject: Subject) -> Iterator[Finding]:
     "readiness",
     "warning",
     bad=one_joint(
-        more='<link name="other">'
-        + INERTIAL
-        + CUBE
-        + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
-        + LIMIT
-        + '</joint><link name="last">'
-        + INERTIAL
-        + CUBE
-        + '</link><joint name="l" type="revolute"><origin xyz="0 0 -0.9"/>'
-        + '<parent link="other"/><child link="last"/>'
-        + LIMIT
-        + "</joint>"
+        more=another(link=INERTIAL + CUBE)
+        + f'<link name="last">{INERTIAL}{CUBE}</link><joint name="l" type="revolute"><origin xyz="0 0 -0.9"/>'
+        + f'<parent link="other"/><child link="last"/>{LIMIT}</joint>'
     ),
 )
 def _self_collision(subject: Subject) -> Iterator[Finding]:

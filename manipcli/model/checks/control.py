@@ -10,7 +10,7 @@ from manipcli.model.check import Subject, check
 from manipcli.model.control_tags import ControlledJoint, controlled_joints
 from manipcli.model.located_xml import Element
 from manipcli.model.rigid import elements_by_name
-from manipcli.model.samples import INERTIAL, LIMIT, one_joint
+from manipcli.model.samples import another, controlled, one_joint
 
 TYPES: Final = ("system", "actuator", "sensor")
 INTERFACES: Final = ("position", "velocity", "effort", "acceleration", "torque", "force", "current", "temperature")
@@ -31,10 +31,7 @@ PARTS: Final = ("command_interface", "state_interface", "param", "limits")
     "URDF320",
     "control-joint",
     "readiness",
-    bad=one_joint(
-        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
-    ),
+    bad=one_joint(more=controlled('<joint name="k"><command_interface name="position"/></joint>')),
 )
 def _joint(subject: Subject) -> Iterator[Finding]:
     """A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have.
@@ -65,12 +62,7 @@ def _joint(subject: Subject) -> Iterator[Finding]:
     "control-mimic",
     "readiness",
     bad=one_joint(
-        more='<link name="other">'
-        + INERTIAL
-        + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
-        + LIMIT
-        + '<mimic joint="j"/></joint><ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
+        more=another('<mimic joint="j"/>') + controlled('<joint name="k"><command_interface name="position"/></joint>')
     ),
 )
 def _mimic(subject: Subject) -> Iterator[Finding]:
@@ -115,8 +107,7 @@ def _plugin(subject: Subject) -> Iterator[Finding]:
     """
     for component in subject.description.root.all("ros2_control"):
         name = component.name
-        hardware = component.first("hardware")
-        plugin = hardware.first("plugin") if hardware is not None else None
+        hardware, plugin = component.first("hardware"), component.first("hardware", "plugin")
         if not name:
             yield Finding("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
         if component.attributes.get("type", "").strip() not in TYPES:
@@ -134,10 +125,7 @@ def _plugin(subject: Subject) -> Iterator[Finding]:
     "control-interface",
     "readiness",
     "warning",
-    bad=one_joint(
-        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="j"><command_interface name="postion"/></joint></ros2_control>'
-    ),
+    bad=one_joint(more=controlled('<joint name="j"><command_interface name="postion"/></joint>')),
 )
 def _interface(subject: Subject) -> Iterator[Finding]:
     """An interface of ros2_control has a name that no controller asks for, or none.
@@ -156,15 +144,7 @@ def _interface(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
 
 
-@check(
-    "URDF325",
-    "control-element",
-    "readiness",
-    bad=one_joint(
-        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="j"/><joint name="j"/></ros2_control>'
-    ),
-)
+@check("URDF325", "control-element", "readiness", bad=one_joint(more=controlled('<joint name="j"/><joint name="j"/>')))
 def _element(subject: Subject) -> Iterator[Finding]:
     """A <ros2_control> has an element, joint, interface or parameter that may not be there as it is.
 

@@ -9,7 +9,7 @@ from manipcli.model.check import Subject, check
 from manipcli.model.control_tags import controlled_joints
 from manipcli.model.located_xml import Element
 from manipcli.model.robot import JointLimits
-from manipcli.model.samples import one_joint
+from manipcli.model.samples import controlled, one_joint
 from manipcli.model.urdf_numbers import finite
 
 SWITCH: Final = ("true", "false", "True", "False")
@@ -21,10 +21,10 @@ TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", 
     "control-number",
     "readiness",
     bad=one_joint(
-        more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-        '<joint name="j">'
-        '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
-        "</ros2_control>"
+        more=controlled(
+            '<joint name="j"><state_interface name="position"><param name="initial_value">half</param>'
+            "</state_interface></joint>"
+        )
     ),
 )
 def _find(subject: Subject) -> Iterator[Finding]:

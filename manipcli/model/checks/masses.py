@@ -46,8 +46,7 @@ def _massless_joint(subject: Subject) -> Iterator[Finding]:
 
 def _states_mass(link: Element) -> bool:
     """Also a mass that is refused for another reason, which reading tells."""
-    inertial = link.first("inertial")
-    mass = inertial.first("mass") if inertial is not None else None
+    inertial, mass = link.first("inertial"), link.first("inertial", "mass")
     return inertial is not None and (mass is None or finite(mass.attributes.get("value", "").strip()) != 0.0)
 
 
@@ -127,9 +126,7 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
     No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all.
     """
     for link in subject.description.root.all("link"):
-        inertial = link.first("inertial")
-        mass = inertial.first("mass") if inertial is not None else None
-        inertia = inertial.first("inertia") if inertial is not None else None
+        mass, inertia = link.first("inertial", "mass"), link.first("inertial", "inertia")
         if mass is None or inertia is None or finite(mass.attributes.get("value", "").strip()) != 0.0:
             continue
         if any(finite(inertia.attributes.get(key, "0").strip()) for key in ("ixx", "iyy", "izz")):

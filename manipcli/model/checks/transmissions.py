@@ -6,9 +6,10 @@ from typing import Final
 from manipcli.core.errors import Finding, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.model.check import Subject, check
-from manipcli.model.control_tags import SIZES, WrittenTransmission, role, transmissions
+from manipcli.model.control_tags import SIZES, WrittenTransmission, transmissions
 from manipcli.model.robot import TransmissionTag
-from manipcli.model.samples import GEARED, INERTIAL, LIMIT, MOTOR, one_joint, transmission
+from manipcli.model.samples import GEARED, MOTOR, another, one_joint, transmission
+from manipcli.model.urdf_joint import role
 from manipcli.model.urdf_numbers import finite
 
 INTERFACES: Final = (
@@ -97,11 +98,8 @@ def _gear(tag: TransmissionTag) -> tuple[object, ...]:
     "transmission-roles",
     "readiness",
     bad=one_joint(
-        more='<link name="other">'
-        + INERTIAL
-        + '</link><joint name="k" type="revolute"><parent link="tip"/><child link="other"/>'
-        + LIMIT
-        + '</joint><transmission name="t"><type>transmission_interface/DifferentialTransmission</type>'
+        more=another(origin="")
+        + '<transmission name="t"><type>transmission_interface/DifferentialTransmission</type>'
         + "".join(
             f'<joint name="{name}"><hardwareInterface>EffortJointInterface</hardwareInterface></joint>'
             f'<actuator name="m{name}"><mechanicalReduction>1</mechanicalReduction></actuator>'
