@@ -95,7 +95,7 @@ def gather() -> Seeds:
 
     from manipcli.description.lint.checks import CHECKS
     from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_joint
-    from manipcli.shapes.mesh_stl import binary_stl
+    from manipcli.shapes.mesh_formats import binary_stl
 
     descriptions: list[tuple[str, bytes, dict[str, bytes]]] = []
     for check in CHECKS:

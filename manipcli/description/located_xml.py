@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Final, cast
 
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.description.bounds import bounds, raised
-from manipcli.description.xml_fault import told
 
 if TYPE_CHECKING:
     from xml.dom.minidom import Document, Node
     from xml.dom.minidom import Element as DomElement
+    from xml.parsers.expat import ExpatError
 
 _PLACE = "manipcli.place"
 _TEXT_PLACE = "manipcli.text_place"
+_DECLARED: Final = re.compile(rb"""\s*<\?xml\s[^>]*\bencoding\s*=""")
+_XACRO: Final = "http://www.ros.org/wiki/xacro"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +34,20 @@ class Element:
     place: Place | None
     text_place: Place | None = None
 
+    @property
+    def name(self) -> str:
+        """Its attribute `name` without blanks around; '' where it has none."""
+        return self.attributes.get("name", "").strip()
+
     def all(self, tag: str) -> tuple[Element, ...]:
         return tuple(child for child in self.children if child.tag == tag)
 
-    def first(self, tag: str) -> Element | None:
-        return next((child for child in self.children if child.tag == tag), None)
+    def first(self, *path: str) -> Element | None:
+        """The first child of a tag; of that, the first of the next tag of the path."""
+        at: Element | None = self
+        for tag in path:
+            at = next((child for child in at.children if child.tag == tag), None) if at is not None else None
+        return at
 
 
 def shown_path(path: Path) -> str:
@@ -125,13 +137,62 @@ def parse_document(data: bytes, file: str) -> Document:
     try:
         document: Document = builder.parseString(data)
     except expat.ExpatError as error:
-        message, place, hint = told(error, data, file)
+        message, place, hint = _told(error, data, file)
         begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
         other = None if begins in (b"<", b"") else "this is no XML; robot, controllers and task files: `manipcli check`"
         raise invalid("URDF001", message, place, other or hint or _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
     return document
+
+
+def _told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | None]:
+    """Message, place and hint (None: nothing better than that an element is open) for `data` of a `file`."""
+    from xml.parsers.expat import ErrorString, errors
+
+    words = ErrorString(error.code)
+    lines = re.split(rb"\r\n|\r|\n", data)
+    line = lines[error.lineno - 1] if 0 < error.lineno <= len(lines) else b""
+    before, here = line[: error.offset].rstrip(), line[error.offset : error.offset + 1]
+    place = Place(file, error.lineno, error.offset + 1)
+    message, hint = f"not well-formed XML: {words}", None
+    if words == errors.XML_ERROR_MISPLACED_XML_PI:
+        hint = "nothing may stand before '<?xml', not even a blank"
+    elif words == errors.XML_ERROR_UNBOUND_PREFIX:
+        found = re.compile(rb"</?([\w.-]+):").match(line, error.offset)
+        prefix = found.group(1).decode("utf-8", "replace")[:40] if found else ""
+        if prefix:
+            message = f"{message} '{prefix}'"
+            hint = f'declare it in the root element: xmlns:{prefix}="{_XACRO if prefix == "xacro" else "..."}"'
+    elif words == errors.XML_ERROR_INVALID_TOKEN:
+        if line.startswith(b"<<<<<<<"):
+            return "a merge conflict is not resolved", Place(file, error.lineno, 1), "keep one side, and no '<<<<<<<'"
+        byte = None if _DECLARED.match(data) else _not_utf8(data, file)
+        if byte is not None and byte[1].line == error.lineno:
+            hint = (
+                'save it as UTF-8: iconv -f latin1 -t utf-8; or name its encoding: <?xml version="1.0" encoding=...?>'
+            )
+            return byte[0], byte[1], hint
+        if here == b"<":
+            hint = "write < as &lt; inside a value, or close the quote before it"
+        elif here == b"&" or before.endswith(b"&"):
+            hint = "write & as &amp;, and < inside a value as &lt;"
+        elif before.endswith(b"="):
+            hint = 'put the value in quotes: "..."'
+        elif before.endswith(b"--"):
+            hint = "take '--' out of the comment"
+    return message, place, hint
+
+
+def _not_utf8(data: bytes, file: str) -> tuple[str, Place] | None:
+    """The first byte that no text in UTF-8 has, and where."""
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8").removeprefix("\ufeff")
+        column = len(before) - before.rfind("\n")
+        return f"the byte 0x{data[error.start]:02x} is not UTF-8", Place(file, before.count("\n") + 1, column)
+    return None
 
 
 def _begin(end: Place, text: str, lines: Sequence[bytes]) -> Place:

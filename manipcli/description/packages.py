@@ -12,14 +12,14 @@ import os
 import pkgutil
 import re
 import stat
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
 from manipcli.core.text import any_of, nearest, nearest_file
 from manipcli.description.located_xml import shown_path
-from manipcli.description.package_xml import package_name, packages_below
 
 LEVELS_ABOVE = 5
 """How many folders above a description are looked at for a folder of a package's name."""
@@ -27,6 +27,11 @@ ALIKE = 0.85
 """Likeness from which on a package was meant: among all that is installed, less finds any name."""
 SUBFOLDERS = frozenset({"urdf", "xacro", "robots", "robot", "description", "cfg"})
 """A description in such a folder belongs to the folder above it."""
+MOST_BYTES = 65_536
+LEVELS_BELOW = 4
+MOST_FOLDERS = 5_000
+_NAME = re.compile(rb"<name>\s*([^<>\s]{1,200})\s*</name>")
+_IGNORED = ("CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs")
 
 
 class NotFound(Exception):
@@ -315,3 +320,46 @@ def _installed_package(name: str) -> Path | None:
         return None
     places = list(spec.submodule_search_locations or ()) if spec is not None else []
     return Path(places[0]).resolve() if places and Path(places[0]).is_dir() else None
+
+
+def package_name(folder: Path) -> str | None:
+    """The `<name>` of the package in this very folder, if there is one."""
+    file = folder / "package.xml"
+    try:
+        if not file.is_file():
+            return None
+        with file.open("rb") as stream:
+            found = _NAME.search(stream.read(MOST_BYTES))
+    except OSError:
+        return None
+    return found[1].decode("utf-8", "replace") if found else None
+
+
+def packages_below(folder: Path) -> dict[str, Path]:
+    """The packages at or below a folder by name, the nearest of each, as rospack crawls.
+
+    Packages hold no packages; hidden folders and those that a build tool is told to ignore are left out.
+    """
+    found: dict[str, Path] = {}
+    for each in _packages_below(folder):
+        found.setdefault(package_name(each) or each.name, each)
+    return found
+
+
+def _packages_below(folder: Path) -> Iterator[Path]:
+    waiting = deque([(folder, 0)])
+    seen = 0
+    while waiting and seen < MOST_FOLDERS:
+        current, depth = waiting.popleft()
+        seen += 1
+        if (current / "package.xml").is_file():
+            yield current
+            continue
+        try:
+            with os.scandir(current) as entries:
+                inside = sorted(entries, key=lambda entry: entry.name)
+            if depth < LEVELS_BELOW and not any(entry.name in _IGNORED for entry in inside):
+                below = [entry for entry in inside if not entry.name.startswith(".") and entry.is_dir()]
+                waiting.extend((Path(entry.path), depth + 1) for entry in below)
+        except OSError:
+            continue

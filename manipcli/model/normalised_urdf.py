@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -19,7 +19,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Inertial, Joint, Link, TransmissionTag
 from manipcli.description.urdf.joint import UNBOUNDED
 from manipcli.model.robot import RobotModel
-from manipcli.shapes.mesh_files import clean_mesh
+from manipcli.shapes.mesh import clean_mesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
 
 MAX_LINE = 4096
@@ -123,6 +123,10 @@ def _numbers(values: Sequence[float] | Array) -> str:
     return " ".join(number(float(value)) for value in values)
 
 
+def _attributes(values: Mapping[str, float | None]) -> str:
+    return " ".join(f'{key}="{number(float(value))}"' for key, value in values.items() if value is not None)
+
+
 def _origin(X: Transform, indent: str) -> list[str]:
     xyz, rpy = X.p, X.rpy
     if not xyz.any() and not rpy.any():
@@ -142,8 +146,7 @@ def _link(link: Link, file_of: FileOf) -> list[str]:
         lines += ["    <inertial>", *_origin(inertial.X_LI, "      ")]
         lines.append(f'      <mass value="{number(inertial.mass)}"/>')
         moments = {"ixx": I[0, 0], "ixy": I[0, 1], "ixz": I[0, 2], "iyy": I[1, 1], "iyz": I[1, 2], "izz": I[2, 2]}
-        pairs = " ".join(f'{key}="{number(float(value))}"' for key, value in moments.items())
-        lines += [f"      <inertia {pairs}/>", "    </inertial>"]
+        lines += [f"      <inertia {_attributes(moments)}/>", "    </inertial>"]
     for tag, geometries in (("visual", link.visuals), ("collision", link.collisions)):
         for geometry in geometries:
             lines += _geometry(tag, geometry, file_of)
@@ -195,19 +198,18 @@ def _joint(joint: Joint) -> list[str]:
         if joint.type != "continuous":
             lower, upper = (-UNBOUNDED if lower is None else lower), (UNBOUNDED if upper is None else upper)
         stated = {"lower": lower, "upper": upper, "velocity": limits.velocity, "effort": limits.effort}
-        written = " ".join(f'{key}="{number(value)}"' for key, value in stated.items() if value is not None)
+        written = _attributes(stated)
         lines += [f"    <limit {written}/>"] if written else []
         if joint.damping or joint.friction:
-            lines.append(f'    <dynamics damping="{number(joint.damping)}" friction="{number(joint.friction)}"/>')
+            lines.append(f"    <dynamics {_attributes({'damping': joint.damping, 'friction': joint.friction})}/>")
         if limits.soft is not None:
             soft = limits.soft
             ends = {"soft_lower_limit": soft.lower, "soft_upper_limit": soft.upper}
             gains = {"k_position": soft.k_position, "k_velocity": soft.k_velocity}
-            written = " ".join(f'{key}="{number(value)}"' for key, value in (ends | gains).items() if value is not None)
-            lines.append(f"    <safety_controller {written}/>")
+            lines.append(f"    <safety_controller {_attributes(ends | gains)}/>")
         if joint.mimic is not None:
             mimic = joint.mimic
-            ratio = f'multiplier="{number(mimic.multiplier)}" offset="{number(mimic.offset)}"'
+            ratio = _attributes({"multiplier": mimic.multiplier, "offset": mimic.offset})
             lines.append(f"    <mimic joint={quoteattr(mimic.joint)} {ratio}/>")
     return [*lines, "  </joint>"]
 

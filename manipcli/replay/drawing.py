@@ -17,9 +17,10 @@ from manipcli.core.text import listed
 from manipcli.description.elements import Inertial, Link
 from manipcli.model.robot import RobotModel
 from manipcli.replay.bones import bones
-from manipcli.replay.mesh_surfaces import UnreadableMesh, mesh_surfaces
+from manipcli.replay.mesh_surfaces import mesh_surfaces
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
 
 Layer = Literal["visual", "collision", "inertia"]
@@ -151,7 +152,7 @@ def _shapes(
     for k, geometry in enumerate(geometries):
         try:
             surfaces = shape_surfaces(geometry.shape, hull=layer == "collision")
-        except UnreadableMesh as error:
+        except UnusableMesh as error:
             missing.append(f"{layer} shape of '{frame}': {error}")
             continue
         for n, one in enumerate(surfaces):
@@ -167,7 +168,7 @@ def shape_surfaces(shape: Shape, *, hull: bool = False) -> tuple[Surface, ...]:
         hull: the convex hull of a mesh instead of its triangles.
 
     Raises:
-        UnreadableMesh: a mesh cannot be drawn.
+        UnusableMesh: a mesh cannot be drawn.
     """
     match shape:
         case Box():

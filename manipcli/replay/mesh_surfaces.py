@@ -11,26 +11,22 @@ import numpy as np
 
 from manipcli.replay.surface import Surface, smoothed
 from manipcli.shapes.mesh import TriangleMesh, read_mesh
-from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Rgba
 
 MAX_MATERIAL_BYTES = 1_000_000
-
-
-class UnreadableMesh(Exception):
-    """A mesh file that cannot be drawn, and why."""
 
 
 def mesh_surfaces(path: Path) -> tuple[Surface, ...]:
     """The surfaces of a mesh file in its own frame, unscaled; each colour of the file is one.
 
     Raises:
-        UnreadableMesh: it is absent, of an unknown kind, damaged or empty.
+        UnusableMesh: it is absent, of an unknown kind, damaged or empty.
     """
     try:
         mesh = read_mesh(path)
     except UnusableMesh as error:
-        raise UnreadableMesh(f"'{path.name}' {error.reason}") from error
+        raise UnusableMesh(f"'{path.name}' {error.reason}") from error
     return _surfaces(path, mesh)
 
 

@@ -10,7 +10,7 @@ from manipcli.task.task import Task
 
 
 def load_libraries(task: Task) -> None:
-    """Import what planning, simulating and recording import at their first use, so that import time counts as loading."""
+    """Import what later stages import at their first use, so that import time counts as loading."""
     for name in ("coal", "pinocchio", "ruckig", "mcap.records", "mcap.opcode", "zstandard"):
         import_module(name)
     retimer.library()

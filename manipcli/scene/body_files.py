@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.errors import InvalidInput
-from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.core.geometry import Transform, frozen
 from manipcli.description.description import read_description
 from manipcli.description.elements import Inertial
+from manipcli.description.lint.rigid import box_about
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import read_parts
 from manipcli.scene.body_shapes import COLORS, BodyShape
@@ -81,7 +82,9 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
         raise ValueError(f"link '{link.name}' of '{spec.file}' has no collision shape")
     seen = next((shape.rgba for shape in link.visuals if shape.rgba is not None), COLORS["urdf"])
     shapes = tuple(replace(shape, rgba=rgba or shape.rgba or seen) for shape in link.collisions)
-    low, high = _bounds(shapes)
+    box = box_about(shapes)
+    assert box is not None  # every mesh has been read
+    low, high = box
     inertial = None
     if link.inertial is not None and link.inertial.mass > 0.0:
         X, inertia = link.inertial.X_LI, link.inertial.inertia
@@ -93,18 +96,6 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
         centre=frozen((high + low) / 2.0),
         inertial=inertial,
     )
-
-
-def _bounds(shapes: tuple[Geometry, ...]) -> tuple[Array, Array]:
-    """Lowest and highest corner of a box about the shapes, in O; that of each shape's own box, so not the tightest."""
-    corners = []
-    for shape in shapes:
-        made = coal_shape(shape.shape)
-        made.computeLocalAABB()
-        low, high = np.array(made.aabb_local.min_), np.array(made.aabb_local.max_)
-        centre, half = shape.X_LS.apply((low + high) / 2.0), np.abs(shape.X_LS.R) @ ((high - low) / 2.0)
-        corners += [centre - half, centre + half]
-    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def principal(mass: float, centre: npt.ArrayLike, inertia: npt.ArrayLike) -> Inertial:

@@ -1,11 +1,13 @@
-"""Mesh files, read safely: the content tells what a file is, every size is bounded, nothing outside is followed.
+"""The one door for mesh files: the content decides what a file is, every size is bounded, nothing outside is followed.
 
-`read_mesh` answers with the triangles or raises `UnusableMesh`, which says what is wrong with the file.
+An engine crashes on a damaged file, drops a text STL without a word, and reads past the end of an OBJ with a bad index:
+it gets files that `clean_mesh` writes from triangles that were checked.
 """
 
 from __future__ import annotations
 
 import functools
+import hashlib
 import re
 import stat
 from dataclasses import dataclass
@@ -14,11 +16,24 @@ from typing import Final, Literal
 
 import numpy as np
 
+from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array, frozen
 from manipcli.shapes.mesh_collada import read_collada
-from manipcli.shapes.mesh_fault import MAX_BYTES, MAX_TRIANGLES, Colours, Faces, UnusableMesh
-from manipcli.shapes.mesh_obj import read_obj
-from manipcli.shapes.mesh_stl import is_ascii_stl, is_binary_stl, read_ascii_stl, read_binary_stl
+from manipcli.shapes.mesh_formats import (
+    MAX_BYTES,
+    MAX_TRIANGLES,
+    Colours,
+    Faces,
+    UnusableMesh,
+    binary_stl,
+    is_ascii_stl,
+    is_binary_stl,
+    obj,
+    read_ascii_stl,
+    read_binary_stl,
+    read_obj,
+)
+from manipcli.shapes.primitives import Mesh
 
 SUFFIXES = {".stl": "stl", ".obj": "obj", ".dae": "collada"}
 """The formats that are read, by the ends of their names."""
@@ -60,6 +75,18 @@ class TriangleMesh:
         return len(used) < 4 or bool(spread[2] <= 1e-9 * spread[0])
 
 
+@dataclass(frozen=True, slots=True)
+class MeshFacts:
+    """`low`, `high`: corners (3,) of its box, unscaled, in its frame; `flat`: its vertices span no volume."""
+
+    format: Format
+    triangles: int
+    low: Array
+    high: Array
+    flat: bool
+    up_axis: str
+
+
 def read_mesh(path: Path) -> TriangleMesh:
     """The triangles of an STL (binary or text), OBJ or Collada file; a file that did not change is read once.
 
@@ -97,6 +124,38 @@ def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, st
         return f"cannot be read: {error.strerror}", None
     except MemoryError:
         return "needs more memory than there is", None
+
+
+def mesh_facts(path: Path) -> MeshFacts:
+    """The facts of a file; one that did not change is read once.
+
+    Raises:
+        UnusableMesh: it holds no mesh that can be used.
+    """
+    try:
+        info = path.stat()
+    except (OSError, ValueError) as error:
+        raise UnusableMesh(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    found = _facts(path, info.st_mtime_ns, info.st_size)
+    if isinstance(found, MeshFacts):
+        return found
+    raise UnusableMesh(found[0], hint=found[1])
+
+
+@functools.lru_cache(maxsize=4096)
+def _facts(path: Path, _changed: int, _size: int) -> MeshFacts | tuple[str, str | None]:
+    try:
+        mesh = read_mesh(path)
+    except UnusableMesh as error:
+        return error.reason, error.hint
+    low, high = mesh.bounds
+    return MeshFacts(mesh.format, len(mesh.faces), frozen(low), frozen(high), mesh.flat, mesh.up_axis)
+
+
+def scaled_box(low: Array, high: Array, scale: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Lowest and highest corner (3,) of a box after scaling; a negative scale mirrors it."""
+    corners = np.stack([low * np.array(scale), high * np.array(scale)])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 _BEGINS_AS_OBJ: Final = re.compile(rb"(\s*(#|o |g |s |mtllib |usemtl )[^\n]*\n)*\s*v\s+-?[0-9.]")
@@ -172,3 +231,24 @@ def _checked(
         raise UnusableMesh("is damaged: all its triangles lie in one point")
     mesh.faces.flags.writeable = False
     return mesh
+
+
+def clean_mesh(mesh: Mesh, folder: Path) -> Path:
+    """A new file in `folder` with the triangles of `mesh`, unscaled: OBJ for OBJ, as its parts count, else binary STL.
+
+    Raises:
+        InvalidInput: the file of the mesh cannot be used.
+    """
+    try:
+        triangles = read_mesh(mesh.path)
+    except UnusableMesh as error:
+        message = f"mesh '{mesh.uri}' {error.reason}"
+        raise InvalidInput([Finding("URDF200", message, hint=error.hint)]) from error
+    suffix = ".obj" if triangles.format == "obj" else ".stl"
+    name = hashlib.sha256(str(mesh.path).encode("utf-8", "surrogateescape")).hexdigest()[:16]
+    path = folder / (name + suffix)
+    if not path.exists():
+        is_obj = triangles.format == "obj"
+        corners = triangles.vertices[triangles.faces]
+        path.write_bytes(obj(triangles.vertices, triangles.faces, triangles.parts) if is_obj else binary_stl(corners))
+    return path

@@ -9,7 +9,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform
 from manipcli.shapes.mesh import read_mesh
-from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Mesh, Shape, Sphere
 
 if TYPE_CHECKING:

@@ -211,7 +211,8 @@ def test_a_signal_while_a_text_is_executed_is_2_as_well(nod: Path, tmp_path: Pat
     (tmp_path / "sitecustomize.py").write_text(
         "import sys\nimport manipcli.report.json, manipcli.report.text\n"
         "class Finder:\n    @staticmethod\n    def find_spec(name, *_):\n"
-        "        if name == 'manipcli.task.load_task': exec('raise KeyboardInterrupt')\nsys.meta_path.insert(0, Finder)\n"
+        "        if name == 'manipcli.task.load_task': exec('raise KeyboardInterrupt')\n"
+        "sys.meta_path.insert(0, Finder)\n"
     )
     paths = os.pathsep.join([str(tmp_path), str(ROOT)])
     ran = subprocess.run(

@@ -60,9 +60,8 @@ def test_every_code_that_can_be_told_is_a_check() -> None:
 
 def test_every_check_of_every_file_is_registered() -> None:
     written = "".join(path.read_text(encoding="utf-8") for path in (DESCRIPTION / "lint" / "checks").glob("*.py"))
-    assert sorted(re.findall(r'^ +(?:code=)?"((?:URDF|XACRO)\d{3})",$', written, re.M)) == sorted(
-        c.code for c in CHECKS
-    )
+    codes = re.findall(r'check\(\s*"((?:URDF|XACRO)\d{3})"', written)
+    assert sorted(codes) == sorted(check.code for check in CHECKS)
 
 
 @pytest.mark.slow

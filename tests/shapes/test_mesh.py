@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from manipcli.core.errors import InvalidInput
 from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron
 from manipcli.shapes import mesh as mesh_module
-from manipcli.shapes import mesh_collada, mesh_stl
-from manipcli.shapes.mesh import read_mesh
-from manipcli.shapes.mesh_fault import UnusableMesh
-from manipcli.shapes.mesh_files import clean_mesh
-from manipcli.shapes.mesh_stl import binary_stl
+from manipcli.shapes import mesh_collada, mesh_formats
+from manipcli.shapes.mesh import clean_mesh, read_mesh
+from manipcli.shapes.mesh_formats import UnusableMesh, binary_stl
 from manipcli.shapes.primitives import Mesh
 from manipcli.shapes.proximity import coal_shape
 
@@ -183,7 +181,7 @@ def test_sizes_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with path.open("wb") as file:
         file.truncate(mesh_module.MAX_BYTES + 1)
     assert "at most 256 MB" in reason(path)
-    monkeypatch.setattr(mesh_stl, "MAX_TRIANGLES", 3)
+    monkeypatch.setattr(mesh_formats, "MAX_TRIANGLES", 3)
     assert "has 4 triangles; at most 3" in reason(write(tmp_path / "many.stl", binary_stl(TETRAHEDRON)))
     monkeypatch.setattr(mesh_collada, "MAX_TRIANGLES", 3)
     assert "more than 3 triangles" in reason(write(tmp_path / "many.dae", DAE))

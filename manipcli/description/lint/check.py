@@ -30,6 +30,9 @@ class Subject:
     packages: Packages
 
 
+Find = Callable[[Subject], Iterable[Finding]]
+
+
 @dataclass(frozen=True, slots=True)
 class Check:
     """A member of the seam.
@@ -53,25 +56,45 @@ class Check:
     summary: str
     reason: str
     bad: str
-    find: Callable[[Subject], Iterable[Finding]]
+    find: Find
     files: Callable[[], Mapping[str, bytes]] = dict[str, bytes]
 
 
-def found_while_reading(code: str) -> Callable[[Subject], Iterable[Finding]]:
+def check(
+    code: str,
+    name: str,
+    tier: Tier,
+    severity: Severity = "error",
+    *,
+    bad: str,
+    files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
+) -> Callable[[Find], Check]:
+    """Makes the check of a function that finds. Its docstring is the summary, then the reason."""
+
+    def made(find: Find) -> Check:
+        summary, _, reason = (find.__doc__ or "").partition("\n\n")
+        return Check(
+            code, name, tier, severity, summary.strip().removesuffix("."), " ".join(reason.split()), bad, find, files
+        )
+
+    return made
+
+
+def found_while_reading(code: str) -> Find:
     """The findings of this code that reading the description made: the one door every description comes through."""
     return lambda subject: (finding for finding in subject.parts.findings if finding.code == code)
 
 
 def reading_check(
-    code: str,
-    *,
-    name: str,
     tier: Tier,
-    severity: Severity = "error",
+    code: str,
+    name: str,
     summary: str,
     reason: str,
     bad: str,
+    *,
+    severity: Severity = "error",
     files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
 ) -> Check:
-    """A check that reading makes anyway: nothing is left but to say what it is about."""
+    """A check that reading makes anyway; a file of them binds the tier first."""
     return Check(code, name, tier, severity, summary, reason, bad, found_while_reading(code), files)

@@ -41,7 +41,7 @@ def controlled_joints(subject: Subject) -> Iterator[ControlledJoint]:
         for joint in component.all("joint"):
             yield ControlledJoint(
                 component=component.attributes.get("name", ""),
-                name=joint.attributes.get("name", "").strip(),
+                name=joint.name,
                 element=joint,
                 commands=joint.all("command_interface"),
             )
@@ -56,16 +56,10 @@ def transmissions(subject: Subject) -> Iterator[WrittenTransmission]:
             kind = element.first("type") or element.first("plugin")
             if kind is not None and kind.text:
                 yield WrittenTransmission(
-                    name=element.attributes.get("name", "").strip() or "(without a name)",
+                    name=element.name or "(without a name)",
                     type=kind.text.strip().rpartition("/")[2],
                     ros1=ros1,
                     element=element,
                     joints=element.all("joint"),
                     actuators=element.all("actuator"),
                 )
-
-
-def role(element: Element) -> str:
-    """As ROS 1 writes it (an element) or ros2_control (an attribute); '' where it has none."""
-    child = element.first("role")
-    return (child.text if child is not None else element.attributes.get("role", "")).strip()

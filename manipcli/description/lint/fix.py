@@ -72,7 +72,7 @@ def _changes(path: Path, description: Description) -> Iterator[Change]:
         place = element.place
         if place is None:
             continue
-        if element.tag == "robot" and not element.attributes.get("name", "").strip():
+        if element.tag == "robot" and not element.name:
             yield Change(place, "name", path.stem.partition(".")[0] or "robot", "the robot gets the name of the file")
         for attribute, value in element.attributes.items():
             new, reason = _better(element, attribute, value, packages)

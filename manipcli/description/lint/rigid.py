@@ -10,8 +10,8 @@ from manipcli.core.geometry import Array
 from manipcli.description.elements import Joint, Link
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.urdf import Parts
-from manipcli.shapes.mesh_facts import mesh_facts, scaled_box
-from manipcli.shapes.mesh_fault import UnusableMesh
+from manipcli.shapes.mesh import mesh_facts, scaled_box
+from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape
 
 LARGEST = 1e9
@@ -36,7 +36,7 @@ def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
     """The elements of a tag directly below <robot>, by name; the first of several."""
     found: dict[str, Element] = {}
     for element in root.all(tag):
-        found.setdefault(element.attributes.get("name", "").strip(), element)
+        found.setdefault(element.name, element)
     return found
 
 

@@ -18,11 +18,33 @@ CUBE = '<collision><geometry><box size="0.35 0.35 0.35"/></geometry></collision>
 """Of 1 kg it has the moments of `INERTIAL`."""
 
 
+def robot(inside: str = "") -> str:
+    return f'<robot name="r">{inside}</robot>'
+
+
+def bare_joint(inside: str = "", *, kind: str = "fixed") -> str:
+    """Links `base` and `tip`, which have nothing, with joint `j` between them."""
+    ends = '<parent link="base"/><child link="tip"/>'
+    return robot(f'<link name="base"/><link name="tip"/><joint name="j" type="{kind}">{ends}{inside}</joint>')
+
+
 def one_joint(inside: str = LIMIT, *, kind: str = "revolute", tip: str = INERTIAL + CUBE, more: str = "") -> str:
     """A description of links `base` and `tip` with joint `j` between them, and `more` beside them."""
     ends = '<parent link="base"/><child link="tip"/>'
     joint = f'<joint name="j" type="{kind}">{ends}{inside}</joint>'
-    return f'<robot name="r"><link name="base"/><link name="tip">{tip}</link>{joint}{more}</robot>'
+    return robot(f'<link name="base"/><link name="tip">{tip}</link>{joint}{more}')
+
+
+def another(inside: str = "", *, link: str = INERTIAL, origin: str = '<origin xyz="0 0 1"/>') -> str:
+    """Link `other` below `tip`, with joint `k` between them; for `more` of `one_joint`."""
+    ends = '<parent link="tip"/><child link="other"/>'
+    return f'<link name="other">{link}</link><joint name="k" type="revolute">{origin}{ends}{LIMIT}{inside}</joint>'
+
+
+def controlled(inside: str) -> str:
+    """A <ros2_control>; for `more` of `one_joint`."""
+    plugin = "<hardware><plugin>p/P</plugin></hardware>"
+    return f'<ros2_control name="c" type="system">{plugin}{inside}</ros2_control>'
 
 
 GEARED = '<joint name="j"><hardwareInterface>PositionJointInterface</hardwareInterface></joint>'
@@ -36,7 +58,7 @@ def transmission(inside: str = GEARED + MOTOR, *, kind: str = "SimpleTransmissio
 
 def one_link(mesh: str, *, role: str = "visual") -> str:
     """A description of one link with a <mesh> of these attributes."""
-    return f'<robot name="r"><link name="base"><{role}><geometry><mesh {mesh}/></geometry></{role}></link></robot>'
+    return robot(f'<link name="base"><{role}><geometry><mesh {mesh}/></geometry></{role}></link>')
 
 
 def ascii_tetrahedron() -> bytes:

@@ -25,7 +25,7 @@ def with_control_limits(root: Element, joints: Mapping[str, Joint]) -> dict[str,
     found = dict(joints)
     for component in root.all("ros2_control"):
         for element in component.all("joint"):
-            name = element.attributes.get("name", "").strip()
+            name = element.name
             joint = found.get(name)
             if joint is not None and joint.moves:
                 found[name] = dataclasses.replace(joint, limits=_limited(joint, element))
@@ -36,7 +36,7 @@ def _limited(joint: Joint, element: Element) -> JointLimits:
     limits = joint.limits
     whole = _is_enabled(element)
     for interface in element.all("command_interface"):
-        name = interface.attributes.get("name", "").strip()
+        name = interface.name
         if not (whole and _is_enabled(interface)):
             limits = _without(limits, name)
             continue
@@ -76,7 +76,7 @@ def _is_enabled(element: Element) -> bool:
 
 def _bound(interface: Element, key: str) -> float | None:
     for parameter in interface.all("param"):
-        if parameter.attributes.get("name", "").strip() == key:
+        if parameter.name == key:
             return finite(parameter.text.strip())
     return None
 

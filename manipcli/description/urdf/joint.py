@@ -192,7 +192,7 @@ def read_transmissions(reader: Reader, root: Element, joints: Collection[str]) -
 
 
 def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> TransmissionTag | None:
-    name = element.attributes.get("name", "").strip() or "(without a name)"
+    name = element.name or "(without a name)"
     kind = element.first("type") or element.first("plugin")
     if kind is None or not kind.text:
         message = f"transmission '{name}' has no <type> (ROS 1) or <plugin> (ros2_control)"
@@ -229,12 +229,13 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
 
 def _by_role(elements: tuple[Element, ...]) -> list[Element]:
     """In the order of their roles (joint1, joint2, ...) where they have roles, else as written."""
-
-    def role(element: Element) -> str:
-        child = element.first("role")
-        return child.text if child is not None else element.attributes.get("role", "")
-
     return sorted(elements, key=role)
+
+
+def role(element: Element) -> str:
+    """As ROS 1 writes it (an element) or ros2_control (an attribute); '' where it has none."""
+    child = element.first("role")
+    return (child.text if child is not None else element.attributes.get("role", "")).strip()
 
 
 def _reduction(reader: Reader, element: Element, transmission: str) -> float:

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Inertial, Link
 from manipcli.description.located_xml import Element
-from manipcli.description.packages import Packages
-from manipcli.description.urdf.mesh_element import read_mesh_element
+from manipcli.description.packages import Absent, NotFound, Outside, Packages, RemoteFile
 from manipcli.description.urdf.numbers import FARTHEST, LARGEST, Reader
 from manipcli.description.urdf.schema_table import is_foreign
-from manipcli.shapes.primitives import Box, Cylinder, Geometry, Rgba, Shape, Sphere
+from manipcli.shapes.mesh import mesh_facts
+from manipcli.shapes.mesh_formats import UnusableMesh
+from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
 
 TRIANGLE_TOLERANCE = 1e-2
 """By which share one principal moment may exceed the sum of the others: descriptions are written with 2-3 digits."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
 _ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
 """Shapes of other formats and of other programs' URDF."""
+WITHOUT_IT: Final = (
+    "put the file there, or a <box>, <cylinder> or the mesh of the <visual> in its place, or take the <collision> out: "
+    "the link then touches nothing"
+)
 
 
 def read_link(reader: Reader, element: Element, name: str, packages: Packages, materials: Mapping[str, Rgba]) -> Link:
@@ -156,7 +162,7 @@ def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Sh
         radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
         return Cylinder(radius=radius[0], length=length[0]) if radius and length else None
     if element.tag == "mesh":
-        return read_mesh_element(reader, element, tag, packages)
+        return _mesh(reader, element, tag, packages)
     if element.tag in _ELSEWHERE:
         left_out = tag == "visual"
         message = f"<{element.tag}> is no shape of URDF" + ("; it is left out" if left_out else "")
@@ -165,6 +171,48 @@ def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Sh
         return None
     reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=reader.near(element.tag, _SHAPES))
     return None
+
+
+def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mesh | None:
+    """The mesh that `element` names, below a <visual> or <collision> (`tag`); None, with a finding, for none."""
+    uri = reader.name(element, "filename")
+    scale = reader.numbers(element, "scale", 3) if "scale" in element.attributes else (1.0, 1.0, 1.0)
+    if uri is None or scale is None:
+        return None
+    if 0.0 in scale:
+        reader.report("URDF012", "a mesh is scaled by 0", element.place)
+        return None
+    try:
+        path = packages.resolve(uri)
+    except (Outside, RemoteFile) as error:
+        code = "URDF202" if isinstance(error, Outside) else "URDF201"
+        reader.report(code, f"{tag} mesh: {error.message}", element.place, hint=error.hint)
+        return None
+    except NotFound as error:
+        if tag == "collision":
+            hint = error.hint
+            if isinstance(error, Absent):
+                hint = f"{hint} Else: {WITHOUT_IT}" if hint else WITHOUT_IT
+            reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=hint)
+        else:
+            message = f"visual mesh, left out: {error.message}"
+            reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")
+        return None
+    if tag == "collision" and packages.reads and not _usable_mesh(reader, element, uri, packages):
+        return None
+    return Mesh(uri=packages.portable(path), path=path, scale=(scale[0], scale[1], scale[2]))
+
+
+def _usable_mesh(reader: Reader, element: Element, uri: str, packages: Packages) -> bool:
+    try:
+        facts = mesh_facts(packages.resolve(uri))
+    except UnusableMesh as error:
+        reader.report("URDF200", f"collision mesh '{uri}' {error.reason}", element.place, hint=error.hint)
+        return False
+    if facts.flat:
+        message = f"collision mesh '{uri}' is flat: nothing can be inside of it"
+        reader.report("URDF210", message, element.place, hint="use a thin <box>")
+    return not facts.flat
 
 
 def _sizes(reader: Reader, element: Element, attribute: str, count: int) -> tuple[float, ...] | None:

@@ -45,7 +45,7 @@ def read_parts(description: Description) -> Parts:
     reader = Reader()
     root = description.root
     places: dict[tuple[str, str], Place] = {}
-    name = root.attributes.get("name", "").strip()
+    name = root.name
     if not name:
         reader.report("URDF050", "<robot> has no attribute 'name'", root.place, severity="warning")
     links_by_name = _named(reader, root, "link", places)

@@ -11,7 +11,7 @@ from typing import Final
 from manipcli.control.command import JointCommand
 from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
-from manipcli.description.lint.checks.too_many_joints import MAX_JOINTS
+from manipcli.description.lint.checks.joints import MAX_JOINTS
 from manipcli.model.batch_kinematics import still_links
 from manipcli.model.normalised_urdf import engine_urdf, massless_links
 from manipcli.model.robot import RobotModel

@@ -15,7 +15,7 @@ from manipcli.description.elements import Inertial, Mimic
 from manipcli.model.normalised_urdf import MASSLESS, body_urdf
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Body
-from manipcli.shapes.mesh_files import clean_mesh
+from manipcli.shapes.mesh import clean_mesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 from manipcli.simulate.engines.pybullet_contacts import Vector
 from manipcli.simulate.engines.pybullet_readback import body_differences

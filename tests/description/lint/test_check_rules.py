@@ -21,7 +21,7 @@ from manipcli.description.lint.samples import (
 )
 from manipcli.description.lint.zero_overlap import overlaps_at_zero
 from manipcli.description.packages import Packages
-from manipcli.shapes.mesh_stl import binary_stl
+from manipcli.shapes.mesh_formats import binary_stl
 
 
 def findings(folder: Path, text: str, **files: bytes) -> tuple[Finding, ...]:

@@ -1,43 +1,36 @@
 """What can be wrong with a description, in the order of tiers and codes.
 
-A file a subject; what reading finds anyway stands in the `reading_` files.
+A file per subject; what reading finds anyway is in the `reading_` files.
 """
 
 from typing import get_args
 
 from manipcli.core.registry import Seam
 from manipcli.description.lint.check import Check, Tier
-from manipcli.description.lint.checks.collisions import COLLISION_CHECKS
-from manipcli.description.lint.checks.control import CONTROL_CHECKS
-from manipcli.description.lint.checks.control_numbers import CONTROL_NUMBER_CHECKS
-from manipcli.description.lint.checks.elements import ELEMENT_CHECKS
-from manipcli.description.lint.checks.joints import JOINT_CHECKS
-from manipcli.description.lint.checks.masses import MASS_CHECKS
-from manipcli.description.lint.checks.materials import MATERIAL_CHECKS
-from manipcli.description.lint.checks.meshes import MESH_CHECKS
-from manipcli.description.lint.checks.names import NAME_CHECKS
+from manipcli.description.lint.checks import (
+    collisions,
+    control,
+    control_numbers,
+    elements,
+    joints,
+    masses,
+    materials,
+    meshes,
+    names,
+    transmissions,
+)
 from manipcli.description.lint.checks.reading_meshes import READING_MESHES
 from manipcli.description.lint.checks.reading_text import READING_TEXT
 from manipcli.description.lint.checks.reading_tree import READING_TREE
-from manipcli.description.lint.checks.too_many_joints import TOO_MANY_JOINTS
-from manipcli.description.lint.checks.transmissions import TRANSMISSION_CHECKS
 
-_MEMBERS: tuple[Check, ...] = (
-    *READING_TEXT,
-    *READING_TREE,
-    *READING_MESHES,
-    *ELEMENT_CHECKS,
-    *NAME_CHECKS,
-    *MATERIAL_CHECKS,
-    *MASS_CHECKS,
-    *JOINT_CHECKS,
-    *MESH_CHECKS,
-    *COLLISION_CHECKS,
-    *TRANSMISSION_CHECKS,
-    *CONTROL_CHECKS,
-    *CONTROL_NUMBER_CHECKS,
-    TOO_MANY_JOINTS,
+_SUBJECTS = (
+    *(collisions, control, control_numbers, elements, joints),
+    *(masses, materials, meshes, names, transmissions),
 )
+_MEMBERS = [
+    *(member for subject in _SUBJECTS for member in vars(subject).values() if isinstance(member, Check)),
+    *(*READING_TEXT, *READING_TREE, *READING_MESHES),
+]
 _TIERS: tuple[Tier, ...] = get_args(Tier)
 
 CHECKS: Seam[Check] = Seam(

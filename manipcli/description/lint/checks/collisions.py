@@ -3,14 +3,21 @@
 from collections.abc import Iterator
 
 from manipcli.core.errors import Finding
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name, moved_bodies
-from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT, one_joint
+from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT, another, one_joint
 from manipcli.description.lint.zero_overlap import overlaps_at_zero
 
 
+@check(
+    "URDF300", "no-collision", "readiness", "warning", bad=one_joint(tip=INERTIAL + CUBE.replace("collision", "visual"))
+)
 def _no_collision(subject: Subject) -> Iterator[Finding]:
-    """Of the links that a joint moves as one: those with visuals only, and where none has any shape, one with mass."""
+    """A link that moves can be seen but has no collision shape.
+
+    It passes through everything, in planning and in simulation.
+    """
+    # Of the links that a joint moves as one: those with visuals only, and where none has any shape, one with mass.
     links = elements_by_name(subject.description.root, "link")
     for joint, body in moved_bodies(subject.parts):
         elements = [(name, links[name]) for name in body if name in links]
@@ -23,50 +30,25 @@ def _no_collision(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF300", message, links[name].place, "a box or cylinder is enough", "warning")
 
 
+@check(
+    "URDF333",
+    "self-collision",
+    "readiness",
+    "warning",
+    bad=one_joint(
+        more=another(link=INERTIAL + CUBE)
+        + f'<link name="last">{INERTIAL}{CUBE}</link><joint name="l" type="revolute"><origin xyz="0 0 -0.9"/>'
+        + f'<parent link="other"/><child link="last"/>{LIMIT}</joint>'
+    ),
+)
 def _self_collision(subject: Subject) -> Iterator[Finding]:
-    """Links that overlap with all joints at zero."""
+    """Links that are not neighbours overlap with all joints at zero.
+
+    Often a misplaced or oversized shape; planning then allows the pair everywhere, as the robot seems to be made
+    like that.
+    """
     links = elements_by_name(subject.description.root, "link")
     for a, b, depth in overlaps_at_zero(subject.parts):
         message = f"links '{a}' and '{b}' overlap (their hulls by {depth * 1000.0:.1f} mm) with all joints at zero"
         hint = "check their <origin> and sizes, or list the pair under collision_ignore in the robot file"
         yield Finding("URDF333", message, links[a].place if a in links else None, hint, "warning")
-
-
-COLLISION_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF300",
-        name="no-collision",
-        tier="readiness",
-        severity="warning",
-        summary="A link that moves can be seen but has no collision shape",
-        reason="It passes through everything, in planning and in simulation.",
-        bad=one_joint(tip=INERTIAL + CUBE.replace("collision", "visual")),
-        find=_no_collision,
-    ),
-    Check(
-        code="URDF333",
-        name="self-collision",
-        tier="readiness",
-        severity="warning",
-        summary="Links that are not neighbours overlap with all joints at zero",
-        reason=(
-            "Often a misplaced or oversized shape; planning then allows the pair everywhere, as the robot seems to "
-            "be made like that."
-        ),
-        bad=one_joint(
-            more='<link name="other">'
-            + INERTIAL
-            + CUBE
-            + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
-            + LIMIT
-            + '</joint><link name="last">'
-            + INERTIAL
-            + CUBE
-            + '</link><joint name="l" type="revolute"><origin xyz="0 0 -0.9"/>'
-            + '<parent link="other"/><child link="last"/>'
-            + LIMIT
-            + "</joint>"
-        ),
-        find=_self_collision,
-    ),
-)

@@ -6,10 +6,10 @@ from typing import Final
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import did_you_mean
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.control_tags import ControlledJoint, controlled_joints
 from manipcli.description.lint.rigid import elements_by_name
-from manipcli.description.lint.samples import INERTIAL, LIMIT, one_joint
+from manipcli.description.lint.samples import another, controlled, one_joint
 from manipcli.description.located_xml import Element
 
 TYPES: Final = ("system", "actuator", "sensor")
@@ -27,8 +27,17 @@ PARTS: Final = ("command_interface", "state_interface", "param", "limits")
 """Of a joint, a sensor or a gpio."""
 
 
+@check(
+    "URDF320",
+    "control-joint",
+    "readiness",
+    bad=one_joint(more=controlled('<joint name="k"><command_interface name="position"/></joint>')),
+)
 def _joint(subject: Subject) -> Iterator[Finding]:
-    """Joints of ros2_control that are not there or do not move."""
+    """A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have.
+
+    The controller manager refuses the whole description at start-up.
+    """
     written = elements_by_name(subject.description.root, "joint")
     for joint in controlled_joints(subject):
         if joint.name not in written:
@@ -38,18 +47,30 @@ def _joint(subject: Subject) -> Iterator[Finding]:
             message = f"ros2_control '{joint.component}': joint '{joint.name}' is fixed"
             yield Finding("URDF320", message, joint.element.place, "take it out, or make the joint move")
     for component in subject.description.root.all("ros2_control"):
-        own = [joint.attributes.get("name", "").strip() for joint in component.all("joint")]
+        own = [joint.name for joint in component.all("joint")]
         for transmission in component.all("transmission"):
             for element in transmission.all("joint"):
-                name = element.attributes.get("name", "").strip()
+                name = element.name
                 if name not in own:
                     what = f"ros2_control '{component.attributes.get('name', '')}': joint '{name}' of transmission "
                     message = f"{what}'{transmission.attributes.get('name', '')}' is not one of its joints"
                     yield Finding("URDF320", message, element.place, did_you_mean(name, own))
 
 
+@check(
+    "URDF321",
+    "control-mimic",
+    "readiness",
+    bad=one_joint(
+        more=another('<mimic joint="j"/>') + controlled('<joint name="k"><command_interface name="position"/></joint>')
+    ),
+)
 def _mimic(subject: Subject) -> Iterator[Finding]:
-    """`mimic="false"` at the joint of the component makes it independent there."""
+    """A mimic joint has a command interface of its own, or nothing to follow.
+
+    It has no position of its own: two commands for one degree of freedom. ros2_control refuses it.
+    """
+    # `mimic="false"` at the joint of the component makes it independent there.
     written = elements_by_name(subject.description.root, "joint")
     together = [(joint.component, joint.name) for joint in controlled_joints(subject)]
     for joint in controlled_joints(subject):
@@ -70,12 +91,23 @@ def _mimic(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF321", message, joint.element.place, f"put '{target}' there too, or take it out")
 
 
+@check(
+    "URDF322",
+    "control-plugin",
+    "readiness",
+    bad=one_joint(
+        more='<ros2_control name="c" type="system"><joint name="j"><command_interface name="position"/></joint>'
+        "</ros2_control>"
+    ),
+)
 def _plugin(subject: Subject) -> Iterator[Finding]:
-    """Components of ros2_control without a plugin, name or type."""
+    """A <ros2_control> states no plugin, no name, or no known type.
+
+    The controller manager does not start with it.
+    """
     for component in subject.description.root.all("ros2_control"):
-        name = component.attributes.get("name", "").strip()
-        hardware = component.first("hardware")
-        plugin = hardware.first("plugin") if hardware is not None else None
+        name = component.name
+        hardware, plugin = component.first("hardware"), component.first("hardware", "plugin")
         if not name:
             yield Finding("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
         if component.attributes.get("type", "").strip() not in TYPES:
@@ -88,11 +120,22 @@ def _plugin(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF322", message, (hardware or component).place, hint)
 
 
+@check(
+    "URDF323",
+    "control-interface",
+    "readiness",
+    "warning",
+    bad=one_joint(more=controlled('<joint name="j"><command_interface name="postion"/></joint>')),
+)
 def _interface(subject: Subject) -> Iterator[Finding]:
-    """A name far from all that are known is somebody's own, which is allowed."""
+    """An interface of ros2_control has a name that no controller asks for, or none.
+
+    Controllers ask for position, velocity, effort or acceleration by exactly these names.
+    """
+    # A name far from all that are known is somebody's own, which is allowed.
     for joint in controlled_joints(subject):
         for interface in (*joint.commands, *joint.element.all("state_interface")):
-            name = interface.attributes.get("name", "").strip()
+            name = interface.name
             near = get_close_matches(name, INTERFACES, n=1, cutoff=0.8) if name else ["position"]
             if name in INTERFACES or name in OTHER_INTERFACES or not near:
                 continue
@@ -101,8 +144,14 @@ def _interface(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
 
 
+@check("URDF325", "control-element", "readiness", bad=one_joint(more=controlled('<joint name="j"/><joint name="j"/>')))
 def _element(subject: Subject) -> Iterator[Finding]:
-    """Elements that <ros2_control> does not have, and such that it has once."""
+    """A <ros2_control> has an element, joint, interface or parameter that may not be there as it is.
+
+    Its parser knows hardware, joint, sensor, gpio and transmission, and throws at any other; what it does not know
+    below a joint it leaves out. A joint and an interface stand there once, an actuator has one joint, a sensor
+    commands nothing, and a parameter has a name.
+    """
     names: set[str] = set()
     for component in subject.description.root.all("ros2_control"):
         name = component.attributes.get("name", "")
@@ -114,7 +163,7 @@ def _element(subject: Subject) -> Iterator[Finding]:
             if child.tag not in ELEMENTS:
                 message = f"ros2_control '{name}' has an element <{child.tag}>; expected {', '.join(ELEMENTS)}"
                 yield Finding("URDF325", message, child.place, None)
-            own = child.attributes.get("name", "").strip()
+            own = child.name
             if child.tag == "joint" and own in seen:
                 yield Finding("URDF325", f"ros2_control '{name}' has joint '{own}' twice", child.place, None)
             if child.tag in ("sensor", "gpio") and not own:
@@ -127,7 +176,7 @@ def _element(subject: Subject) -> Iterator[Finding]:
             message = f"ros2_control '{name}' is an actuator and has {len(component.all('joint'))} joints; expected one"
             yield Finding("URDF325", message, component.all("joint")[1].place, 'type="system" may have several')
         for parameter in _parameters(component):
-            if not parameter.attributes.get("name", "").strip():
+            if not parameter.name:
                 yield Finding("URDF325", f"ros2_control '{name}': a <param> has no name", parameter.place, None)
     yield from _commanded_twice(subject)
 
@@ -142,7 +191,7 @@ def _within(element: Element, component: str) -> Iterator[Finding]:
         if child.tag not in PARTS and ":" not in child.tag:
             message = f"{what} has an element <{child.tag}>, which is ignored"
             yield Finding("URDF325", message, child.place, did_you_mean(child.tag, PARTS, kind="known"), "warning")
-        interface = child.tag, child.attributes.get("name", "").strip()
+        interface = child.tag, child.name
         if child.tag.endswith("_interface") and interface[1] and interface in seen:
             yield Finding("URDF325", f"{what} has <{child.tag}> '{interface[1]}' twice", child.place, None)
         seen.add(interface)
@@ -158,7 +207,7 @@ def _commanded_twice(subject: Subject) -> Iterator[Finding]:
     owners: dict[tuple[str, str], ControlledJoint] = {}
     for joint in controlled_joints(subject):
         for interface in joint.commands:
-            name = interface.attributes.get("name", "").strip()
+            name = interface.name
             what = f"ros2_control '{joint.component}': command interface '{name}' of joint '{joint.name}'"
             if joint.component in sensors:
                 hint = 'a sensor has state interfaces only; type="system" may have both'
@@ -174,82 +223,3 @@ def _parameters(element: Element) -> Iterator[Element]:
         if child.tag == "param":
             yield child
         yield from _parameters(child)
-
-
-CONTROL_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF320",
-        name="control-joint",
-        tier="readiness",
-        severity="error",
-        summary=(
-            "A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have"
-        ),
-        reason="The controller manager refuses the whole description at start-up.",
-        bad=one_joint(
-            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-            '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
-        ),
-        find=_joint,
-    ),
-    Check(
-        code="URDF321",
-        name="control-mimic",
-        tier="readiness",
-        severity="error",
-        summary="A mimic joint has a command interface of its own, or nothing to follow",
-        reason="It has no position of its own: two commands for one degree of freedom. ros2_control refuses it.",
-        bad=one_joint(
-            more='<link name="other">'
-            + INERTIAL
-            + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
-            + LIMIT
-            + '<mimic joint="j"/></joint><ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-            '<joint name="k"><command_interface name="position"/></joint></ros2_control>'
-        ),
-        find=_mimic,
-    ),
-    Check(
-        code="URDF322",
-        name="control-plugin",
-        tier="readiness",
-        severity="error",
-        summary="A <ros2_control> states no plugin, no name, or no known type",
-        reason="The controller manager does not start with it.",
-        bad=one_joint(
-            more='<ros2_control name="c" type="system"><joint name="j"><command_interface name="position"/></joint>'
-            "</ros2_control>"
-        ),
-        find=_plugin,
-    ),
-    Check(
-        code="URDF323",
-        name="control-interface",
-        tier="readiness",
-        severity="warning",
-        summary="An interface of ros2_control has a name that no controller asks for, or none",
-        reason="Controllers ask for position, velocity, effort or acceleration by exactly these names.",
-        bad=one_joint(
-            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-            '<joint name="j"><command_interface name="postion"/></joint></ros2_control>'
-        ),
-        find=_interface,
-    ),
-    Check(
-        code="URDF325",
-        name="control-element",
-        tier="readiness",
-        severity="error",
-        summary="A <ros2_control> has an element, joint, interface or parameter that may not be there as it is",
-        reason=(
-            "Its parser knows hardware, joint, sensor, gpio and transmission, and throws at any other; what it does "
-            "not know below a joint it leaves out. A joint and an interface stand there once, an actuator has one "
-            "joint, a sensor commands nothing, and a parameter has a name."
-        ),
-        bad=one_joint(
-            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-            '<joint name="j"/><joint name="j"/></ros2_control>'
-        ),
-        find=_element,
-    ),
-)

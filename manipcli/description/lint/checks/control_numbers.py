@@ -6,9 +6,9 @@ from typing import Final
 from manipcli.core.errors import Finding
 from manipcli.core.text import shorten
 from manipcli.description.elements import JointLimits
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.control_tags import controlled_joints
-from manipcli.description.lint.samples import one_joint
+from manipcli.description.lint.samples import controlled, one_joint
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.numbers import finite
 
@@ -16,8 +16,23 @@ SWITCH: Final = ("true", "false", "True", "False")
 TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", "uint16", "uint32")
 
 
+@check(
+    "URDF324",
+    "control-number",
+    "readiness",
+    bad=one_joint(
+        more=controlled(
+            '<joint name="j"><state_interface name="position"><param name="initial_value">half</param>'
+            "</state_interface></joint>"
+        )
+    ),
+)
 def _find(subject: Subject) -> Iterator[Finding]:
-    """Numbers and switches of ros2_control that are none."""
+    """A number or switch in <ros2_control> cannot be read, or contradicts the limits.
+
+    ros2_control takes its default instead, without a word; an initial position outside of the limits starts the
+    robot where it cannot be.
+    """
     for component in subject.description.root.all("ros2_control"):
         rate = component.attributes.get("rw_rate", "1").strip()
         if not _whole(rate):
@@ -97,9 +112,9 @@ def _switch(element: Element, attribute: str) -> Iterator[Finding]:
 def _legacy(joint: Element) -> Iterator[Finding]:
     """<param name="multiplier"> and "offset" of a joint that follows another by <param name="mimic">."""
     for parameter in joint.all("param"):
-        key, said = parameter.attributes.get("name", "").strip(), parameter.text.strip()
+        key, said = parameter.name, parameter.text.strip()
         if key in ("multiplier", "offset") and finite(said) is None:
-            name = joint.attributes.get("name", "").strip()
+            name = joint.name
             message = f"joint '{name}': '{shorten(said)}' is no finite number for {key}"
             yield Finding("URDF324", message, parameter.place, None)
 
@@ -107,25 +122,3 @@ def _legacy(joint: Element) -> Iterator[Finding]:
 def _whole(text: str) -> bool:
     """Of digits alone and above 0, whatever the locale."""
     return text.isascii() and text.isdigit() and int(text) > 0
-
-
-CONTROL_NUMBER_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF324",
-        name="control-number",
-        tier="readiness",
-        severity="error",
-        summary="A number or switch in <ros2_control> cannot be read, or contradicts the limits",
-        reason=(
-            "ros2_control takes its default instead, without a word; an initial position outside of the limits "
-            "starts the robot where it cannot be."
-        ),
-        bad=one_joint(
-            more='<ros2_control name="c" type="system"><hardware><plugin>p/P</plugin></hardware>'
-            '<joint name="j">'
-            '<state_interface name="position"><param name="initial_value">half</param></state_interface></joint>'
-            "</ros2_control>"
-        ),
-        find=_find,
-    ),
-)

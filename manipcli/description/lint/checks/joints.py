@@ -5,9 +5,9 @@ from math import radians
 from typing import Final
 
 from manipcli.core.errors import Finding
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name
-from manipcli.description.lint.samples import INERTIAL, LIMIT, one_joint
+from manipcli.description.lint.samples import LIMIT, another, one_joint
 from manipcli.description.urdf.numbers import finite
 
 MANY_TURNS: Final = 20.0
@@ -16,10 +16,18 @@ FAR_SLIDE: Final = 20.0
 """[m]"""
 MIMIC_TOLERANCE: Final = 0.02
 """Of the range: descriptions round their numbers."""
+MAX_JOINTS: Final = 127
+"""Moving and fixed; with one more PyBullet's `getJointState` fails, with thousands the process."""
 
 
+@check(
+    "URDF104", "fixed-axis", "physics", "warning", bad=one_joint('<axis xyz="0 0 1"/><mimic joint="k"/>', kind="fixed")
+)
 def _fixed_axis(subject: Subject) -> Iterator[Finding]:
-    """Axes and mimics of fixed joints."""
+    """A fixed joint has an axis, or follows another.
+
+    It means nothing; mostly the joint moved once. What should follow another joint stands still.
+    """
     for joint in subject.description.root.all("joint"):
         if joint.attributes.get("type") != "fixed":
             continue
@@ -32,8 +40,12 @@ def _fixed_axis(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF104", message, mimic.place, "make the joint move, or delete <mimic>", "warning")
 
 
+@check("URDF105", "default-axis", "physics", "note", bad=one_joint())
 def _default_axis(subject: Subject) -> Iterator[Finding]:
-    """Moving joints without an axis."""
+    """A moving joint has no axis; x is used.
+
+    URDF says x; whoever meant z does not see it before the robot moves.
+    """
     for joint in subject.description.root.all("joint"):
         axis = joint.first("axis")
         if joint.attributes.get("type") in ("revolute", "continuous", "prismatic") and (
@@ -43,8 +55,12 @@ def _default_axis(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF105", message, joint.place, '<axis xyz="..."/>', "note")
 
 
+@check("URDF106", "continuous-limits", "physics", "note", bad=one_joint(kind="continuous"))
 def _continuous_limits(subject: Subject) -> Iterator[Finding]:
-    """Limits of position on continuous joints."""
+    """A continuous joint states lower and upper limits.
+
+    They are ignored: a joint with limits is revolute.
+    """
     for joint in subject.description.root.all("joint"):
         limit = joint.first("limit")
         if limit is None or joint.attributes.get("type") != "continuous":
@@ -58,8 +74,19 @@ def _continuous_limits(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF106", message, limit.place, "make it revolute where the limits are meant", "note")
 
 
+@check(
+    "URDF107",
+    "safety-limits",
+    "physics",
+    "warning",
+    bad=one_joint(LIMIT + '<safety_controller soft_lower_limit="-2" soft_upper_limit="0.9" k_velocity="1"/>'),
+)
 def _safety_limits(subject: Subject) -> Iterator[Finding]:
-    """Soft limits that do not fit the limits."""
+    """The soft limits of a safety_controller lie outside of the limits, or cross.
+
+    Soft limits are there to slow a joint before its end; outside of the limits they never act, and the joint meets
+    its hard limit at full speed.
+    """
     written = elements_by_name(subject.description.root, "joint")
     for joint in subject.parts.joints:
         safety = written[joint.name].first("safety_controller") if joint.name in written else None
@@ -82,8 +109,18 @@ def _safety_limits(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF107", message, safety.place, "soft limits lie inside of the limits", "warning")
 
 
+@check(
+    "URDF109",
+    "limits-in-degrees",
+    "physics",
+    "warning",
+    bad=one_joint('<limit lower="-180" upper="180" velocity="1" effort="1"/>'),
+)
 def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
-    """Limits of angle that look like degrees, and of way that look like millimetres."""
+    """A joint has limits that look like degrees, or like millimetres.
+
+    URDF counts in radians and metres: a limit of 180 lets a joint turn 28 times, or slide 180 m.
+    """
     written = elements_by_name(subject.description.root, "joint")
     for joint in subject.parts.joints:
         lower, upper = joint.limits.lower or 0.0, joint.limits.upper or 0.0
@@ -101,8 +138,19 @@ def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF109", message, place, hint, "warning")
 
 
+@check(
+    "URDF334",
+    "zero-outside",
+    "readiness",
+    "note",
+    bad=one_joint('<limit lower="0.5" upper="1" velocity="1" effort="1"/>'),
+)
 def _zero_outside(subject: Subject) -> Iterator[Finding]:
-    """Joints for which zero is outside of the limits."""
+    """Zero is outside of the limits of a joint.
+
+    Programs that start a robot with all joints at zero start it where it cannot be; a pose `home` in the robot file
+    says where to start.
+    """
     written = elements_by_name(subject.description.root, "joint")
     for joint in subject.parts.joints:
         lower, upper = joint.limits.lower, joint.limits.upper
@@ -113,8 +161,14 @@ def _zero_outside(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF334", message, place, "state a named pose in the robot file", "note")
 
 
+@check(
+    "URDF335", "mimic-limits", "readiness", "warning", bad=one_joint(more=another('<mimic joint="j" multiplier="2"/>'))
+)
 def _mimic_limits(subject: Subject) -> Iterator[Finding]:
-    """Mimic joints that cannot follow."""
+    """A mimic joint cannot follow its joint all the way: its own limits are narrower.
+
+    Either the coupling breaks at the limit or the limit does; a plan for the leading joint does not know of it.
+    """
     joints = {joint.name: joint for joint in subject.parts.joints}
     written = elements_by_name(subject.description.root, "joint")
     for joint in subject.parts.joints:
@@ -136,90 +190,24 @@ def _mimic_limits(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF335", message, (element.first("limit") or element).place, "widen them", "warning")
 
 
-JOINT_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF104",
-        name="fixed-axis",
-        tier="physics",
-        severity="warning",
-        summary="A fixed joint has an axis, or follows another",
-        reason="It means nothing; mostly the joint moved once. What should follow another joint stands still.",
-        bad=one_joint('<axis xyz="0 0 1"/><mimic joint="k"/>', kind="fixed"),
-        find=_fixed_axis,
-    ),
-    Check(
-        code="URDF105",
-        name="default-axis",
-        tier="physics",
-        severity="note",
-        summary="A moving joint has no axis; x is used",
-        reason="URDF says x; whoever meant z does not see it before the robot moves.",
-        bad=one_joint(),
-        find=_default_axis,
-    ),
-    Check(
-        code="URDF106",
-        name="continuous-limits",
-        tier="physics",
-        severity="note",
-        summary="A continuous joint states lower and upper limits",
-        reason="They are ignored: a joint with limits is revolute.",
-        bad=one_joint(kind="continuous"),
-        find=_continuous_limits,
-    ),
-    Check(
-        code="URDF107",
-        name="safety-limits",
-        tier="physics",
-        severity="warning",
-        summary="The soft limits of a safety_controller lie outside of the limits, or cross",
-        reason=(
-            "Soft limits are there to slow a joint before its end; outside of the limits they never act, and the joint "
-            "meets its hard limit at full speed."
-        ),
-        bad=one_joint(LIMIT + '<safety_controller soft_lower_limit="-2" soft_upper_limit="0.9" k_velocity="1"/>'),
-        find=_safety_limits,
-    ),
-    Check(
-        code="URDF109",
-        name="limits-in-degrees",
-        tier="physics",
-        severity="warning",
-        summary="A joint has limits that look like degrees, or like millimetres",
-        reason="URDF counts in radians and metres: a limit of 180 lets a joint turn 28 times, or slide 180 m.",
-        bad=one_joint('<limit lower="-180" upper="180" velocity="1" effort="1"/>'),
-        find=_limits_in_degrees,
-    ),
-    Check(
-        code="URDF334",
-        name="zero-outside",
-        tier="readiness",
-        severity="note",
-        summary="Zero is outside of the limits of a joint",
-        reason=(
-            "Programs that start a robot with all joints at zero start it where it cannot be; a pose `home` in the "
-            "robot file says where to start."
-        ),
-        bad=one_joint('<limit lower="0.5" upper="1" velocity="1" effort="1"/>'),
-        find=_zero_outside,
-    ),
-    Check(
-        code="URDF335",
-        name="mimic-limits",
-        tier="readiness",
-        severity="warning",
-        summary="A mimic joint cannot follow its joint all the way: its own limits are narrower",
-        reason=(
-            "Either the coupling breaks at the limit or the limit does; a plan for the leading joint does not know of "
-            "it."
-        ),
-        bad=one_joint(
-            more='<link name="other">'
-            + INERTIAL
-            + '</link><joint name="k" type="revolute"><origin xyz="0 0 1"/><parent link="tip"/><child link="other"/>'
-            + LIMIT
-            + '<mimic joint="j" multiplier="2"/></joint>'
-        ),
-        find=_mimic_limits,
+@check(
+    "URDF332",
+    "too-many-joints",
+    "readiness",
+    bad=one_joint(
+        more="".join(
+            f'<link name="l{k}"/><joint name="j{k}" type="fixed"><parent link="base"/><child link="l{k}"/></joint>'
+            for k in range(127)
+        )
     ),
 )
+def _too_many_joints(subject: Subject) -> Iterator[Finding]:
+    """The robot has more than 127 joints.
+
+    From 128 on, fixed ones included, PyBullet cannot read a joint; with thousands it hangs or crashes.
+    """
+    joints = subject.description.root.all("joint")
+    if len(joints) > MAX_JOINTS:
+        message = f"the robot has {len(joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
+        hint = "join links that are fixed to each other"
+        yield Finding("URDF332", message, joints[MAX_JOINTS].place, hint)

@@ -8,7 +8,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import digits
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name, extent, moved_bodies
 from manipcli.description.lint.samples import CUBE, INERTIAL, one_joint
 from manipcli.description.located_xml import Element
@@ -28,8 +28,13 @@ DENSEST: Final = 30_000.0
 """[kg/m3]: osmium, the densest there is, has 22590; shapes may be somewhat smaller than what they stand for."""
 
 
+@check("URDF100", "massless-joint", "physics", "warning", bad=one_joint(tip=CUBE))
 def _massless_joint(subject: Subject) -> Iterator[Finding]:
-    """The child of a moving joint has no mass, and neither has what is fixed to it."""
+    """A joint moves a link that has no mass.
+
+    PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques mean nothing; here an engine
+    with physics refuses such a joint.
+    """
     links = elements_by_name(subject.description.root, "link")
     massive = {name for name, link in links.items() if _states_mass(link)}
     for joint, body in moved_bodies(subject.parts):
@@ -41,16 +46,21 @@ def _massless_joint(subject: Subject) -> Iterator[Finding]:
 
 def _states_mass(link: Element) -> bool:
     """Also a mass that is refused for another reason, which reading tells."""
-    inertial = link.first("inertial")
-    mass = inertial.first("mass") if inertial is not None else None
+    inertial, mass = link.first("inertial"), link.first("inertial", "mass")
     return inertial is not None and (mass is None or finite(mass.attributes.get("value", "").strip()) != 0.0)
 
 
+@check(
+    "URDF101", "inertia-size", "physics", "warning", bad=one_joint(tip=INERTIAL.replace("0.02", "0.00000002") + CUBE)
+)
 def _inertia_size(subject: Subject) -> Iterator[Finding]:
-    """sqrt(I / m) is how far from the centre of mass the mass lies on average: never farther than all of the shape.
+    """The moments of inertia do not fit the size of the link.
 
-    A solid ball has 0.63 of its radius, a solid cube 0.47 of the distance of its corners.
+    A unit that was mixed up (g mm2 for kg m2, or a density) looks plausible as a number; the arm then shakes or
+    crawls.
     """
+    # sqrt(I / m) is how far from the centre of mass the mass lies on average: never farther than all of the shape. A
+    # solid ball has 0.63 of its radius, a solid cube 0.47 of the distance of its corners.
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         box = extent(link, links[link.name])
@@ -72,8 +82,18 @@ def _inertia_size(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF101", message, (element.first("inertia") or element).place, hint, "warning")
 
 
+@check(
+    "URDF102",
+    "centre-of-mass",
+    "physics",
+    "warning",
+    bad=one_joint(tip=INERTIAL.replace("<mass", '<origin xyz="0 0 2"/><mass') + CUBE),
+)
 def _centre_of_mass(subject: Subject) -> Iterator[Finding]:
-    """Centres of mass far outside of the link."""
+    """The centre of mass lies far outside of the shape of the link.
+
+    Gravity then turns the joint with an arm that is not there; mostly a unit, a sign, or another frame.
+    """
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         box = extent(link, links[link.name])
@@ -93,12 +113,20 @@ def _centre_of_mass(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF102", message, place, "check the <origin> of <inertial>: its unit, its frame", "warning")
 
 
+@check(
+    "URDF108",
+    "inertia-without-mass",
+    "physics",
+    "warning",
+    bad=one_joint(tip=CUBE + INERTIAL.replace('mass value="1"', 'mass value="0"'), kind="fixed", inside=""),
+)
 def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
-    """Moments of inertia without a mass."""
+    """A link has moments of inertia and mass 0.
+
+    No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all.
+    """
     for link in subject.description.root.all("link"):
-        inertial = link.first("inertial")
-        mass = inertial.first("mass") if inertial is not None else None
-        inertia = inertial.first("inertia") if inertial is not None else None
+        mass, inertia = link.first("inertial", "mass"), link.first("inertial", "inertia")
         if mass is None or inertia is None or finite(mass.attributes.get("value", "").strip()) != 0.0:
             continue
         if any(finite(inertia.attributes.get(key, "0").strip()) for key in ("ixx", "iyy", "izz")):
@@ -106,8 +134,19 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF108", message, inertia.place, "state its mass, or leave the inertial out", "warning")
 
 
+@check(
+    "URDF110",
+    "root-inertia",
+    "physics",
+    "note",
+    bad=one_joint().replace('<link name="base"/>', f'<link name="base">{INERTIAL}</link>'),
+)
 def _root_inertia(subject: Subject) -> Iterator[Finding]:
-    """Inertias of root links."""
+    """The root link has an inertial, which is ignored.
+
+    The robot stands on its root link, so that its mass moves nothing; KDL warns of it. On a mobile base it would
+    matter.
+    """
     root = elements_by_name(subject.description.root, "link").get(subject.parts.root)
     inertial = root.first("inertial") if root is not None else None
     if inertial is not None and subject.parts.joints:
@@ -115,8 +154,20 @@ def _root_inertia(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF110", message, inertial.place, "put an empty root link before it for KDL", "note")
 
 
+@check(
+    "URDF111",
+    "no-inertial",
+    "physics",
+    "note",
+    bad=one_joint().replace('<link name="base"/>', f'<link name="base">{CUBE}</link>'),
+)
 def _no_inertial(subject: Subject) -> Iterator[Finding]:
-    """But for links that a joint moves by themselves: URDF100 tells those."""
+    """A link that has a shape has no inertial; it counts as having no mass.
+
+    Fine for a base that stands still; fixed to a moving link it makes the arm lighter than it is. PyBullet would
+    give it 1 kg.
+    """
+    # But for links that a joint moves by themselves: URDF100 tells those.
     moved = {joint.child for joint, _ in moved_bodies(subject.parts)}
     for name, link in elements_by_name(subject.description.root, "link").items():
         shaped = link.first("visual") is not None or link.first("collision") is not None
@@ -125,8 +176,14 @@ def _no_inertial(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF111", message, link.place, None, "note")
 
 
+@check("URDF112", "heavy-link", "physics", "warning", bad=one_joint(tip=INERTIAL.replace('value="1"', 'value="20000"')))
 def _heavy_link(subject: Subject) -> Iterator[Finding]:
-    """The box about all shapes is larger than they are, so that the density is at least what is told."""
+    """A link is heavier than anything of its size can be, or than 10 t.
+
+    A mass in grams or a mesh in millimetres taken for metres gives it; no motor moves such a link, and beside light
+    ones it makes the simulation stiff or unstable.
+    """
+    # The box about all shapes is larger than they are, so that the density is at least what is told.
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         if link.inertial is None:
@@ -144,94 +201,3 @@ def _heavy_link(subject: Subject) -> Iterator[Finding]:
         place = (element.first("mass") or element).place
         message = f"link '{link.name}' has mass {digits(mass)} kg: {why}"
         yield Finding("URDF112", message, place, "URDF counts in kg and m", "warning")
-
-
-MASS_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF100",
-        name="massless-joint",
-        tier="physics",
-        severity="warning",
-        summary="A joint moves a link that has no mass",
-        reason=(
-            "PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques mean nothing; here an "
-            "engine with physics refuses such a joint."
-        ),
-        bad=one_joint(tip=CUBE),
-        find=_massless_joint,
-    ),
-    Check(
-        code="URDF101",
-        name="inertia-size",
-        tier="physics",
-        severity="warning",
-        summary="The moments of inertia do not fit the size of the link",
-        reason=(
-            "A unit that was mixed up (g mm2 for kg m2, or a density) looks plausible as a number; the arm then "
-            "shakes or crawls."
-        ),
-        bad=one_joint(tip=INERTIAL.replace("0.02", "0.00000002") + CUBE),
-        find=_inertia_size,
-    ),
-    Check(
-        code="URDF102",
-        name="centre-of-mass",
-        tier="physics",
-        severity="warning",
-        summary="The centre of mass lies far outside of the shape of the link",
-        reason="Gravity then turns the joint with an arm that is not there; mostly a unit, a sign, or another frame.",
-        bad=one_joint(tip=INERTIAL.replace("<mass", '<origin xyz="0 0 2"/><mass') + CUBE),
-        find=_centre_of_mass,
-    ),
-    Check(
-        code="URDF108",
-        name="inertia-without-mass",
-        tier="physics",
-        severity="warning",
-        summary="A link has moments of inertia and mass 0",
-        reason=(
-            "No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all."
-        ),
-        bad=one_joint(tip=CUBE + INERTIAL.replace('mass value="1"', 'mass value="0"'), kind="fixed", inside=""),
-        find=_inertia_without_mass,
-    ),
-    Check(
-        code="URDF110",
-        name="root-inertia",
-        tier="physics",
-        severity="note",
-        summary="The root link has an inertial, which is ignored",
-        reason=(
-            "The robot stands on its root link, so that its mass moves nothing; KDL warns of it. On a mobile base "
-            "it would matter."
-        ),
-        bad=one_joint().replace('<link name="base"/>', f'<link name="base">{INERTIAL}</link>'),
-        find=_root_inertia,
-    ),
-    Check(
-        code="URDF111",
-        name="no-inertial",
-        tier="physics",
-        severity="note",
-        summary="A link that has a shape has no inertial; it counts as having no mass",
-        reason=(
-            "Fine for a base that stands still; fixed to a moving link it makes the arm lighter than it is. "
-            "PyBullet would give it 1 kg."
-        ),
-        bad=one_joint().replace('<link name="base"/>', f'<link name="base">{CUBE}</link>'),
-        find=_no_inertial,
-    ),
-    Check(
-        code="URDF112",
-        name="heavy-link",
-        tier="physics",
-        severity="warning",
-        summary="A link is heavier than anything of its size can be, or than 10 t",
-        reason=(
-            "A mass in grams or a mesh in millimetres taken for metres gives it; no motor moves such a link, and "
-            "beside light ones it makes the simulation stiff or unstable."
-        ),
-        bad=one_joint(tip=INERTIAL.replace('value="1"', 'value="20000"')),
-        find=_heavy_link,
-    ),
-)

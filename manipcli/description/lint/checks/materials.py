@@ -4,14 +4,27 @@ from collections.abc import Iterator
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import did_you_mean, shorten
-from manipcli.description.lint.check import Check, Subject
+from manipcli.description.lint.check import Subject, check
+from manipcli.description.lint.samples import robot
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.numbers import finite
 from manipcli.description.urdf.schema_table import known_elements
 
 
+@check(
+    "URDF063",
+    "undefined-material",
+    "schema",
+    "warning",
+    bad=robot(
+        '<link name="base"><visual><geometry><box size="1 1 1"/></geometry><material name="red"/></visual></link>'
+    ),
+)
 def _undefined_material(subject: Subject) -> Iterator[Finding]:
-    """Materials without a definition or without a name."""
+    """A material is used and nowhere defined, or has no name.
+
+    The shape gets a colour that the program likes; some parsers refuse the file.
+    """
     materials = [element for element, _ in known_elements(subject.description.root) if element.tag == "material"]
     defined = {each.attributes.get("name", "") for each in materials if each.children}
     for material in materials:
@@ -25,8 +38,21 @@ def _undefined_material(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF063", what, material.place, near or "give it a <color rgba=.../>", "warning")
 
 
+@check(
+    "URDF064",
+    "colour-range",
+    "schema",
+    "warning",
+    bad=robot(
+        '<link name="base"><visual><geometry><box size="1 1 1"/></geometry><material name="red">'
+        '<color rgba="255 0 0 1"/></material></visual></link>'
+    ),
+)
 def _colour_range(subject: Subject) -> Iterator[Finding]:
-    """Colours beyond what can be shown."""
+    """A colour is not within 0 and 1.
+
+    Colours are shares of 1, not of 255: what is larger is drawn white, or as nothing.
+    """
     for element, _ in known_elements(subject.description.root):
         if element.tag != "color":
             continue
@@ -38,8 +64,21 @@ def _colour_range(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF064", message, element.place, hint, "warning")
 
 
+@check(
+    "URDF066",
+    "redefined-material",
+    "schema",
+    "warning",
+    bad=robot(
+        '<material name="red"><color rgba="1 0 0 1"/></material><link name="base"><visual><geometry>'
+        '<box size="1 1 1"/></geometry><material name="red"><color rgba="0 1 0 1"/></material></visual></link>'
+    ),
+)
 def _redefined_material(subject: Subject) -> Iterator[Finding]:
-    """Materials of one name and two colours."""
+    """A material is defined twice, with different colours.
+
+    Programs keep one of the two for all shapes; PyBullet the first.
+    """
     first: dict[str, Element] = {}
     for element, _ in known_elements(subject.description.root):
         name = element.attributes.get("name", "")
@@ -54,51 +93,3 @@ def _redefined_material(subject: Subject) -> Iterator[Finding]:
 def _colour(material: Element) -> tuple[float | None, ...] | None:
     colour = material.first("color")
     return tuple(finite(word) for word in colour.attributes.get("rgba", "").split()[:4]) if colour is not None else None
-
-
-MATERIAL_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF063",
-        name="undefined-material",
-        tier="schema",
-        severity="warning",
-        summary="A material is used and nowhere defined, or has no name",
-        reason="The shape gets a colour that the program likes; some parsers refuse the file.",
-        bad=(
-            '<robot name="r">'
-            '<link name="base"><visual><geometry><box size="1 1 1"/></geometry><material name="red"/></visual></link>'
-            "</robot>"
-        ),
-        find=_undefined_material,
-    ),
-    Check(
-        code="URDF064",
-        name="colour-range",
-        tier="schema",
-        severity="warning",
-        summary="A colour is not within 0 and 1",
-        reason="Colours are shares of 1, not of 255: what is larger is drawn white, or as nothing.",
-        bad=(
-            '<robot name="r">'
-            '<link name="base"><visual><geometry><box size="1 1 1"/></geometry>'
-            '<material name="red"><color rgba="255 0 0 1"/></material></visual></link>'
-            "</robot>"
-        ),
-        find=_colour_range,
-    ),
-    Check(
-        code="URDF066",
-        name="redefined-material",
-        tier="schema",
-        severity="warning",
-        summary="A material is defined twice, with different colours",
-        reason="Programs keep one of the two for all shapes; PyBullet the first.",
-        bad=(
-            '<robot name="r"><material name="red"><color rgba="1 0 0 1"/></material>'
-            '<link name="base"><visual><geometry><box size="1 1 1"/></geometry>'
-            '<material name="red"><color rgba="0 1 0 1"/></material></visual></link>'
-            "</robot>"
-        ),
-        find=_redefined_material,
-    ),
-)

@@ -6,9 +6,10 @@ from typing import Final
 from manipcli.core.errors import Finding, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import TransmissionTag
-from manipcli.description.lint.check import Check, Subject
-from manipcli.description.lint.control_tags import SIZES, WrittenTransmission, role, transmissions
-from manipcli.description.lint.samples import GEARED, INERTIAL, LIMIT, MOTOR, one_joint, transmission
+from manipcli.description.lint.check import Subject, check
+from manipcli.description.lint.control_tags import SIZES, WrittenTransmission, transmissions
+from manipcli.description.lint.samples import GEARED, MOTOR, another, one_joint, transmission
+from manipcli.description.urdf.joint import role
 from manipcli.description.urdf.numbers import finite
 
 INTERFACES: Final = (
@@ -26,8 +27,14 @@ _UNREAD = (
 )
 
 
+@check(
+    "URDF310", "transmission-type", "readiness", "warning", bad=one_joint(more=transmission(kind="Simpletransmission"))
+)
 def _type(subject: Subject) -> Iterator[Finding]:
-    """Transmissions of an unknown type."""
+    """A transmission is of a type that is not known.
+
+    It is left out: commands go to the joint as if there were no gear.
+    """
     for found in transmissions(subject):
         if found.type not in SIZES:
             kind = found.element.first("type") or found.element.first("plugin") or found.element
@@ -36,17 +43,25 @@ def _type(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF310", message, kind.place, hint, "warning")
 
 
+@check(
+    "URDF311",
+    "transmission-shared",
+    "readiness",
+    bad=one_joint(more=transmission() + transmission().replace('"t"', '"u"')),
+)
 def _shared(subject: Subject) -> Iterator[Finding]:
-    """ROS 1 and ros2_control may describe the same gear, each in its own place: they are two lists.
+    """A joint or actuator belongs to two transmissions, or to two unlike ones of ROS 1 and ros2_control.
 
-    Two joints with an actuator of one name are two motors with a name copied, which does no harm in joint space.
+    Each of them would set its position; which one wins depends on the order of loading.
     """
+    # ROS 1 and ros2_control may describe the same gear, each in its own place: they are two lists. Two joints with an
+    # actuator of one name are two motors with a name copied, which does no harm in joint space.
     owners: dict[tuple[bool, str, str], WrittenTransmission] = {}
     for found in transmissions(subject):
         shared_joint = False
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
             for element in elements:
-                name = element.attributes.get("name", "").strip()
+                name = element.name
                 owner = owners.setdefault((found.ros1, tag, name), found)
                 if not name or owner is found or shared_joint:
                     continue
@@ -78,8 +93,28 @@ def _gear(tag: TransmissionTag) -> tuple[object, ...]:
     return tag.type, tag.joints, tag.joint_reductions, tag.joint_offsets, tag.actuator_reductions
 
 
+@check(
+    "URDF312",
+    "transmission-roles",
+    "readiness",
+    bad=one_joint(
+        more=another(origin="")
+        + '<transmission name="t"><type>transmission_interface/DifferentialTransmission</type>'
+        + "".join(
+            f'<joint name="{name}"><hardwareInterface>EffortJointInterface</hardwareInterface></joint>'
+            f'<actuator name="m{name}"><mechanicalReduction>1</mechanicalReduction></actuator>'
+            for name in "jk"
+        )
+        + "</transmission>"
+    ),
+)
 def _roles(subject: Subject) -> Iterator[Finding]:
-    """ros2_control wants a role everywhere; ROS 1 only where there are two."""
+    """A transmission does not say by roles which joint and actuator is which.
+
+    A differential or a four-bar linkage maps its two joints in different ways; ros2_control sorts them by name and
+    swaps them without a word.
+    """
+    # ros2_control wants a role everywhere; ROS 1 only where there are two.
     for found in transmissions(subject):
         pairs = SIZES.get(found.type) == 2
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
@@ -93,14 +128,24 @@ def _roles(subject: Subject) -> Iterator[Finding]:
             elif not pairs and not found.ros1 and "" in roles:
                 message = f"transmission '{found.name}': {'an' if tag == 'actuator' else 'a'} {tag} has no role"
                 yield Finding("URDF312", message, elements[roles.index("")].place, how.format(tag))
-            names = [element.attributes.get("name", "").strip() for element in elements]
+            names = [element.name for element in elements]
             if pairs and len(names) == 2 and names[0] and names[0] == names[1]:
                 message = f"transmission '{found.name}': {tag} '{names[0]}' has both roles; expected two {tag}s"
                 yield Finding("URDF312", message, elements[1].place, None)
 
 
+@check(
+    "URDF313",
+    "transmission-count",
+    "readiness",
+    bad=one_joint(more=transmission(GEARED + MOTOR + MOTOR.replace('"m"', '"n"'))),
+)
 def _count(subject: Subject) -> Iterator[Finding]:
-    """In ros2_control the actuator may be left out of a simple one."""
+    """A transmission does not have as many joints and actuators as its type takes.
+
+    A simple one has one of each, a differential and a four-bar linkage two; ros_control does not load another.
+    """
+    # In ros2_control the actuator may be left out of a simple one.
     for found in transmissions(subject):
         count = SIZES.get(found.type)
         joints, actuators = len(found.joints), len(found.actuators)
@@ -112,8 +157,19 @@ def _count(subject: Subject) -> Iterator[Finding]:
         yield Finding("URDF313", message, found.element.place, None)
 
 
+@check(
+    "URDF314",
+    "hardware-interface",
+    "readiness",
+    "warning",
+    bad=one_joint(more=transmission('<joint name="j"/>' + MOTOR)),
+)
 def _hardware_interface(subject: Subject) -> Iterator[Finding]:
-    """The name may carry the prefix `hardware_interface/`; without it, it is old but read."""
+    """A joint of a ROS 1 transmission has no hardware interface, or an unknown one.
+
+    ros_control then leaves the joint out without an error; no controller finds it.
+    """
+    # The name may carry the prefix `hardware_interface/`; without it, it is old but read.
     for found in transmissions(subject):
         for joint in found.joints if found.ros1 else ():
             name = joint.attributes.get("name", "")
@@ -136,12 +192,17 @@ def _meant(found: WrittenTransmission) -> str:
     return next((word for word in said if word in INTERFACES), "PositionJointInterface")
 
 
+@check("URDF315", "transmission-joint", "readiness", bad=one_joint(kind="fixed", inside="", more=transmission()))
 def _joint(subject: Subject) -> Iterator[Finding]:
-    """Transmissions of joints that nobody commands."""
+    """A transmission drives a fixed joint or one that follows another.
+
+    A fixed joint does not move, and a mimic joint has no actuator of its own: its position is that of the joint it
+    follows.
+    """
     joints = {joint.name: joint for joint in subject.parts.joints}
     for found in transmissions(subject):
         for element in found.joints:
-            joint = joints.get(element.attributes.get("name", "").strip())
+            joint = joints.get(element.name)
             if joint is None or joint.independent:
                 continue
             severity: Severity = "warning" if joint.moves else "error"
@@ -150,8 +211,19 @@ def _joint(subject: Subject) -> Iterator[Finding]:
             yield Finding("URDF315", message, element.place, "take the transmission out", severity)
 
 
+@check(
+    "URDF316",
+    "transmission-reduction",
+    "readiness",
+    "warning",
+    bad=one_joint(more=transmission(GEARED + '<actuator name="m"/>')),
+)
 def _reduction(subject: Subject) -> Iterator[Finding]:
-    """ROS 1 transmissions without a reduction."""
+    """A ROS 1 transmission states no reduction at its actuator.
+
+    ros_control wants <mechanicalReduction> there and does not load the transmission without it; here it counts as
+    1.
+    """
     for found in transmissions(subject):
         for actuator in found.actuators if found.ros1 else ():
             if actuator.first("mechanicalReduction") is None:
@@ -162,11 +234,15 @@ def _reduction(subject: Subject) -> Iterator[Finding]:
                 )
 
 
+@check("URDF317", "transmission-name", "readiness", bad=one_joint(more=transmission().replace(' name="t"', "")))
 def _name(subject: Subject) -> Iterator[Finding]:
-    """Transmissions without a name."""
+    """A transmission has no name, or one that another has.
+
+    ros_control and ros2_control find transmissions by name, and load no other.
+    """
     seen: set[tuple[bool, str]] = set()
     for found in transmissions(subject):
-        name = found.element.attributes.get("name", "").strip()
+        name = found.element.name
         if not name:
             yield Finding("URDF317", f"a {found.type} has no name", found.element.place, 'name="..."')
         elif (found.ros1, name) in seen:
@@ -174,8 +250,13 @@ def _name(subject: Subject) -> Iterator[Finding]:
         seen.add((found.ros1, name))
 
 
+@check("URDF318", "transmission-unread", "readiness", "warning", bad=one_joint(more=transmission(_UNREAD + MOTOR)))
 def _unread(subject: Subject) -> Iterator[Finding]:
-    """Reductions of simple transmissions at the end that is not read."""
+    """A simple transmission states a reduction where nobody reads it.
+
+    ros_control reads the reduction of the actuator, ros2_control that of the joint; each leaves the other out
+    without a word, and so is done here.
+    """
     for found in transmissions(subject):
         if found.type != "SimpleTransmission":
             continue
@@ -186,124 +267,3 @@ def _unread(subject: Subject) -> Iterator[Finding]:
                 continue
             message = f"transmission '{found.name}': the reduction {child.text} of its {element.tag} is not read"
             yield Finding("URDF318", message, child.place, f"write it at the {read}", "warning")
-
-
-TRANSMISSION_CHECKS: tuple[Check, ...] = (
-    Check(
-        code="URDF310",
-        name="transmission-type",
-        tier="readiness",
-        severity="warning",
-        summary="A transmission is of a type that is not known",
-        reason="It is left out: commands go to the joint as if there were no gear.",
-        bad=one_joint(more=transmission(kind="Simpletransmission")),
-        find=_type,
-    ),
-    Check(
-        code="URDF311",
-        name="transmission-shared",
-        tier="readiness",
-        severity="error",
-        summary="A joint or actuator belongs to two transmissions, or to two unlike ones of ROS 1 and ros2_control",
-        reason="Each of them would set its position; which one wins depends on the order of loading.",
-        bad=one_joint(more=transmission() + transmission().replace('"t"', '"u"')),
-        find=_shared,
-    ),
-    Check(
-        code="URDF312",
-        name="transmission-roles",
-        tier="readiness",
-        severity="error",
-        summary="A transmission does not say by roles which joint and actuator is which",
-        reason=(
-            "A differential or a four-bar linkage maps its two joints in different ways; ros2_control sorts them by "
-            "name and swaps them without a word."
-        ),
-        bad=one_joint(
-            more='<link name="other">'
-            + INERTIAL
-            + '</link><joint name="k" type="revolute"><parent link="tip"/><child link="other"/>'
-            + LIMIT
-            + '</joint><transmission name="t"><type>transmission_interface/DifferentialTransmission</type>'
-            + "".join(
-                f'<joint name="{name}"><hardwareInterface>EffortJointInterface</hardwareInterface></joint>'
-                f'<actuator name="m{name}"><mechanicalReduction>1</mechanicalReduction></actuator>'
-                for name in "jk"
-            )
-            + "</transmission>"
-        ),
-        find=_roles,
-    ),
-    Check(
-        code="URDF313",
-        name="transmission-count",
-        tier="readiness",
-        severity="error",
-        summary="A transmission does not have as many joints and actuators as its type takes",
-        reason=(
-            "A simple one has one of each, a differential and a four-bar linkage two; ros_control does not load "
-            "another."
-        ),
-        bad=one_joint(more=transmission(GEARED + MOTOR + MOTOR.replace('"m"', '"n"'))),
-        find=_count,
-    ),
-    Check(
-        code="URDF314",
-        name="hardware-interface",
-        tier="readiness",
-        severity="warning",
-        summary="A joint of a ROS 1 transmission has no hardware interface, or an unknown one",
-        reason="ros_control then leaves the joint out without an error; no controller finds it.",
-        bad=one_joint(more=transmission('<joint name="j"/>' + MOTOR)),
-        find=_hardware_interface,
-    ),
-    Check(
-        code="URDF315",
-        name="transmission-joint",
-        tier="readiness",
-        severity="error",
-        summary="A transmission drives a fixed joint or one that follows another",
-        reason=(
-            "A fixed joint does not move, and a mimic joint has no actuator of its own: its position is that of the "
-            "joint it follows."
-        ),
-        bad=one_joint(kind="fixed", inside="", more=transmission()),
-        find=_joint,
-    ),
-    Check(
-        code="URDF316",
-        name="transmission-reduction",
-        tier="readiness",
-        severity="warning",
-        summary="A ROS 1 transmission states no reduction at its actuator",
-        reason=(
-            "ros_control wants <mechanicalReduction> there and does not load the transmission without it; here it "
-            "counts as 1."
-        ),
-        bad=one_joint(more=transmission(GEARED + '<actuator name="m"/>')),
-        find=_reduction,
-    ),
-    Check(
-        code="URDF317",
-        name="transmission-name",
-        tier="readiness",
-        severity="error",
-        summary="A transmission has no name, or one that another has",
-        reason="ros_control and ros2_control find transmissions by name, and load no other.",
-        bad=one_joint(more=transmission().replace(' name="t"', "")),
-        find=_name,
-    ),
-    Check(
-        code="URDF318",
-        name="transmission-unread",
-        tier="readiness",
-        severity="warning",
-        summary="A simple transmission states a reduction where nobody reads it",
-        reason=(
-            "ros_control reads the reduction of the actuator, ros2_control that of the joint; each leaves the other "
-            "out without a word, and so is done here."
-        ),
-        bad=one_joint(more=transmission(_UNREAD + MOTOR)),
-        find=_unread,
-    ),
-)
