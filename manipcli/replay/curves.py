@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,25 +120,3 @@ def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array
         kept.update((first, first + lowest, first + highest, stop - 1))
     order = np.array(sorted(kept))
     return times[order], values[order]
-
-
-def span_of(curves: Iterable[Curve]) -> tuple[float, float]:
-    """Lowest and highest value; 0 and 1 where there is none."""
-    finite = [values for curve in curves if len(values := curve.values[np.isfinite(curve.values)])]
-    if not finite:
-        return 0.0, 1.0
-    return min(float(v.min()) for v in finite), max(float(v.max()) for v in finite)
-
-
-def ticks(low: float, high: float, most: int) -> Sequence[float]:
-    """At most `most` round numbers (1, 2 or 5 times a power of ten apart) from low to high."""
-    if not high > low:
-        return [low]
-    raw = (high - low) / max(most, 1)
-    power = 10.0 ** np.floor(np.log10(raw))
-    for factor in (1.0, 2.0, 5.0, 10.0, 20.0):
-        step = factor * power
-        first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-        if last - first + 1 <= most:
-            return [float(step * k) for k in np.arange(first, last + 1)]
-    return [low]
