@@ -140,21 +140,24 @@ def _check_options(
 
 
 def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:
-    """Tells what is missing, writes the files asked for; where none is, serves the page until Ctrl-C."""
+    """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
         console.talk(f"the log is not closed: {playback.lost}")
     for note in playback.notes:
         console.talk(f"note: {note}")
-    if html is not None:
-        from manipcli.core.whole_file import write_whole
+    pages = html is not None or not pictures.wanted
+    if pages:
         from manipcli.replay.player import player_page
 
-        write_whole(html, player_page(playback).encode())
+        page = player_page(playback)
+    if html is not None:
+        from manipcli.core.whole_file import write_whole
+
+        write_whole(html, page.encode())
         console.result(str(html))
     pictures.make(playback)
-    if html is not None or pictures.wanted:
-        return
-    from manipcli.replay.replay import Replay
+    if html is None and pages:
+        from manipcli.replay.page_server import PageServer
 
-    with Replay(playback, port=port) as page:
-        stay(page, open_=open_)
+        with PageServer(page, port=port) as server:
+            stay(server.url, open_=open_)
