@@ -96,7 +96,7 @@ def _write_table(chart: Chart, csv: str) -> None:
     from io import StringIO
 
     from manipcli.core.whole_file import write_whole
-    from manipcli.replay.curve_table import write_table
+    from manipcli.replay.curves import write_table
 
     stream = StringIO()
     write_table(chart, stream)

@@ -1,4 +1,4 @@
-"""`manipcli replay LOG`: a run in the browser, or as a page that plays by itself."""
+"""`manipcli replay LOG`: a run in the browser, as a page, as pictures or as a video."""
 
 from __future__ import annotations
 
@@ -27,49 +27,51 @@ def replay(
     *,
     html: Annotated[
         Path | None,
-        typer.Option("--html", metavar="FILE", help="Write one page that plays offline, instead of serving one."),
+        typer.Option("--html", metavar="FILE", help="Write the page to FILE instead of serving it; it plays offline."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw one moment of the run.")
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the run at one time.")
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step; the end of the run when absent."),
+        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step; the end of the run by default."),
     ] = None,
     sheet: Annotated[
         Path | None,
-        typer.Option("--sheet", metavar="FILE.png", help="Draw all steps, each at its most telling moment."),
+        typer.Option("--sheet", metavar="FILE.png", help="Draw all steps on one contact sheet."),
     ] = None,
     video: Annotated[
         Path | None,
-        typer.Option("--video", metavar="FILE", help="Make a film: .webp, .gif, or .mp4 with the extra 'video'."),
+        typer.Option("--video", metavar="FILE", help="Write a video: .webp, .gif, or .mp4 with the extra 'video'."),
     ] = None,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="Of a picture, 960x720 when absent; of a film, 640x360.")
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Size of pictures; 960x720, of a video 640x360, by default."),
     ] = None,
     view: Annotated[
         str | None,
         typer.Option(
             "--view",
             metavar="VIEW",
-            help="Of pictures and films: iso, front, back, left, right, top, or AZIMUTH,ELEVATION; iso when absent.",
+            help="View of pictures: iso, front, back, left, right, top, or AZIMUTH,ELEVATION; iso by default.",
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="Frames of a film in one second; 25 when absent.")
+        float | None, typer.Option("--fps", metavar="N", help="Frames of a video per second; 25 by default.")
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film; 1 when absent."),
+        typer.Option("--speed", metavar="X", help="Seconds of the run per second of a video; 1 by default."),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option("--robot", metavar="NAMESPACE", help="Of several robots in a ROS 2 log, as /left.")
+        str | None,
+        typer.Option("--robot", metavar="NAMESPACE", help="Robot to show, where a log has several."),
     ] = None,
     port: PagePort = None,
     open_: OpenPage = False,
     verify: Annotated[
         bool,
-        typer.Option("--verify", help="Show nothing: simulate the run again from the log, and compare every message."),
+        typer.Option("--verify", help="Simulate the run again from the log and compare every message."),
     ] = False,
     allow_different: Annotated[
         bool, typer.Option("--allow-different", help="With --verify: also with other versions or meshes.")
@@ -104,7 +106,9 @@ def replay(
         from manipcli.flow.replay import open_playback
 
         check_outputs(*files, reads=(log,))
-        pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
+        pictures = Pictures(
+            picture=picture, at=at, sheet=sheet, video=video, size=size, view=view, fps=fps, speed=speed
+        )
         playback = open_playback(
             log,
             rate=pictures.rate,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
@@ -60,20 +60,25 @@ def open_chart(
         found = [topic.name for one in opened for topic in one.topics.all.values() if topic.definition]
         hint = f"say TOPIC.FIELD; topics: {listed(found)}" if found else "it has no topic of ROS 2 messages"
         raise InvalidInput([Finding("PLOT001", "these logs have nothing that is shown by itself", hint=hint)])
-    panels = _Panels()
+    panels: _Panels = {}
     for one in opened:
         for number, group in enumerate(asked):
             one.read(group, number, panels, first, last)
-    shown = panels.all()
-    if not shown:
+            if sum(map(len, panels.values())) > MAX_CURVES:
+                hint = "pick elements in brackets: [joint_1]"
+                raise InvalidInput([Finding("PLOT005", f"more than {MAX_CURVES} curves are asked for", hint=hint)])
+    if not panels:
         what = f" of {listed(words)}" if words else ""
         raise InvalidInput([Finding("PLOT004", f"there is no value{what} in that time")])
-    missing = [word for number, word in enumerate(words) if number not in panels.numbers]
+    missing = [word for number, word in enumerate(words) if number not in {head.word for head in panels}]
     steps = next((one.steps for one in opened if one.steps), ())
     ends = [one.duration for one in opened]
     return Chart(
         title=", ".join(one.name for one in opened),
-        panels=shown,
+        panels=tuple(
+            Panel(head.title, head.quantity, head.unit, tuple(panels[head]))
+            for head in sorted(panels, key=lambda head: head.word)
+        ),
         steps=steps,
         start=max(first, 0.0),
         end=min(last, max(ends)) if max(ends) > max(first, 0.0) else max(first, 0.0) + 1.0,
@@ -102,36 +107,17 @@ def field_lines(path: Path) -> tuple[FieldLine, ...]:
     return tuple(lines)
 
 
-class _Panels:
-    """Panels on their way, by the word that asks for them, what they are of, and the unit."""
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What a panel is of: the number of the word that asks for it, its title, unit and quantity."""
 
-    def __init__(self) -> None:
-        self._found: dict[tuple[int, str, str], list[Curve]] = {}
-        self._heads: dict[tuple[int, str, str], tuple[str, str]] = {}
-        self._count = 0
+    word: int
+    title: str
+    unit: str
+    quantity: str = field(compare=False)
 
-    def add(self, number: int, quantity: str, title: str, unit: str, curve: Curve) -> None:
-        self._count += 1
-        if self._count > MAX_CURVES:
-            raise InvalidInput(
-                [
-                    Finding(
-                        "PLOT005", f"these are more than {MAX_CURVES} curves", hint="say which in brackets: [joint_1]"
-                    )
-                ]
-            )
-        key = (number, title, unit)
-        self._heads.setdefault(key, (title, quantity))
-        self._found.setdefault(key, []).append(curve)
 
-    @property
-    def numbers(self) -> set[int]:
-        """Which words have a curve."""
-        return {number for number, _, _ in self._found}
-
-    def all(self) -> tuple[Panel, ...]:
-        order = sorted(self._found, key=lambda key: key[0])
-        return tuple(Panel(*self._heads[key], key[2], tuple(self._found[key])) for key in order)
+_Panels = dict[_Head, list[Curve]]
 
 
 class _Log:
@@ -212,7 +198,7 @@ class _Log:
         elif len(quantity) == 1 and len(parts) > 1:
             quantity = f"{parts[-2]} {quantity}"
         curve = Curve(name, label, self.name, each.times, each.values, each.held, self.duration)
-        panels.add(number, quantity, title, unit, curve)
+        panels.setdefault(_Head(number, title, unit, quantity), []).append(curve)
 
     def _topic(self, name: FieldName) -> Topic:
         topic = self.topics.all.get(name.topic)

@@ -168,7 +168,7 @@ def draw(inspection: Inspection, path: Path) -> tuple[str, ...]:
     Raises:
         InvalidInput: it has errors.
     """
-    from manipcli.replay.picture import draw_robot
+    from manipcli.replay.renderer import draw_robot
 
     parts = inspection.examination.parts
     if parts is None or inspection.examination.errors:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.text import escape
-from manipcli.replay.image import Image
 from manipcli.replay.playback import Playback
+from manipcli.replay.renderer import Image
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -20,9 +20,8 @@ from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.replay.camera import framing
-from manipcli.replay.drawing import WORLD, Drawing, draw, link_frame
+from manipcli.replay.drawing import WORLD, Drawing, draw, floors_of, ground_height, link_frame
 from manipcli.replay.forces import LONGEST, Forces
-from manipcli.replay.ground import floors_of, ground_height
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
 from manipcli.replay.surface import Surface

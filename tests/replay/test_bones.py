@@ -9,8 +9,7 @@ import numpy as np
 
 from manipcli.flow.look import load_sight
 from manipcli.model.robot import Geometry, Link, Mesh, RobotModel
-from manipcli.replay.bones import bones
-from manipcli.replay.drawing import draw
+from manipcli.replay.drawing import bones, draw
 
 ROOT = Path(__file__).parents[2]
 GONE = Mesh("package://gone/link.stl", Path("/nowhere/link.stl"))

@@ -13,8 +13,7 @@ import pytest
 from PIL import Image
 
 from manipcli.replay import figure
-from manipcli.replay.curve_table import write_table
-from manipcli.replay.curves import Chart, Curve, Interval, Panel, thinned
+from manipcli.replay.curves import Chart, Curve, Interval, Panel, thinned, write_table
 
 TIMES = np.arange(10_001) / 1000.0
 SINE = Curve("a.b[one]", "one", "", TIMES, np.sin(TIMES))

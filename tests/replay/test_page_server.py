@@ -94,9 +94,7 @@ def test_the_command_serves_the_page_that_it_writes_until_it_is_interrupted(tmp_
     assert main(["run", task, "--log", str(log), "--set", "simulation.engine=kinematic", "-q"]) in (0, 1)
     assert main(["replay", str(log), "--html", str(page)]) == 0
     command = [sys.executable, "-m", "manipcli", "replay", str(log), "--port", "0"]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
-    ) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)\n", process.stdout.readline())
         assert found

@@ -19,8 +19,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.flow.look import load_sight
 from manipcli.model.robot import Joint, JointLimits
-from manipcli.replay.panel import pose_text, slider_range
-from manipcli.replay.view import View
+from manipcli.replay.view import View, pose_text, slider_range
 
 ROOT = Path(__file__).parents[2]
 ROBOT = """<robot name="two">

@@ -10,9 +10,9 @@ import numpy as np
 
 from manipcli.replay.camera import FROM, Vector
 from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, cut, font, text_size
-from manipcli.replay.image import Image
+from manipcli.replay.frames import Frames, telling
 from manipcli.replay.playback import Playback
-from manipcli.replay.shots import Shots, telling
+from manipcli.replay.renderer import Image
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -51,7 +51,7 @@ def columns_of(count: int) -> int:
     return min(count, 3 if count <= 9 and count != 4 else 4)
 
 
-def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
+def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
     """The sheet.
 
     Args:
@@ -72,7 +72,7 @@ def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector =
     whole = PillowImage.new("RGB", (columns * (size[0] + GAP) + GAP, head + rows * (high + GAP)), PAPER)
     pen = Drawing.Draw(whole)
     _heading(pen, playback, whole.width, head, letter)
-    with Shots(playback, size=size, towards=towards, captions=False) as shots:
+    with Frames(playback, size=size, towards=towards, captions=False) as frames:
         for k, tile in enumerate(shown):
             row, column = divmod(k, columns)
             left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)
@@ -81,7 +81,7 @@ def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector =
                 middle = (left + size[0] / 2, top + size[1] / 2)
                 pen.text(middle, "not begun", fill=QUIET, font=font(letter), anchor="mm")
             else:
-                whole.paste(PillowImage.fromarray(shots.at(tile.time)), (left, top))
+                whole.paste(PillowImage.fromarray(frames.at(tile.time)), (left, top))
             _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
     return np.asarray(whole)
 
