@@ -88,7 +88,7 @@ def replay(
     drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
     shows = (*files, *drawn, ("--robot", robot), ("--port", port), ("--open", open_ or None))
     verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
-    _check_options(verify=verify, shows=shows, verifies=verifies)
+    _refuse(shows if verify else verifies, verify=verify)
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.verify import verify as verified
@@ -120,27 +120,16 @@ def replay(
     return ExitCode.PASSED
 
 
-def _check_options(
-    *, verify: bool, shows: Sequence[tuple[str, object]], verifies: Sequence[tuple[str, object]]
-) -> None:
-    """Refuses options of the other use; those that are None were not given.
-
-    Args:
-        verify: whether the run is verified.
-        shows: options (name, value) of what shows a run.
-        verifies: options of what verifies one.
+def _refuse(options: Sequence[tuple[str, object]], *, verify: bool) -> None:
+    """Refuses the options of the other use; those that are None were not given.
 
     Raises:
-        InvalidInput: of the two uses both are meant.
+        InvalidInput: an option has no effect.
     """
-    asked = [option for option, value in (shows if verify else verifies) if value is not None]
-    if not asked:
-        return
-    if verify:
-        message = f"--verify shows nothing: leave out {listed(asked)}"
-    else:
-        message = f"{listed(asked)} {'is' if len(asked) == 1 else 'are'} for --verify alone"
-    raise InvalidInput([Finding("USE080", message)])
+    given = [option for option, value in options if value is not None]
+    if given:
+        reason = "with" if verify else "without"
+        raise InvalidInput([Finding("USE080", f"{listed(given)}: no effect {reason} --verify")])
 
 
 def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:

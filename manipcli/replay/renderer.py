@@ -94,7 +94,7 @@ class Renderer:
             return image.copy()
         front = self._moving.render(poses, camera, whole, window)
         rows, columns = window.slices
-        nearer = front.seen & (front.depth <= behind.depth[rows, columns])
+        nearer = front.depth <= behind.depth[rows, columns]
         rgb = np.where(nearer[..., None], front.rgb, behind.rgb[rows, columns])
         image = image.copy()
         rows, columns = window.divided(FINER).slices
@@ -104,7 +104,7 @@ class Renderer:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of a picture, from `left` and `top` up to `right` and `bottom` [pixel]."""
+    """Part of a picture [pixel]; `right` and `bottom` are the first column and row beyond it."""
 
     left: int
     top: int
@@ -123,11 +123,10 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class _Raster:
-    """Colours (h, w, 3), depth (h, w) as the graphics library counts it, and where anything is (h, w)."""
+    """Colours (h, w, 3), and depth (h, w) as the graphics library counts it, infinite where nothing is."""
 
     rgb: Image
     depth: npt.NDArray[np.float32]
-    seen: npt.NDArray[np.bool_]
 
 
 class _Client:
@@ -216,7 +215,6 @@ class _Client:
         return _Raster(
             np.where(there[..., None], rgb, behind),
             np.where(there, np.asarray(depth, dtype=np.float32).reshape(height, width), np.inf),
-            there,
         )
 
 
