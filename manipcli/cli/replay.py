@@ -34,7 +34,7 @@ def replay(
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step; the end of the run by default."),
+        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step [default: end of the run]."),
     ] = None,
     sheet: Annotated[
         Path | None,
@@ -46,22 +46,22 @@ def replay(
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option("--size", metavar="WxH", help="Size of pictures; 960x720, of a video 640x360, by default."),
+        typer.Option("--size", metavar="WxH", help="Size of pictures [default: 960x720, videos: 640x360]."),
     ] = None,
     view: Annotated[
         str | None,
         typer.Option(
             "--view",
             metavar="VIEW",
-            help="View of pictures: iso, front, back, left, right, top, or AZIMUTH,ELEVATION; iso by default.",
+            help="View of pictures: iso, front, back, left, right, top, or AZIMUTH,ELEVATION [default: iso].",
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="Frames of a video per second; 25 by default.")
+        float | None, typer.Option("--fps", metavar="N", help="Frames of a video per second [default: 25].")
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", metavar="X", help="Seconds of the run per second of a video; 1 by default."),
+        typer.Option("--speed", metavar="X", help="Seconds of the run per second of a video [default: 1]."),
     ] = None,
     robot: Annotated[
         str | None,

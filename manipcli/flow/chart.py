@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
@@ -128,13 +131,8 @@ class _Log:
         self.name = name
         self.topics: Topics = open_topics(path)
         self._messages: dict[str, Message] = {}
-        self._joints: JointUnits | None = None
         self.steps = _steps(path)
-
-    @property
-    def duration(self) -> float:
-        """[s]"""
-        return (self.topics.end - self.topics.start) / 1e9
+        self.duration = (self.topics.end - self.topics.start) / 1e9
 
     def message(self, topic: Topic) -> Message:
         """The type of a topic.
@@ -144,10 +142,8 @@ class _Log:
         """
         if topic.name not in self._messages:
             if not topic.definition:
-                message = (
-                    f"{topic.name} is written as {topic.encoding or 'nothing known'}, not as ROS 2 CDR with ros2msg"
-                )
-                raise self._refused("PLOT006", message)
+                encoding = topic.encoding or "unknown"
+                raise self._refused("PLOT006", f"{topic.name} has encoding {encoding}, expected ROS 2 CDR with ros2msg")
             try:
                 self._messages[topic.name] = read_definition(topic.type, topic.definition)
             except UnknownDefinition as error:
@@ -187,7 +183,7 @@ class _Log:
         parts = [part.name for part in one.way.parts]
         field = f"{one.topic.strip('/')}.{short(one.message, one.way.name)}"
         name = f"{field}[{each.label}]" if each.label else field
-        unit = unit_of(one.way, each.label, self._known_joints())
+        unit = unit_of(one.way, each.label, self._joints)
         label = each.label.replace("+", " – ").replace("robot/", "")
         title, quantity = field, parts[-1]
         if several:
@@ -221,21 +217,17 @@ class _Log:
             hint = did_you_mean(words[0], labels, kind="there are")
             raise self._refused("PLOT002", f"{name.text}: there is no '{shorten(', '.join(words))}' in it", hint)
 
-    def _known_joints(self) -> JointUnits:
-        if self._joints is None:
-            self._joints = joint_units(self._description())
-        return self._joints
-
-    def _description(self) -> bytes:
+    @cached_property
+    def _joints(self) -> JointUnits:
+        """The units of the joints of the described robot; none where the description cannot be read."""
         topic = self.topics.all.get(ROBOT_DESCRIPTION)
+        urdf = ""
         if topic is not None and topic.definition:
-            for _, data, places in self.topics.messages({ROBOT_DESCRIPTION}):
+            for _, data, places in islice(self.topics.messages({ROBOT_DESCRIPTION}), 1):
                 start, length = int(places.starts[0]), int(places.lengths[0])
-                try:
-                    return CdrReader(memoryview(data)[start : start + length]).text().encode()
-                except CdrError:
-                    return b""
-        return b""
+                with suppress(CdrError):
+                    urdf = CdrReader(memoryview(data)[start : start + length]).text()
+        return joint_units(urdf.encode())
 
     def _refused(self, code: str, message: str, hint: str | None = None) -> InvalidInput:
         return InvalidInput([Finding(code, message, Place(str(self.path), 0, 0), hint)])

@@ -15,6 +15,7 @@ from manipcli.control.controller import Controller
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
+from manipcli.core.text import number_of
 from manipcli.flow.load import load_task
 from manipcli.flow.log import (
     action_of,
@@ -127,7 +128,7 @@ class _Builder:
             f"{step.id}: {step.verb}{f', until {step.until.name}' if step.until is not None else ''}"
             for step in spec.steps
         )
-        self._add(Node("task", "task", spec.task, details=(_count(len(steps), "step"),), items=steps))
+        self._add(Node("task", "task", spec.task, details=(number_of(len(steps), "step"),), items=steps))
         self._add(Node("planner", "planner", "planner", details=(f"seed {spec.simulation.seed}",)))
         self._join("task", "planner", "steps")
 
@@ -157,7 +158,7 @@ class _Builder:
             "soft": any(one.soft is not None for one in limits),
         }
         held = [kind for kind, has in there.items() if has]
-        self._add(Node("limits", "limits", "joint limits", details=(_count(len(limits), "joint"), *held)))
+        self._add(Node("limits", "limits", "joint limits", details=(number_of(len(limits), "joint"), *held)))
         actuation = Actuation(robot, self._period)
         acts = bool(actuation.names) and not actuation.ideal and self._member.physics == "full"
         by_effort = any("effort" in controller.interfaces for controller in self._controllers)
@@ -181,7 +182,7 @@ class _Builder:
         counts = [f"{sum(tag.type == kind for tag in tags)} {kind}" for kind in kinds]
         details = (
             f"transmissions: {', '.join(counts)}",
-            _count(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
+            number_of(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
             "their limits, friction and latency act" if acts else "ideal: they change nothing",
         )
         return Node("drives", "drive", "transmissions and actuators", details=details)
@@ -189,14 +190,15 @@ class _Builder:
     def _engine(self) -> None:
         simulation = self._spec.simulation
         steps = round(simulation.control_period / simulation.step)
-        physics = f"{_count(steps, 'physics step')} of {1e3 * simulation.step:g} ms a tick"
+        physics = f"{number_of(steps, 'physics step')} of {1e3 * simulation.step:g} ms per tick"
         if self._member.physics != "full":
-            physics = "no physics: references come true"
+            physics = "ideal tracking, no physics"
         self._add(Node("engine", "engine", f"{self._member.name} {self._version}".strip(), details=(physics,)))
         bodies = self._scene.bodies
+        count = "1 body" if len(bodies) == 1 else f"{len(bodies)} bodies"
         free = sum(not body.fixed for body in bodies)
-        self._add(Node("robot", "robot", self._robot.name, details=(_count(len(self._robot.links), "link"),)))
-        self._add(Node("scene", "scene", _count(len(bodies), "body", "bodies"), details=(f"{free} free to move",)))
+        self._add(Node("robot", "robot", self._robot.name, details=(number_of(len(self._robot.links), "link"),)))
+        self._add(Node("scene", "scene", count, details=(f"{free} free to move",)))
         self._join("robot", "engine", "description")
         self._join("scene", "engine", "bodies")
 
@@ -254,7 +256,7 @@ def _topic_node(name: str, kind: str, about: str) -> Node:
 
 def _held(topic: Topic) -> str:
     """`14550 messages, 1000 Hz`."""
-    text = _count(topic.count, "message")
+    text = number_of(topic.count, "message")
     if topic.count > 2 and topic.last > topic.first:
         text += f", {(topic.count - 1) / ((topic.last - topic.first) / 1e9):.4g} Hz"
     return text
@@ -263,7 +265,3 @@ def _held(topic: Topic) -> str:
 def _named(names: Sequence[str]) -> str:
     """The first few, and the last."""
     return ", ".join(names) if len(names) <= MOST_NAMES else f"{names[0]}, {names[1]} … {names[-1]}"
-
-
-def _count(number: int, noun: str, nouns: str | None = None) -> str:
-    return f"{number} {noun if number == 1 else nouns or f'{noun}s'}"

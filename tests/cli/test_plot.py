@@ -135,6 +135,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
         (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
         (["gone.mcap"], "LOG300", "No such file"),
+        (["joint_states.position"] * 31, "PLOT005", "more than 400 curves"),
     ],
 )
 def test_what_cannot_be_plotted_is_refused(
