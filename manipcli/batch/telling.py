@@ -15,8 +15,8 @@ from manipcli.logs.invalid import invalid_page, invalid_verdict
 from manipcli.logs.replay import open_playback
 from manipcli.logs.report import file_places, log_page, refused_page
 from manipcli.pipeline import load_task
-from manipcli.replay.image import png_bytes
-from manipcli.replay.shots import Shots
+from manipcli.replay.frames import Frames
+from manipcli.replay.renderer import png_bytes
 from manipcli.report.html import render_page
 from manipcli.report.junit import render_junit
 from manipcli.report.run_page import Cause, RunPage, Written
@@ -97,8 +97,8 @@ def draw(
         ManipcliError: the log shows nothing, or a mesh is not there.
     """
     playback = open_playback(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
-    with Shots(playback, size=SIZE) as shots:
-        image = shots.at(playback.end if at is None else min(max(at, playback.start), playback.end))
+    with Frames(playback, size=SIZE) as frames:
+        image = frames.at(playback.end if at is None else min(max(at, playback.start), playback.end))
     write_whole(picture, png_bytes(image))
 
 

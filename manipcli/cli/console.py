@@ -48,18 +48,6 @@ def result(text: str) -> None:
     _write(sys.stdout, f"{_dressed(text, sys.stdout)}\n")
 
 
-def painted(lines: Sequence[Sequence[tuple[str, str]]]) -> None:
-    """A result in colours: of each line its pieces, each a text and a colour by its number, "" for none."""
-    coloured = is_coloured()
-    text = "\n".join(
-        "".join(
-            f"\x1b[{colour}m{escape(text)}\x1b[0m" if colour and coloured else escape(text) for text, colour in line
-        )
-        for line in lines
-    )
-    _write(sys.stdout, f"{text}\n")
-
-
 def result_is_terminal() -> bool:
     """Whether somebody looks at what the command was asked for, and no file or program takes it."""
     return _is_terminal(sys.stdout)
@@ -102,21 +90,11 @@ def redraw(text: str) -> None:
     _write(sys.stderr, f"\r\x1b[K{escape(text)[: _columns(sys.stderr) - 1]}")
 
 
-def columns() -> int:
-    """Of the terminal that results go to; 100 where they go to a file."""
-    return _columns(sys.stdout, otherwise=100)
-
-
-def is_coloured() -> bool:
-    """Whether results go to a terminal that wants colours."""
-    return _is_coloured(sys.stdout)
-
-
-def _columns(stream: TextIO, otherwise: int = 80) -> int:
+def _columns(stream: TextIO) -> int:
     try:
-        return os.get_terminal_size(stream.fileno()).columns or otherwise
+        return os.get_terminal_size(stream.fileno()).columns or 80
     except (OSError, ValueError):
-        return otherwise
+        return 80
 
 
 def _is_terminal(stream: TextIO | None) -> bool:

@@ -46,7 +46,8 @@ AllowOutside = Annotated[
 ]
 
 PagePort = Annotated[
-    int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="8080 or the next free one when absent.")
+    int | None,
+    typer.Option("--port", metavar="N", min=0, max=65535, help="Port [default: the first free one from 8080]."),
 ]
 OpenPage = Annotated[bool, typer.Option("--open", help="Open the page in a browser.")]
 

@@ -1,24 +1,21 @@
-"""A page that stays until Ctrl-C: what `view` and `replay` do once it is up."""
+"""Waiting for Ctrl-C while a page is served: `view` and `replay`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import threading
 
 from manipcli.cli import console
 
-if TYPE_CHECKING:
-    from manipcli.replay.server import LocalServer
 
-
-def stay(page: LocalServer, *, open_: bool) -> None:
-    """Tells the address, with `open_` shows it in a browser, and returns when the user ends it."""
-    try:  # from the moment at which the address is told
-        console.result(page.url)
+def stay(url: str, *, open_: bool) -> None:
+    """Prints the address, with `open_` opens it in a browser, and returns on Ctrl-C."""
+    try:  # Ctrl-C may come as soon as the address is printed
+        console.result(url)
         console.talk("Ctrl-C ends it")
         if open_:
             import webbrowser
 
-            webbrowser.open(page.url)
-        page.wait()
+            webbrowser.open(url)
+        threading.Event().wait()
     except KeyboardInterrupt:
         console.talk("")

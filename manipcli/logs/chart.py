@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import islice
 from pathlib import Path
 
 from manipcli.core.errors import Finding, InvalidInput, Place
@@ -60,20 +63,25 @@ def open_chart(
         found = [topic.name for one in opened for topic in one.topics.all.values() if topic.definition]
         hint = f"say TOPIC.FIELD; topics: {listed(found)}" if found else "it has no topic of ROS 2 messages"
         raise InvalidInput([Finding("PLOT001", "these logs have nothing that is shown by itself", hint=hint)])
-    panels = _Panels()
+    panels: _Panels = {}
     for one in opened:
         for number, group in enumerate(asked):
             one.read(group, number, panels, first, last)
-    shown = panels.all()
-    if not shown:
+            if sum(map(len, panels.values())) > MAX_CURVES:
+                hint = "pick elements in brackets: [joint_1]"
+                raise InvalidInput([Finding("PLOT005", f"more than {MAX_CURVES} curves are asked for", hint=hint)])
+    if not panels:
         what = f" of {listed(words)}" if words else ""
         raise InvalidInput([Finding("PLOT004", f"there is no value{what} in that time")])
-    missing = [word for number, word in enumerate(words) if number not in panels.numbers]
+    missing = [word for number, word in enumerate(words) if number not in {head.word for head in panels}]
     steps = next((one.steps for one in opened if one.steps), ())
     ends = [one.duration for one in opened]
     return Chart(
         title=", ".join(one.name for one in opened),
-        panels=shown,
+        panels=tuple(
+            Panel(head.title, head.quantity, head.unit, tuple(panels[head]))
+            for head in sorted(panels, key=lambda head: head.word)
+        ),
         steps=steps,
         start=max(first, 0.0),
         end=min(last, max(ends)) if max(ends) > max(first, 0.0) else max(first, 0.0) + 1.0,
@@ -102,36 +110,17 @@ def field_lines(path: Path) -> tuple[FieldLine, ...]:
     return tuple(lines)
 
 
-class _Panels:
-    """Panels on their way, by the word that asks for them, what they are of, and the unit."""
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What a panel is of: the number of the word that asks for it, its title, unit and quantity."""
 
-    def __init__(self) -> None:
-        self._found: dict[tuple[int, str, str], list[Curve]] = {}
-        self._heads: dict[tuple[int, str, str], tuple[str, str]] = {}
-        self._count = 0
+    word: int
+    title: str
+    unit: str
+    quantity: str = field(compare=False)
 
-    def add(self, number: int, quantity: str, title: str, unit: str, curve: Curve) -> None:
-        self._count += 1
-        if self._count > MAX_CURVES:
-            raise InvalidInput(
-                [
-                    Finding(
-                        "PLOT005", f"these are more than {MAX_CURVES} curves", hint="say which in brackets: [joint_1]"
-                    )
-                ]
-            )
-        key = (number, title, unit)
-        self._heads.setdefault(key, (title, quantity))
-        self._found.setdefault(key, []).append(curve)
 
-    @property
-    def numbers(self) -> set[int]:
-        """Which words have a curve."""
-        return {number for number, _, _ in self._found}
-
-    def all(self) -> tuple[Panel, ...]:
-        order = sorted(self._found, key=lambda key: key[0])
-        return tuple(Panel(*self._heads[key], key[2], tuple(self._found[key])) for key in order)
+_Panels = dict[_Head, list[Curve]]
 
 
 class _Log:
@@ -142,13 +131,8 @@ class _Log:
         self.name = name
         self.topics: Topics = open_topics(path)
         self._messages: dict[str, Message] = {}
-        self._joints: JointUnits | None = None
         self.steps = _steps(path)
-
-    @property
-    def duration(self) -> float:
-        """[s]"""
-        return (self.topics.end - self.topics.start) / 1e9
+        self.duration = (self.topics.end - self.topics.start) / 1e9
 
     def message(self, topic: Topic) -> Message:
         """The type of a topic.
@@ -158,10 +142,8 @@ class _Log:
         """
         if topic.name not in self._messages:
             if not topic.definition:
-                message = (
-                    f"{topic.name} is written as {topic.encoding or 'nothing known'}, not as ROS 2 CDR with ros2msg"
-                )
-                raise self._refused("PLOT006", message)
+                encoding = topic.encoding or "unknown"
+                raise self._refused("PLOT006", f"{topic.name} has encoding {encoding}, expected ROS 2 CDR with ros2msg")
             try:
                 self._messages[topic.name] = read_definition(topic.type, topic.definition)
             except UnknownDefinition as error:
@@ -201,7 +183,7 @@ class _Log:
         parts = [part.name for part in one.way.parts]
         field = f"{one.topic.strip('/')}.{short(one.message, one.way.name)}"
         name = f"{field}[{each.label}]" if each.label else field
-        unit = unit_of(one.way, each.label, self._known_joints())
+        unit = unit_of(one.way, each.label, self._joints)
         label = each.label.replace("+", " – ").replace("robot/", "")
         title, quantity = field, parts[-1]
         if several:
@@ -212,7 +194,7 @@ class _Log:
         elif len(quantity) == 1 and len(parts) > 1:
             quantity = f"{parts[-2]} {quantity}"
         curve = Curve(name, label, self.name, each.times, each.values, each.held, self.duration)
-        panels.add(number, quantity, title, unit, curve)
+        panels.setdefault(_Head(number, title, unit, quantity), []).append(curve)
 
     def _topic(self, name: FieldName) -> Topic:
         topic = self.topics.all.get(name.topic)
@@ -235,21 +217,17 @@ class _Log:
             hint = did_you_mean(words[0], labels, kind="there are")
             raise self._refused("PLOT002", f"{name.text}: there is no '{shorten(', '.join(words))}' in it", hint)
 
-    def _known_joints(self) -> JointUnits:
-        if self._joints is None:
-            self._joints = joint_units(self._description())
-        return self._joints
-
-    def _description(self) -> bytes:
+    @cached_property
+    def _joints(self) -> JointUnits:
+        """The units of the joints of the described robot; none where the description cannot be read."""
         topic = self.topics.all.get(ROBOT_DESCRIPTION)
+        urdf = ""
         if topic is not None and topic.definition:
-            for _, data, places in self.topics.messages({ROBOT_DESCRIPTION}):
+            for _, data, places in islice(self.topics.messages({ROBOT_DESCRIPTION}), 1):
                 start, length = int(places.starts[0]), int(places.lengths[0])
-                try:
-                    return CdrReader(memoryview(data)[start : start + length]).text().encode()
-                except CdrError:
-                    return b""
-        return b""
+                with suppress(CdrError):
+                    urdf = CdrReader(memoryview(data)[start : start + length]).text()
+        return joint_units(urdf.encode())
 
     def _refused(self, code: str, message: str, hint: str | None = None) -> InvalidInput:
         return InvalidInput([Finding(code, message, Place(str(self.path), 0, 0), hint)])

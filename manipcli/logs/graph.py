@@ -1,4 +1,4 @@
-"""A task, or the log of one, to who feeds whom: planner, controllers, limits, drives, engine, sensors, topics.
+"""Data-flow graph of a task or its log: planner, controllers, limits, drives, engine, sensors, topics.
 
 Everything is asked of what a run is made of: the controllers as they are built, the drivetrain, the engine's member,
 the table of channels. Of a log the topics are those that are in it.
@@ -7,7 +7,6 @@ the table of channels. Of a log the topics are those that are in it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +15,7 @@ from manipcli.control.controller import Controller
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
+from manipcli.core.text import number_of
 from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.model.robot import RobotModel
@@ -78,20 +78,6 @@ def log_graph(path: Path) -> Graph:
     return _Builder(spec, controllers, robot, scene, topics, version=version, notes=notes).graph()
 
 
-@dataclass(slots=True)
-class _Found:
-    """The graph on its way."""
-
-    nodes: dict[str, Node]
-    edges: list[Edge]
-
-    def add(self, node: Node) -> None:
-        self.nodes[node.id] = node
-
-    def join(self, source: str, target: str, label: str = "", *, idle: bool = False, back: bool = False) -> None:
-        self.edges.append(Edge(source, target, label, idle, back))
-
-
 class _Builder:
     def __init__(
         self,
@@ -111,7 +97,8 @@ class _Builder:
         self._version = version or self._member.version()
         manager = build_controllers(file, robot, self._period)
         self._controllers = manager.controllers
-        self._found = _Found({}, [])
+        self._nodes: dict[str, Node] = {}
+        self._edges: list[Edge] = []
 
     def graph(self) -> Graph:
         self._task()
@@ -121,17 +108,23 @@ class _Builder:
         self._engine()
         self._feedback()
         self._publish()
-        return Graph(self._spec.task, tuple(self._found.nodes.values()), tuple(self._found.edges), self._notes)
+        return Graph(self._spec.task, tuple(self._nodes.values()), tuple(self._edges), self._notes)
+
+    def _add(self, node: Node) -> None:
+        self._nodes[node.id] = node
+
+    def _join(self, source: str, target: str, label: str = "", *, idle: bool = False, back: bool = False) -> None:
+        self._edges.append(Edge(source, target, label, idle, back))
 
     def _task(self) -> None:
-        spec, found = self._spec, self._found
+        spec = self._spec
         steps = tuple(
             f"{step.id}: {step.verb}{f', until {step.until.name}' if step.until is not None else ''}"
             for step in spec.steps
         )
-        found.add(Node("task", "task", spec.task, details=(_count(len(steps), "step"),), items=steps))
-        found.add(Node("planner", "planner", "planner", details=(f"seed {spec.simulation.seed}",)))
-        found.join("task", "planner", "steps")
+        self._add(Node("task", "task", spec.task, details=(number_of(len(steps), "step"),), items=steps))
+        self._add(Node("planner", "planner", "planner", details=(f"seed {spec.simulation.seed}",)))
+        self._join("task", "planner", "steps")
 
     def _controller(self, controller: Controller) -> None:
         own = self._file.controllers[controller.name]
@@ -140,42 +133,41 @@ class _Builder:
         if controller.feed_forward != "none":
             details.append(f"adds {controller.feed_forward.replace('_', ' ')}")
         details += [] if own.active else ["inactive at the start"]
-        found = self._found
-        found.add(Node(controller.name, "controller", controller.name, details=tuple(details), idle=not own.active))
+        self._add(Node(controller.name, "controller", controller.name, details=tuple(details), idle=not own.active))
         if is_follower(controller) or is_hand(controller):
             what = "trajectories" if is_follower(controller) else "grips"
-            found.join("planner", controller.name, f"{what} by {action_of(controller)}", idle=not own.active)
+            self._join("planner", controller.name, f"{what} by {action_of(controller)}", idle=not own.active)
         if controller.interfaces:
             what = f"{', '.join(controller.interfaces)} of {_named(controller.joints)}"
-            found.join(controller.name, "limits", what, idle=not own.active)
+            self._join(controller.name, "limits", what, idle=not own.active)
 
     def _limits_and_drives(self) -> None:
         """Joint limits, then transmissions and actuators, where those change anything."""
-        robot, found = self._robot, self._found
+        robot = self._robot
         limits = [joint.limits for joint in robot.moving_joints]
-        kinds = {
+        there = {
             "position": any(one.lower is not None or one.upper is not None for one in limits),
             "velocity": any(one.velocity is not None for one in limits),
             "effort": any(one.effort is not None for one in limits),
             "soft": any(one.soft is not None for one in limits),
         }
-        held = [kind for kind, there in kinds.items() if there]
-        found.add(Node("limits", "limits", "joint limits", details=(_count(len(limits), "joint"), *held)))
+        held = [kind for kind, has in there.items() if has]
+        self._add(Node("limits", "limits", "joint limits", details=(number_of(len(limits), "joint"), *held)))
         actuation = Actuation(robot, self._period)
         acts = bool(actuation.names) and not actuation.ideal and self._member.physics == "full"
         by_effort = any("effort" in controller.interfaces for controller in self._controllers)
         others = sorted({one for c in self._controllers for one in c.interfaces if one != "effort"})
         if actuation.names:
-            found.add(self._drives(actuation, acts=acts))
+            self._add(self._drives(actuation, acts=acts))
         if acts and by_effort:
-            found.join("limits", "drives", "effort")
-            found.join("drives", "engine", "effort at the joints")
+            self._join("limits", "drives", "effort")
+            self._join("drives", "engine", "effort at the joints")
             if others:
-                found.join("limits", "engine", ", ".join(others))
+                self._join("limits", "engine", ", ".join(others))
         else:
-            found.join("limits", "engine", ", ".join([*others, *(["effort"] if by_effort else [])]))
+            self._join("limits", "engine", ", ".join([*others, *(["effort"] if by_effort else [])]))
         if actuation.names and not (acts and by_effort):
-            found.join("engine", "drives", "position, velocity, effort")
+            self._join("engine", "drives", "position, velocity, effort")
 
     def _drives(self, actuation: Actuation, *, acts: bool) -> Node:
         names = actuation.names
@@ -184,48 +176,48 @@ class _Builder:
         counts = [f"{sum(tag.type == kind for tag in tags)} {kind}" for kind in kinds]
         details = (
             f"transmissions: {', '.join(counts)}",
-            _count(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
+            number_of(len(names), "actuator") + (f": {', '.join(names)}" if len(names) <= MOST_NAMES else ""),
             "their limits, friction and latency act" if acts else "ideal: they change nothing",
         )
         return Node("drives", "drive", "transmissions and actuators", details=details)
 
     def _engine(self) -> None:
-        simulation, found = self._spec.simulation, self._found
+        simulation = self._spec.simulation
         steps = round(simulation.control_period / simulation.step)
-        physics = f"{_count(steps, 'physics step')} of {1e3 * simulation.step:g} ms a tick"
+        physics = f"{number_of(steps, 'physics step')} of {1e3 * simulation.step:g} ms per tick"
         if self._member.physics != "full":
-            physics = "no physics: references come true"
-        found.add(Node("engine", "engine", f"{self._member.name} {self._version}".strip(), details=(physics,)))
+            physics = "ideal tracking, no physics"
+        self._add(Node("engine", "engine", f"{self._member.name} {self._version}".strip(), details=(physics,)))
         bodies = self._scene.bodies
+        count = "1 body" if len(bodies) == 1 else f"{len(bodies)} bodies"
         free = sum(not body.fixed for body in bodies)
-        found.add(Node("robot", "robot", self._robot.name, details=(_count(len(self._robot.links), "link"),)))
-        found.add(Node("scene", "scene", _count(len(bodies), "body", "bodies"), details=(f"{free} free to move",)))
-        found.join("robot", "engine", "description")
-        found.join("scene", "engine", "bodies")
+        self._add(Node("robot", "robot", self._robot.name, details=(number_of(len(self._robot.links), "link"),)))
+        self._add(Node("scene", "scene", count, details=(f"{free} free to move",)))
+        self._join("robot", "engine", "description")
+        self._join("scene", "engine", "bodies")
 
     def _feedback(self) -> None:
         """What is measured, and who reads it."""
-        found = self._found
-        found.add(Node("joints", "sensor", "measured joints"))
-        found.add(Node("contacts", "sensor", "contacts"))
-        found.join("engine", "joints")
-        found.join("engine", "contacts")
+        self._add(Node("joints", "sensor", "measured joints"))
+        self._add(Node("contacts", "sensor", "contacts"))
+        self._join("engine", "joints")
+        self._join("engine", "contacts")
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
             if isinstance(controller, ForceTorqueBroadcaster):
                 sensor = f"wrench {controller.name}"
-                found.add(Node(sensor, "sensor", f"wrench at {controller.joint}"))
-                found.join("engine", sensor)
-                found.join(sensor, controller.name, idle=idle, back=True)
+                self._add(Node(sensor, "sensor", f"wrench at {controller.joint}"))
+                self._join("engine", sensor)
+                self._join(sensor, controller.name, idle=idle, back=True)
                 continue
             if controller.joints:
-                found.join("joints", controller.name, idle=idle, back=True)
+                self._join("joints", controller.name, idle=idle, back=True)
             if is_hand(controller):
-                found.join("contacts", controller.name, "forces", idle=idle, back=True)
+                self._join("contacts", controller.name, "forces", idle=idle, back=True)
 
     def _publish(self) -> None:
         """Topics, each by who publishes it."""
-        found, spec = self._found, self._spec
+        spec = self._spec
         selection = Selection(spec.record.strides(self._period), spec.record.left_out)
         common = {channel.topic for channel in channel_table([])}
         rows = [(channel, PRODUCERS[channel.topic]) for channel in channel_table([])]
@@ -243,13 +235,13 @@ class _Builder:
                 about = _held(self._topics[channel.topic])
             else:
                 continue
-            found.add(_topic_node(channel.topic, channel.type, about))
-            if producer in found.nodes:
-                found.join(producer, channel.topic)
+            self._add(_topic_node(channel.topic, channel.type, about))
+            if producer in self._nodes:
+                self._join(producer, channel.topic)
         known = {channel.topic for channel, _ in rows}
         for name, topic in (self._topics or {}).items():
             if name not in known:
-                found.add(_topic_node(name, topic.type, _held(topic)))
+                self._add(_topic_node(name, topic.type, _held(topic)))
 
 
 def _topic_node(name: str, kind: str, about: str) -> Node:
@@ -258,7 +250,7 @@ def _topic_node(name: str, kind: str, about: str) -> Node:
 
 def _held(topic: Topic) -> str:
     """`14550 messages, 1000 Hz`."""
-    text = _count(topic.count, "message")
+    text = number_of(topic.count, "message")
     if topic.count > 2 and topic.last > topic.first:
         text += f", {(topic.count - 1) / ((topic.last - topic.first) / 1e9):.4g} Hz"
     return text
@@ -267,7 +259,3 @@ def _held(topic: Topic) -> str:
 def _named(names: Sequence[str]) -> str:
     """The first few, and the last."""
     return ", ".join(names) if len(names) <= MOST_NAMES else f"{names[0]}, {names[1]} … {names[-1]}"
-
-
-def _count(number: int, noun: str, nouns: str | None = None) -> str:
-    return f"{number} {noun if number == 1 else nouns or f'{noun}s'}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import frozen
+from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
@@ -21,7 +21,7 @@ from manipcli.record.faults import LEFT_OUT, Thinned
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
-from manipcli.replay.sampling import plot_tables, sampled
+from manipcli.replay.sampling import sampled
 
 
 def open_playback(
@@ -59,7 +59,7 @@ def _open_own(
 ) -> Playback:
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
-    if not len(samples.times):
+    if samples is None:
         raise InvalidInput([Finding("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
     verdict = judge_recording(recording, path)
@@ -73,7 +73,9 @@ def _open_own(
     )
     robot, scene = meshes.robot(robot), meshes.scene(scene)
     notes = meshes.notes
-    body_position, body_quat_xyzw = samples.body_position, samples.body_quat_xyzw
+    span, contacts = samples
+    states = span.states
+    body_position, body_quat_xyzw = states.body_position, states.body_quat_xyzw
     if TF in recording.absent:
         start = [scene.body(name).X_WO for name in recording.body_names]
         body_position = frozen(np.broadcast_to([X_WO.p for X_WO in start], body_position.shape))
@@ -85,19 +87,18 @@ def _open_own(
         robot=robot,
         scene=scene,
         joint_names=recording.joint_names,
-        times=samples.times,
-        position=samples.position,
-        velocity=samples.velocity,
-        effort=samples.effort,
-        reference=samples.reference,
+        times=states.time,
+        position=states.position,
+        velocity=states.velocity,
+        effort=states.effort,
+        reference=references(span.controllers, recording.joint_names, len(states.time)),
         body_position=body_position,
         body_quat_xyzw=body_quat_xyzw,
-        contacts=samples.contacts,
-        steps=playback_steps(verdict, recording.events, end=float(samples.times[-1])),
+        contacts=contacts,
+        steps=playback_steps(verdict, recording.events, end=float(states.time[-1])),
         verdict=verdict,
         lost=recording.lost,
         notes=notes,
-        tables=partial(plot_tables, recording, robot),
         keep=meshes.folder,
     )
 

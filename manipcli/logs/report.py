@@ -24,8 +24,8 @@ from manipcli.logs.replay import open_playback
 from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
+from manipcli.replay.frames import Frames, telling
 from manipcli.replay.playback import RATE, Playback
-from manipcli.replay.shots import Shots, telling
 from manipcli.report.quantity import quantity
 from manipcli.report.run_page import Cause, Picture, RunPage, Source, Written
 from manipcli.report.text import how_wrong
@@ -70,9 +70,9 @@ def log_page(
     assert verdict is not None, "the log is one of ours"
     page = _page(recording, path, verdict, end=playback.end)
     worst = page.causes[0].at if page.causes else None
-    with Shots(playback, size=PICTURE, captions=False) as shots:
-        pictures = {step.id: _picture(shots, telling(playback, step)) for step in playback.steps}
-        moment = _picture(shots, worst) if worst is not None else None
+    with Frames(playback, size=PICTURE, captions=False) as frames:
+        pictures = {step.id: _picture(frames, telling(playback, step)) for step in playback.steps}
+        moment = _picture(frames, worst) if worst is not None else None
     return replace(
         page,
         facts=run_facts(recording, recorded_robot(recording, path), recorded_scene(recording, path), verdict.steps),
@@ -239,12 +239,12 @@ def limit_of(spec: Model, unit: str) -> float | None:
     return None
 
 
-def _picture(shots: Shots, time: float) -> Picture:
+def _picture(frames: Frames, time: float) -> Picture:
     from PIL import Image
 
-    run: Playback = shots.playback
+    run: Playback = frames.playback
     stream = io.BytesIO()
-    Image.fromarray(shots.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
+    Image.fromarray(frames.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
     return Picture(float(run.times[run.index(time)]), stream.getvalue(), PICTURE)
 
 

@@ -1,15 +1,16 @@
-"""What is written into a picture of a run: the step, the time, and where in the run this is."""
+"""Captions of pictures: lines of text, and the timeline of a run."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manipcli.core.text import escape
-from manipcli.replay.image import Image
 from manipcli.replay.playback import Playback
+from manipcli.replay.renderer import Image
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -43,7 +44,7 @@ def text_size(height: int) -> int:
 
 
 def caption(image: Image, playback: Playback, time: float) -> Image:
-    """The picture with the name of the step that is on and the time at its top, and the timeline at its bottom."""
+    """The picture with the active step and the time at its top, and the timeline at its bottom."""
     from PIL import Image as PillowImage
     from PIL import ImageDraw
 
@@ -51,24 +52,42 @@ def caption(image: Image, playback: Playback, time: float) -> Image:
     pen = ImageDraw.Draw(canvas)
     size = text_size(canvas.height)
     margin = round(0.7 * size)
-    clock = f"{time:.2f} s"
-    width = pen.textlength(clock, font=font(size))
-    pen.text((canvas.width - margin, margin), clock, fill=INK, font=font(size), anchor="ra")
     step = playback.step_at(time)
+    left = []
     if step is not None:
-        number = f"{playback.steps.index(step) + 1}/{playback.total}"
-        room = canvas.width - 3.0 * margin - width
-        x = float(margin)
-        pen.text((x, margin), number, fill=QUIET, font=font(size), anchor="la")
-        x += pen.textlength(number + "  ", font=font(size))
-        pen.text((x, margin), cut(pen, step.label, size, room - x), fill=INK, font=font(size), anchor="la")
+        left = [(f"{playback.steps.index(step) + 1}/{playback.total}", QUIET), (step.label, INK)]
+    write_line(pen, (margin, canvas.width - margin, margin + size / 2), size, left, [(f"{time:.2f} s", INK)])
     if playback.end > playback.start:
         _timeline(pen, playback, time, (canvas.width, canvas.height), margin)
     return np.asarray(canvas)
 
 
-def cut(pen: ImageDraw, text: str, size: int, room: float) -> str:
-    """As much of a text as there is room for [pixel]."""
+def write_line(
+    pen: ImageDraw,
+    place: tuple[float, float, float],
+    size: int,
+    left: Sequence[tuple[str, Rgb]],
+    right: Sequence[tuple[str, Rgb]] = (),
+) -> None:
+    """Writes words into one line; those of `left` are cut where they do not fit.
+
+    Args:
+        pen: draws.
+        place: the left and right end of the line and the middle of its height [pixel].
+        size: height of the text [pixel].
+        left, right: words and their colours, from the end of the line inwards.
+    """
+    x, end, y = place
+    for word, colour in right:
+        pen.text((end, y), word, fill=colour, font=font(size), anchor="rm")
+        end -= pen.textlength(f"{word}  ", font=font(size))
+    for word, colour in left:
+        text = _cut(pen, word, size, end - x)
+        pen.text((x, y), text, fill=colour, font=font(size), anchor="lm")
+        x += pen.textlength(f"{text}  ", font=font(size))
+
+
+def _cut(pen: ImageDraw, text: str, size: int, room: float) -> str:
     text = escape(text)
     if pen.textlength(text, font=font(size)) <= room:
         return text

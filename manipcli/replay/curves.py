@@ -1,10 +1,12 @@
-"""Curves as they are drawn: panels over one axis of time, the steps behind them. Knows no log and no library."""
+"""Curves as they are drawn or written as a table: panels over one time axis, the steps behind them."""
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TextIO
 
 import numpy as np
 
@@ -123,23 +125,32 @@ def thinned(curve: Curve, start: float, end: float, columns: int) -> tuple[Array
     return times[order], values[order]
 
 
-def span_of(curves: Iterable[Curve]) -> tuple[float, float]:
-    """Lowest and highest value; 0 and 1 where there is none."""
-    finite = [values for curve in curves if len(values := curve.values[np.isfinite(curve.values)])]
-    if not finite:
-        return 0.0, 1.0
-    return min(float(v.min()) for v in finite), max(float(v.max()) for v in finite)
+def write_table(chart: Chart, stream: TextIO) -> None:
+    """Writes comma-separated values, which read back the same to the last bit.
+
+    One row per time, one column per curve; a cell is empty where a curve has no value at that time.
+
+    With several logs the first column says which, and each log has its rows after those of the one before.
+    """
+    curves = list({(one.name, one.log): one for panel in chart.panels for one in panel.curves}.values())
+    names = list(dict.fromkeys(one.name for one in curves))
+    logs = list(dict.fromkeys(one.log for one in curves))
+    writer = csv.writer(stream, lineterminator="\n")
+    head = ["log"] if len(logs) > 1 else []
+    writer.writerow([*head, "time", *names])
+    for log in logs:
+        mine = [one for one in curves if one.log == log]
+        first = [log] if head else []
+        times = np.unique(np.concatenate([one.times for one in mine]))
+        columns = [_cells(times, (one for one in mine if one.name == name)) for name in names]
+        writer.writerows([*first, repr(time), *row] for time, *row in zip(times.tolist(), *columns, strict=True))
 
 
-def ticks(low: float, high: float, most: int) -> Sequence[float]:
-    """At most `most` round numbers (1, 2 or 5 times a power of ten apart) from low to high."""
-    if not high > low:
-        return [low]
-    raw = (high - low) / max(most, 1)
-    power = 10.0 ** np.floor(np.log10(raw))
-    for factor in (1.0, 2.0, 5.0, 10.0, 20.0):
-        step = factor * power
-        first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-        if last - first + 1 <= most:
-            return [float(step * k) for k in np.arange(first, last + 1)]
-    return [low]
+def _cells(times: Array, curves: Iterable[Curve]) -> list[str]:
+    """The cells of a column; of several values at one time the last."""
+    cells = [""] * len(times)
+    for curve in curves:
+        at = np.searchsorted(times, curve.times).tolist()
+        for k, value in zip(at, curve.values.tolist(), strict=True):
+            cells[k] = repr(value)
+    return cells

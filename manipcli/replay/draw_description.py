@@ -7,7 +7,7 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.description.lint.inspection import Inspection
 from manipcli.model.build_robot import bare_robot
-from manipcli.replay.picture import draw_robot
+from manipcli.replay.renderer import draw_robot
 
 
 def draw_description(inspection: Inspection, path: Path) -> tuple[str, ...]:

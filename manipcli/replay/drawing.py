@@ -12,19 +12,18 @@ from typing import Literal
 
 import numpy as np
 
-from manipcli.core.geometry import Transform
+from manipcli.core.geometry import Array, Transform
 from manipcli.core.text import listed
 from manipcli.description.elements import Inertial, Link
 from manipcli.model.robot import RobotModel
-from manipcli.replay.bones import bones
 from manipcli.replay.mesh_surfaces import mesh_surfaces
+from manipcli.replay.placing import Poses
 from manipcli.replay.surface import Surface, box_surface, cylinder_surface, smoothed, sphere_surface
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
 
 Layer = Literal["visual", "collision", "inertia"]
-LAYERS: tuple[Layer, ...] = ("visual", "collision", "inertia")
 
 PLAIN: Rgba = (0.72, 0.74, 0.77, 1.0)
 """Where neither the description nor the mesh says a colour."""
@@ -33,6 +32,12 @@ INERTIA: Rgba = (0.20, 0.45, 0.90, 0.45)
 THINNEST = 1e-3
 """Least length of an edge of an inertia box [m]: a rod or a plate would not be seen."""
 WORLD = "world"
+FLOOR = "floor"
+"""The kind of body that everything is on; pages and the view draw a grid in its place."""
+BONE_RADIUS, BONE_SLENDERNESS, SHORTEST_BONE = 0.02, 8.0, 1e-3
+"""Of a bone: largest radius [m], smallest length over radius, and the shortest that is drawn [m]."""
+LAST_BONE = 0.01
+"""Radius [m] of the ball in place of a link without joints below it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +113,11 @@ def draw(robot: RobotModel | None, scene: Scene | None = None) -> Drawing:
             if (link.visuals or link.collisions) and not any(one.layer == "visual" for one in shown):
                 bare.append(link.name)
         if bare:
-            drawables += (bone for name in bare for bone in _bones(robot, name))
+            drawables += (
+                Drawable(f"{link_frame(name)}/bone_{k}", "visual", link_frame(name), bone, PLAIN)
+                for name in bare
+                for k, bone in enumerate(bones(robot, name))
+            )
             missing.insert(0, f"bones between joints stand in for {listed(bare)}")
         if robot.tool is not None:
             marks.append(Mark("tool", link_frame(robot.tool.link), robot.tool.X_LT))
@@ -133,10 +142,21 @@ def _link(link: Link, missing: list[str]) -> Iterator[Drawable]:
         yield from _inertia(frame, link.inertial)
 
 
-def _bones(robot: RobotModel, link: str) -> Iterator[Drawable]:
-    frame = link_frame(link)
-    for k, bone in enumerate(bones(robot, link)):
-        yield Drawable(f"{frame}/bone_{k}", "visual", frame, bone, PLAIN)
+def bones(robot: RobotModel, link: str) -> tuple[Surface, ...]:
+    """In place of a link without shapes, in its frame: a bone to each joint below it (at zero), or else a ball."""
+    ends = [joint.X_PJ.p for joint in robot.joints if joint.parent == link]
+    found = tuple(_bone(end) for end in ends if np.linalg.norm(end) > SHORTEST_BONE)
+    return found or (sphere_surface(Sphere(LAST_BONE)),)
+
+
+def _bone(end: Array) -> Surface:
+    length = float(np.linalg.norm(end))
+    z = end / length
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(z, x), z], axis=1)
+    cylinder = Cylinder(radius=min(BONE_RADIUS, length / BONE_SLENDERNESS), length=length)
+    return cylinder_surface(cylinder).moved(Transform.of(xyz=end / 2.0, R=R))
 
 
 def _body(body: Body, missing: list[str]) -> Iterator[Drawable]:
@@ -218,3 +238,25 @@ def _inertia(frame: str, inertial: Inertial) -> Iterator[Drawable]:
     box, X = inertia_box(inertial)
     a, b, c = (max(edge, THINNEST) for edge in box.size)
     yield Drawable(f"{frame}/inertia", "inertia", frame, box_surface(Box((a, b, c))).moved(X), INERTIA)
+
+
+def floors_of(scene: Scene | None) -> frozenset[str]:
+    """The names of the floors."""
+    return frozenset(body.name for body in scene.bodies if body.kind == FLOOR) if scene is not None else frozenset()
+
+
+def ground_height(drawing: Drawing, poses: Poses, floors: frozenset[str]) -> float:
+    """[m] of the grid: z = 0, or under what stands lower.
+
+    Args:
+        drawing: what is shown.
+        poses: one instant.
+        floors: frames that are not drawn.
+    """
+    index = {name: k for k, name in enumerate(drawing.frames)}
+    lowest = (
+        float(poses.X_WF(index[one.frame]).apply(one.surface.vertices)[:, 2].min())
+        for one in drawing.layer("visual")
+        if one.frame not in floors and len(one.surface.vertices)
+    )
+    return min(0.0, min(lowest, default=0.0))

@@ -65,11 +65,6 @@ class Forces:
         found = (self._push(one, k) for one in self._contacts[k] if one.force > LEAST)
         return tuple(push for push in found if push is not None)
 
-    def arrow(self, push: Push) -> Array:
-        """(2, 3) from where to where the arrow goes: it ends where the parts touch."""
-        length = min(push.force * self.scale, 2.0 * LONGEST)
-        return np.stack([push.point - length * push.direction, push.point])
-
     def _push(self, contact: Contact, k: int) -> Push | None:
         import coal
 

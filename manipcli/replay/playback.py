@@ -1,11 +1,7 @@
-"""A run as it is shown: what stood where at the rate of a screen, its steps, and its curves at the rate of the log.
-
-One value for everything that shows a log: the page in the browser, the page in a file, pictures, films and plots.
-"""
+"""A run as it is shown: poses at the rate of a screen, steps and curves. Pages, pictures and videos are made of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -65,10 +61,6 @@ class PlotTable:
     times: Array
     values: Array
 
-    def column(self, name: str) -> Array:
-        """(T,) one of the curves."""
-        return self.values[:, self.columns.index(name)]
-
 
 @dataclass(frozen=True)
 class Playback:
@@ -89,8 +81,6 @@ class Playback:
         verdict: None where the log cannot be judged.
         lost: why the end of the log is missing, or None.
         notes: what else is missing or unlike it was in the run, a sentence each.
-        tables: reads the curves at the full rate of the log: joints, reference and error, tool, contact forces. Empty
-            where it has no more than `curves` shows.
         keep: what must live as long as this does: the folder of the meshes that the log carries.
     """
 
@@ -110,7 +100,6 @@ class Playback:
     verdict: Verdict | None = None
     lost: str | None = None
     notes: tuple[str, ...] = ()
-    tables: Callable[[], tuple[PlotTable, ...]] = field(repr=False, default=lambda: ())
     keep: object = field(repr=False, default=None)
 
     @property
@@ -159,10 +148,6 @@ class Playback:
         assert self.robot is not None
         return with_mimics(self.robot, np.where(np.isnan(self.reference), self.stance, self.reference))
 
-    def reference_poses(self) -> Poses:
-        """Where the robot should be, and the bodies as they are: the frames of `draw(robot, scene)` at every time."""
-        return Placing(self.robot, self.scene).at(self.reference_position(), self.body_position, self.body_quat_xyzw)
-
     def tool_path(self) -> Array:
         """(T, 3) [m] the origin of the tool in the world; (0, 3) where the robot has none."""
         if self.robot is None or self.robot.tool is None:
@@ -170,14 +155,46 @@ class Playback:
         return tool_poses(self.robot, self.stance)[0]
 
     def curves(self) -> tuple[PlotTable, ...]:
-        """Measured and wanted values of the joints, the way of the tool and contact forces, at the times shown."""
-        forces = force_table(self.times, self.contacts)
-        return (
-            *joint_tables(
-                self.joint_names, self.robot, self.times, self.position, self.velocity, self.effort, self.reference
-            ),
-            *((forces,) if forces.columns else ()),
-        )
+        """Joints, reference and error, tool, contact forces at the times shown; columns without a number are left out.
+
+        The error of a joint without limits is the shorter rotation.
+        """
+        joints = self.robot.joints if self.robot is not None else ()
+        kinds = {joint.name: joint.type for joint in joints}
+        position = tuple("m" if kinds.get(name) == "prismatic" else "rad" for name in self.joint_names)
+        velocity = tuple(f"{unit}/s" for unit in position)
+        effort = tuple("N" if unit == "m" else "N m" for unit in position)
+        error = self.reference - self.position
+        endless = [k for k, name in enumerate(self.joint_names) if kinds.get(name) == "continuous"]
+        error[:, endless] = wrapped(error[:, endless])
+        tables = []
+        for title, values, units in (
+            ("joint position", self.position, position),
+            ("joint velocity", self.velocity, velocity),
+            ("joint effort", self.effort, effort),
+            ("joint reference", self.reference, position),
+            ("joint error", error, position),
+        ):
+            known = np.flatnonzero(~np.isnan(values).all(axis=0)).tolist()
+            if known:
+                columns, of = (tuple(each[k] for k in known) for each in (self.joint_names, units))
+                tables.append(PlotTable(title, columns, of, self.times, values[:, known]))
+        if self.robot is not None and self.robot.tool is not None:
+            path = tool_poses(self.robot, self.position)[0]
+            tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, self.times, path))
+        return (*tables, *self._force_curves())
+
+    def _force_curves(self) -> tuple[PlotTable, ...]:
+        """Normal force [N] of every pair that touches at some time; 0 while it does not."""
+        pairs = {pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in self.contacts for one in each}))}
+        if not pairs:
+            return ()
+        values = np.zeros((len(self.times), len(pairs)))
+        for k, each in enumerate(self.contacts):
+            for one in each:
+                values[k, pairs[one.a, one.b]] = one.force
+        columns = tuple(f"{a.removeprefix('robot/')} – {b.removeprefix('robot/')}" for a, b in pairs)
+        return (PlotTable("contact force", columns, ("N",) * len(pairs), self.times, values),)
 
 
 def filled(values: Array) -> Array:
@@ -187,60 +204,3 @@ def filled(values: Array) -> Array:
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values))[:, None], known.argmax(axis=0)), axis=0)
     return np.nan_to_num(np.take_along_axis(values, last, axis=0))
-
-
-def joint_tables(
-    names: tuple[str, ...],
-    robot: RobotModel | None,
-    times: Array,
-    position: Array,
-    velocity: Array,
-    effort: Array,
-    reference: Array,
-) -> tuple[PlotTable, ...]:
-    """Measured and wanted values of joints, what is between them, and the way of the tool; columns without a number go.
-
-    Args:
-        names: (n) of the joints.
-        robot: says the units and where the tool is; None: neither.
-        times: (T,) [s].
-        position, velocity, effort, reference: (T, n); NaN where there is none.
-    """
-    slides = {joint.name for joint in robot.joints if joint.type == "prismatic"} if robot is not None else set()
-    turning = {joint.name for joint in robot.joints if joint.type == "continuous"} if robot is not None else set()
-    endless = [k for k, name in enumerate(names) if name in turning]
-    unit = tuple("m" if name in slides else "rad" for name in names)
-    error = reference - position
-    # A joint without limits errs the short way round.
-    error[:, endless] = wrapped(error[:, endless])
-    tables = []
-    for title, values, units in (
-        ("joint position", position, unit),
-        ("joint velocity", velocity, tuple(f"{one}/s" for one in unit)),
-        ("joint effort", effort, tuple("N" if one == "m" else "N m" for one in unit)),
-        ("joint reference", reference, unit),
-        ("joint error", error, unit),
-    ):
-        known = np.flatnonzero(~np.isnan(values).all(axis=0)).tolist() if len(times) else []
-        if known:
-            columns, of = (tuple(each[k] for k in known) for each in (names, units))
-            tables.append(PlotTable(title, columns, of, times, values[:, known]))
-    if robot is not None and robot.tool is not None:
-        tables.append(PlotTable("tool position", ("x", "y", "z"), ("m",) * 3, times, tool_poses(robot, position)[0]))
-    return tuple(tables)
-
-
-def force_table(times: Array, contacts: Sequence[tuple[Contact, ...]]) -> PlotTable:
-    """Normal force of every pair that touches at some time, (T, pairs) [N]; 0 while it does not.
-
-    Args:
-        times: (T,) [s].
-        contacts: what touches at each.
-    """
-    pairs = {pair: k for k, pair in enumerate(sorted({(one.a, one.b) for each in contacts for one in each}))}
-    values = np.zeros((len(times), len(pairs)))
-    for k, each in enumerate(contacts):
-        for one in each:
-            values[k, pairs[one.a, one.b]] = one.force
-    columns = tuple(f"{pair[0].removeprefix('robot/')} – {pair[1].removeprefix('robot/')}" for pair in pairs)
-    return PlotTable("contact force", columns, ("N",) * len(pairs), times, values)

@@ -10,7 +10,7 @@ import base64
 import html
 import json
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 
 import numpy as np
@@ -19,9 +19,8 @@ import numpy.typing as npt
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import framing
-from manipcli.replay.drawing import WORLD, Drawing, draw, link_frame
+from manipcli.replay.drawing import WORLD, Drawing, draw, floors_of, ground_height, link_frame
 from manipcli.replay.forces import LONGEST, Forces
-from manipcli.replay.ground import floors_of, ground_height
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
 from manipcli.replay.surface import Surface
@@ -34,6 +33,7 @@ Reference = tuple[str, int, int]
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 """What a page of its own may do: nothing but itself."""
 LEVEL = 9
+_PAGE = files("manipcli.replay").joinpath("page")
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -69,14 +69,11 @@ def player_html(playback: Playback, *, whole_page: bool = False) -> str:
         whole_page: the element has the page to itself: it takes the keys, too.
     """
     head, data = _contents(playback)
-    page = files("manipcli.replay").joinpath("page")
-    script = "".join(
-        one.read_text("utf-8") for one in sorted(page.iterdir(), key=lambda one: one.name) if one.name.endswith(".js")
-    )
+    script = "".join(map(_read, sorted(one.name for one in _PAGE.iterdir() if one.name.endswith(".js"))))
     return (
         f'<div class="mc-player"{" data-page=1" if whole_page else ""}>\n'
-        f"<style>\n{page.joinpath('player.css').read_text('utf-8')}</style>\n"
-        f"{page.joinpath('player.html').read_text('utf-8')}"
+        f"<style>\n{_read('player.css')}</style>\n"
+        f"{_read('player.html')}"
         f'<script type="application/json" data-part="head">{head}</script>\n'
         f'<script type="text/plain" data-part="data">{data}</script>\n'
         f"<script>(function () {{\n{script}}})();</script>\n</div>\n"
@@ -100,16 +97,14 @@ def player_page(playback: Playback) -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{name}</title><link rel="icon" href="data:,">\n'
-        "<style>\nbody { margin: 0; padding: 12px 16px; background: #fff; color: #1d2733;"
-        ' font: 14px/1.4 system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; }\n'
-        "header { display: flex; flex-wrap: wrap; align-items: baseline; gap: 2px 16px; margin-bottom: 10px; }\n"
-        "h1 { font-size: 20px; } h1, header p { margin: 0; overflow-wrap: anywhere; }\n"
-        "header .good { color: #1a7f4b; } header .bad { color: #c4342d; } .note { color: #687686; }\n"
-        "@media (min-width: 761px) { body { height: 100vh; box-sizing: border-box; display: flex;"
-        " flex-direction: column; } body > .mc-player { flex: 1; height: auto; min-height: 420px; } }\n"
+        f"<style>\n{_read('whole_page.css')}"
         f"</style></head><body>\n<header><h1>{name}</h1>{''.join(said)}</header>\n"
         f"{player_html(playback, whole_page=True)}</body></html>\n"
     )
+
+
+def _read(name: str) -> str:
+    return _PAGE.joinpath(name).read_text("utf-8")
 
 
 def _contents(playback: Playback) -> tuple[str, str]:
@@ -128,17 +123,7 @@ def _contents(playback: Playback) -> tuple[str, str]:
         "name": playback.name,
         "start": playback.start,
         "end": playback.end,
-        "steps": [
-            {
-                "label": step.label,
-                "start": step.start,
-                "end": step.end,
-                "outcome": step.outcome,
-                "text": step.text,
-                "phases": [{"name": phase.name, "start": phase.start, "end": phase.end} for phase in step.phases],
-            }
-            for step in playback.steps
-        ],
+        "steps": [asdict(step) for step in playback.steps],
         "camera": {"eye": camera.eye, "target": camera.target, "field": camera.field},
         "ground": ground_height(drawing, start, floors),
         "frames": frames,

@@ -1,41 +1,27 @@
-"""A recording at the rate of a screen, in one pass over its spans, and its curves at full rate."""
+"""A recording at the rate of a screen, in one pass over its spans."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.core.geometry import Array, frozen
-from manipcli.judge.measures.reference import references
-from manipcli.model.robot import RobotModel
+from manipcli.core.geometry import Array
 from manipcli.model.state import Contact
 from manipcli.record.recording import ContactSnapshot, Recording, Span, joined
-from manipcli.replay.playback import PlotTable, force_table, joint_tables
 
 
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """Some ticks of a recording; the arrays are those of `Playback`. `end`: the last tick of the recording [s]."""
-
-    times: Array
-    position: Array
-    velocity: Array
-    effort: Array
-    reference: Array
-    body_position: Array
-    body_quat_xyzw: Array
-    contacts: tuple[tuple[Contact, ...], ...]
-
-
-def sampled(recording: Recording, *, rate: float) -> Samples:
+def sampled(recording: Recording, *, rate: float) -> tuple[Span, tuple[tuple[Contact, ...], ...]] | None:
     """The ticks nearest to multiples of 1 / rate, and the last one; one span in memory at a time.
 
     Args:
         recording: any.
         rate: [Hz]; beyond that of the recording every tick is taken.
+
+    Returns:
+        The ticks as one span without contacts, and for each what touched since the one before, with the largest force
+        of each pair; None where the recording has no tick.
     """
     chosen: list[Span] = []
     gathered = _Contacts()
@@ -52,25 +38,11 @@ def sampled(recording: Recording, *, rate: float) -> Samples:
         gathered.add(span.contacts, times[ticks])
         last = _picked(span, np.array([len(times) - 1]))
     if not chosen:
-        nothing = frozen(np.zeros((0, len(recording.joint_names))))
-        bodies = np.zeros((0, len(recording.body_names), 7))
-        return Samples(
-            frozen([]), nothing, nothing, nothing, nothing, frozen(bodies[..., :3]), frozen(bodies[..., 3:]), ()
-        )
+        return None
     if last.states.time[0] not in chosen[-1].states.time:
         chosen.append(last)
         gathered.add((), last.states.time)
-    whole = joined(chosen)
-    return Samples(
-        times=whole.states.time,
-        position=whole.states.position,
-        velocity=whole.states.velocity,
-        effort=whole.states.effort,
-        reference=references(whole.controllers, recording.joint_names, len(whole.states.time)),
-        body_position=whole.states.body_position,
-        body_quat_xyzw=whole.states.body_quat_xyzw,
-        contacts=gathered.finish(),
-    )
+    return joined(chosen), tuple(gathered.found)
 
 
 def _picked(span: Span, ticks: npt.NDArray[np.intp]) -> Span:
@@ -87,7 +59,7 @@ class _Contacts:
     def __init__(self) -> None:
         self._now: tuple[Contact, ...] = ()
         self._waiting: list[ContactSnapshot] = []
-        self._found: list[tuple[Contact, ...]] = []
+        self.found: list[tuple[Contact, ...]] = []
 
     def add(self, snapshots: Iterable[ContactSnapshot], times: Array) -> None:
         self._waiting += snapshots
@@ -104,30 +76,4 @@ class _Contacts:
                     if known is None or one.force >= known.force:
                         strongest[one.a, one.b] = one
             del self._waiting[:taken]
-            self._found.append(tuple(strongest[pair] for pair in sorted(strongest)))
-
-    def finish(self) -> tuple[tuple[Contact, ...], ...]:
-        return tuple(self._found)
-
-
-def plot_tables(recording: Recording, robot: RobotModel | None) -> tuple[PlotTable, ...]:
-    """The curves of a recording, every tick of it.
-
-    Args:
-        recording: any.
-        robot: says the units of joints and where the tool is; None: neither.
-    """
-    whole = joined(recording.spans)
-    states, names = whole.states, recording.joint_names
-    reference = references(whole.controllers, names, len(states.time))
-    forces = force_table(states.time, _held(whole.contacts, states.time))
-    return (
-        *joint_tables(names, robot, states.time, states.position, states.velocity, states.effort, reference),
-        *((forces,) if forces.columns else ()),
-    )
-
-
-def _held(snapshots: Sequence[ContactSnapshot], times: Array) -> list[tuple[Contact, ...]]:
-    """What touches at each of `times` (T,) [s]."""
-    last = np.searchsorted([one.time for one in snapshots], times, side="right") - 1
-    return [snapshots[k].contacts if k >= 0 else () for k in last.tolist()]
+            self.found.append(tuple(strongest[pair] for pair in sorted(strongest)))

@@ -73,57 +73,37 @@ def surface(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = N
 
 
 def box_surface(box: Box) -> Surface:
-    """Twelve triangles, four vertices a side."""
-    corners: list[Array] = []
-    faces: list[list[int]] = []
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            first = len(corners)
-            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-                corner = np.zeros(3)
-                corner[axis], corner[u], corner[v] = sign, a, b
-                corners.append(corner)
-            side = [(0, 1, 2), (0, 2, 3)] if sign > 0 else [(0, 2, 1), (0, 3, 2)]
-            faces += [[first + k for k in triangle] for triangle in side]
-    return surface(np.array(corners) * np.asarray(box.size) / 2.0, faces)
+    """Twelve triangles; the sides share no vertex."""
+    corners = np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)]) - 0.5
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))]
+    return smoothed(corners * np.asarray(box.size), faces)
 
 
 def sphere_surface(sphere: Sphere) -> Surface:
     """Circles of latitude between two poles."""
-    rings = SEGMENTS // 2
-    polar = np.linspace(0.0, math.pi, rings + 1)[1:-1]
-    around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
-    theta, phi = np.meshgrid(polar, around, indexing="ij")
-    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-    top, bottom = len(polar) * SEGMENTS, len(polar) * SEGMENTS + 1
-    k, after = np.arange(SEGMENTS), (np.arange(SEGMENTS) + 1) % SEGMENTS
-    faces = [np.stack([np.full(SEGMENTS, top), k, after], axis=1)]
-    for ring in range(len(polar) - 1):
-        upper, lower = ring * SEGMENTS, (ring + 1) * SEGMENTS
-        faces.append(np.stack([upper + k, lower + k, lower + after], axis=1))
-        faces.append(np.stack([upper + k, lower + after, upper + after], axis=1))
-    last = (len(polar) - 1) * SEGMENTS
-    faces.append(np.stack([np.full(SEGMENTS, bottom), last + after, last + k], axis=1))
-    vertices = np.vstack([points.reshape(-1, 3), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    return surface(sphere.radius * vertices, np.concatenate(faces))
+    polar = np.linspace(0.0, math.pi, SEGMENTS // 2 + 1)
+    return _revolved(sphere.radius * np.stack([np.sin(polar), np.cos(polar)], axis=1))
 
 
 def cylinder_surface(cylinder: Cylinder) -> Surface:
     """A round side and two flat ends, with vertices of their own so that the rims stay sharp."""
+    radius, half = cylinder.radius, cylinder.length / 2.0
+    return _revolved(np.array([(0.0, half), (radius, half), (radius, -half), (0.0, -half)]))
+
+
+def _revolved(profile: Array) -> Surface:
+    """The surface that a line of points (radius, z), from top to bottom, makes around the z axis."""
     around = np.arange(SEGMENTS) * 2.0 * math.pi / SEGMENTS
-    circle = cylinder.radius * np.stack([np.cos(around), np.sin(around), np.zeros(SEGMENTS)], axis=1)
-    half = np.array([0.0, 0.0, cylinder.length / 2.0])
-    vertices = np.vstack([circle - half, circle + half, circle - half, circle + half, [-half, half]])
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1)
+    rings = [np.column_stack([radius * circle, np.full(SEGMENTS, z)]) for radius, z in profile]
     k, after = np.arange(SEGMENTS), (np.arange(SEGMENTS) + 1) % SEGMENTS
-    low, high = 2 * SEGMENTS, 3 * SEGMENTS
-    faces = [
-        np.stack([k, after, SEGMENTS + after], axis=1),
-        np.stack([k, SEGMENTS + after, SEGMENTS + k], axis=1),
-        np.stack([np.full(SEGMENTS, 4 * SEGMENTS), low + after, low + k], axis=1),
-        np.stack([np.full(SEGMENTS, 4 * SEGMENTS + 1), high + k, high + after], axis=1),
-    ]
-    return surface(vertices, np.concatenate(faces))
+    faces = []
+    for upper in range(0, (len(profile) - 1) * SEGMENTS, SEGMENTS):
+        lower = upper + SEGMENTS
+        faces += [np.stack([upper + k, lower + k, lower + after], axis=1)]
+        faces += [np.stack([upper + k, lower + after, upper + after], axis=1)]
+    return smoothed(np.concatenate(rings), np.concatenate(faces))
 
 
 def smoothed(vertices: npt.ArrayLike, faces: npt.ArrayLike, rgba: Rgba | None = None) -> Surface:

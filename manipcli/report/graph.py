@@ -1,30 +1,23 @@
-"""Who feeds whom, as a tree for a terminal, for Graphviz, for Mermaid and as JSON."""
+"""Data-flow graph of a task or a log: a tree for a terminal, a flowchart for Mermaid, JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
 from manipcli.core.text import escape
 from manipcli.report.json import Json, dumps
 
 Kind = Literal["task", "planner", "controller", "limits", "drive", "engine", "sensor", "robot", "scene", "topic"]
-GraphFormat = Literal["text", "dot", "mermaid", "json"]
+GraphFormat = Literal["text", "mermaid", "json"]
 
-_SHAPES: Final[Mapping[Kind, tuple[str, str, str]]] = {
-    # of Graphviz, and what stands around a label of Mermaid
-    "task": ("note", "[", "]"),
-    "planner": ("box", "[", "]"),
-    "controller": ("box", "[", "]"),
-    "limits": ("box", "[", "]"),
-    "drive": ("box", "[", "]"),
-    "engine": ("box3d", "[[", "]]"),
-    "sensor": ("parallelogram", "[/", "/]"),
-    "robot": ("note", "[", "]"),
-    "scene": ("note", "[", "]"),
-    "topic": ("ellipse", "([", "])"),
+_BRACKETS: Final[Mapping[Kind, tuple[str, str]]] = {
+    "engine": ("[[", "]]"),
+    "sensor": ("[/", "/]"),
+    "topic": ("([", "])"),
 }
+"""Of a label in Mermaid, which give a node its shape; all other kinds are rectangles."""
 _SAID: Final = ("task", "controller", "engine", "robot", "scene")
 """Kinds whose names do not say what they are."""
 
@@ -85,7 +78,7 @@ class Graph:
 
 def render(graph: Graph, kind: GraphFormat) -> str:
     """The graph in one of its formats."""
-    return {"text": render_text, "dot": render_dot, "mermaid": render_mermaid, "json": render_json}[kind](graph)
+    return {"text": render_text, "mermaid": render_mermaid, "json": render_json}[kind](graph)
 
 
 def render_text(graph: Graph) -> str:
@@ -124,35 +117,12 @@ def render_text(graph: Graph) -> str:
     return "\n".join(lines)
 
 
-def render_dot(graph: Graph) -> str:
-    """For Graphviz: `manipcli graph TASK --format dot | dot -Tsvg`."""
-    numbers = {node.id: f"n{k}" for k, node in enumerate(graph.nodes)}
-    lines = [f"digraph {_dot(graph.name)} {{", "  rankdir=LR;", '  node [fontname="sans-serif"];']
-    lines.append('  edge [fontname="sans-serif", fontsize=10];')
-    for node in graph.nodes:
-        style = ", style=dashed" if node.idle else ""
-        lines.append(f"  {numbers[node.id]} [shape={_SHAPES[node.kind][0]}, label={_dot(*_label(node))}{style}];")
-    for edge in graph.edges:
-        words = [f"label={_dot(edge.label)}"] if edge.label else []
-        words += ["style=dashed"] if edge.idle else []
-        words += ["constraint=false"] if edge.back else []
-        about = f" [{', '.join(words)}]" if words else ""
-        lines.append(f"  {numbers[edge.source]} -> {numbers[edge.target]}{about};")
-    return "\n".join([*lines, "}"])
-
-
-def _dot(*lines: str) -> str:
-    """A quoted string; a line ends with `\\l`, which also sets it to the left, where there are several."""
-    quoted = [escape(line).replace("\\", "\\\\").replace('"', '\\"') for line in lines]
-    return f'"{quoted[0]}"' if len(quoted) == 1 else '"' + "".join(f"{line}\\l" for line in quoted) + '"'
-
-
 def render_mermaid(graph: Graph) -> str:
     """For Mermaid, as in Markdown of code hosts."""
     numbers = {node.id: f"n{k}" for k, node in enumerate(graph.nodes)}
     lines = ["flowchart LR"]
     for node in graph.nodes:
-        _, left, right = _SHAPES[node.kind]
+        left, right = _BRACKETS.get(node.kind, ("[", "]"))
         label = "<br/>".join(map(_mermaid, _label(node)))
         lines.append(f'  {numbers[node.id]}{left}"{label}"{right}')
     for edge in graph.edges:
@@ -176,18 +146,7 @@ def _label(node: Node) -> tuple[str, ...]:
 
 def render_json(graph: Graph) -> str:
     """Nodes and edges as they are."""
-    nodes: list[Json] = [
-        {
-            "id": node.id,
-            "kind": node.kind,
-            "name": node.name,
-            "type": node.type or None,
-            "details": list(node.details),
-            "items": list(node.items),
-            "idle": node.idle,
-        }
-        for node in graph.nodes
-    ]
+    nodes: list[Json] = [asdict(node) | {"type": node.type or None} for node in graph.nodes]
     edges: list[Json] = [
         {"source": one.source, "target": one.target, "label": one.label, "idle": one.idle, "feedback": one.back}
         for one in graph.edges

@@ -24,14 +24,18 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.slow
-def test_an_overview_comes_to_the_terminal(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plot", str(log)]) == 0
+def test_an_overview_is_drawn_where_nothing_is_asked_for(log: Path) -> None:
+    axes = [panel.axis for panel in open_chart([log], []).panels]
+    assert axes[:3] == ["position [rad]", "velocity [rad/s]", "effort [N m]"]
+    assert any(panel.title.endswith("error.positions") for panel in open_chart([log], []).panels)
+
+
+def test_without_an_output_the_options_that_make_one_are_named(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", str(log)]) == 4
     told = capsys.readouterr()
-    for word in ("joint_states.position  [rad]", "joint_states.effort", "error.positions", "joint_1"):
-        assert word in told.out
-    assert told.err == ""
-    assert "\x1b" not in told.out
+    assert told.out == ""
+    assert "error[USE065]: no output is given" in told.err
+    assert all(option in told.err for option in ("-o FILE.svg", "--csv -", "--fields"))
 
 
 @pytest.mark.slow
@@ -131,6 +135,7 @@ def test_what_there_is_to_plot_is_listed(log: Path, capsys: pytest.CaptureFixtur
         (["-o", "a.gif"], "USE061", ".svg, .png, .pdf"),
         (["-o", "absent/a.svg"], "USE082", "--output 'absent/a.svg': there is no folder 'absent'"),
         (["gone.mcap"], "LOG300", "No such file"),
+        (["joint_states.position"] * 31, "PLOT005", "more than 400 curves"),
     ],
 )
 def test_what_cannot_be_plotted_is_refused(
@@ -143,7 +148,7 @@ def test_what_cannot_be_plotted_is_refused(
     says: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["plot", str(log), *words]) == 4
+    assert main(["plot", str(log), *words, *([] if "-o" in words else ["--csv", "-"])]) == 4
     told = capsys.readouterr()
     assert told.out == ""
     assert f"error[{code}]" in told.err
@@ -153,17 +158,17 @@ def test_what_cannot_be_plotted_is_refused(
 
 def test_a_joint_is_told_to_stand_in_brackets(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for given in ("joint_states.joint_4.position", "joint_states.joint_4"):
-        assert main(["plot", str(log), given]) == 4
+        assert main(["plot", str(log), given, "--csv", "-"]) == 4
         hint = "brackets pick an element: joint_states[joint_4].FIELD; fields: position, velocity, effort\n"
         assert hint in capsys.readouterr().err
     assert open_chart([log], ["joint_states[joint_4].position"]).panels[0].labels == ("joint_4",)
-    assert main(["plot", str(log), "joint_states.positions"]) == 4
+    assert main(["plot", str(log), "joint_states.positions", "--csv", "-"]) == 4
     assert "brackets" not in capsys.readouterr().err
 
 
 def test_what_a_hint_says_of_a_body_can_be_plotted(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     moves = open_chart([log], ["tf.translation.x"]).panels[0].labels[-1]
-    assert main(["plot", str(log), f"tf.{moves}.z"]) == 4
+    assert main(["plot", str(log), f"tf.{moves}.z", "--csv", "-"]) == 4
     hint = capsys.readouterr().err
     assert f"tf[{moves}].FIELD; fields: transform.translation.x, " in hint
     for field in hint.split("fields: ")[1].split(", "):

@@ -27,11 +27,11 @@ def test_a_moment_all_steps_and_a_film_are_drawn_at_once(
     log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(ROOT)
-    picture, sheet, film = (tmp_path / name for name in ("a.png", "b.png", "c.webp"))
-    words = ["--picture", picture, "--at", "0.2", "--sheet", sheet, "--video", film, "--size", "160x120", "--fps", "5"]
+    picture, sheet, video = (tmp_path / name for name in ("a.png", "b.png", "c.webp"))
+    words = ["--picture", picture, "--at", "0.2", "--sheet", sheet, "--video", video, "--size", "160x120", "--fps", "5"]
     assert main(["replay", str(log), *map(str, words)]) == 0
     told = capsys.readouterr()
-    assert told.out.split() == [str(picture), str(sheet), str(film)]
+    assert told.out.split() == [str(picture), str(sheet), str(video)]
     assert "frames/s" in told.err
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a.png", "b.png", "c.webp"]
     with Image.open(picture) as image:

@@ -202,11 +202,10 @@ def test_options_that_show_a_run_are_refused_where_it_is_verified(capsys: pytest
     shows = ["--picture", "x.png", "--at", "1", "--size", "9x9", "--view", "iso", "--fps", "25", "--speed", "1"]
     shows += ["--robot", "left", "--port", "8765", "--open"]
     assert main(["replay", "absent.mcap", "--verify", *shows]) == 4
-    told = "USE080]: --verify shows nothing: leave out --picture, --at, --size, --view, --fps, --speed, --robot, "
-    told += "--port, --open"
+    told = "USE080]: --picture, --at, --size, --view, --fps, --speed, --robot, --port, --open: no effect with --verify"
     assert told in capsys.readouterr().err
     assert main(["replay", "absent.mcap", "--allow-different", "--format", "json"]) == 4
-    assert "--allow-different, --format json are for --verify alone" in capsys.readouterr().out
+    assert "--allow-different, --format json: no effect without --verify" in capsys.readouterr().out
 
 
 @pytest.mark.slow

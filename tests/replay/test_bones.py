@@ -9,8 +9,7 @@ import numpy as np
 
 from manipcli.description.elements import Link
 from manipcli.model.robot import RobotModel
-from manipcli.replay.bones import bones
-from manipcli.replay.drawing import draw
+from manipcli.replay.drawing import bones, draw
 from manipcli.shapes.primitives import Geometry, Mesh
 from manipcli.task.viewed import load_sight
 

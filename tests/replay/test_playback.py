@@ -27,6 +27,7 @@ from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
 from manipcli.replay.drawing import draw
 from manipcli.replay.playback import Playback, PlaybackStep
+from manipcli.replay.player import player_page
 from manipcli.replay.sampling import _Contacts, sampled
 from manipcli.shapes.primitives import Mesh
 
@@ -97,16 +98,17 @@ def test_the_times_are_the_ticks_nearest_to_the_rate(log: Path) -> None:
     recording = read_recording(log)
     ticks = recording.states.time
     for rate in (50.0, 30.0, 7.0, 5000.0):
-        samples = sampled(recording, rate=rate)
+        chosen_span, _ = sampled(recording, rate=rate) or pytest.fail("nothing is recorded")
+        samples = chosen_span.states
         goals = np.arange(0.0, ticks[-1] + 1e-12, 1.0 / rate)
         nearest = {int(np.argmin(np.abs(ticks - goal))) for goal in goals} | {0, len(ticks) - 1}
         # Half way between two ticks either is the nearest.
-        chosen = {int(np.flatnonzero(ticks == time)[0]) for time in samples.times}
-        assert len(chosen) == len(samples.times)
+        chosen = {int(np.flatnonzero(ticks == time)[0]) for time in samples.time}
+        assert len(chosen) == len(samples.time)
         assert all(min(abs(one - other) for other in nearest) <= 1 for one in chosen)
         assert abs(len(chosen) - len(nearest)) <= 1
-        assert samples.times[0] == ticks[0]
-        assert samples.times[-1] == ticks[-1]
+        assert samples.time[0] == ticks[0]
+        assert samples.time[-1] == ticks[-1]
         np.testing.assert_array_equal(samples.position, recording.states.position[sorted(chosen)])
 
 
@@ -138,12 +140,14 @@ def test_steps_and_phases_stand_where_the_events_say(log: Path, playback: Playba
 
 
 @pytest.mark.slow
-def test_curves_at_the_full_rate_are_those_of_the_log(log: Path, playback: Playback) -> None:
-    whole = {one.name: one for one in playback.tables()}
-    np.testing.assert_array_equal(whole["joint position"].values, read_recording(log).states.position)
+def test_the_curves_are_those_of_the_log(log: Path, playback: Playback) -> None:
+    states = read_recording(log).states
+    ticks = np.searchsorted(states.time, playback.times)
+    curves = {one.name: one for one in playback.curves()}
+    np.testing.assert_array_equal(curves["joint position"].values, states.position[ticks])
     tool = draw(playback.robot).marks[0]
     X = _in_world(tool.frame.removeprefix("robot/"), _transforms(log)[0]) @ tool.X_FM.matrix
-    np.testing.assert_allclose(whole["tool position"].values[0], X[:3, 3], atol=1e-9)
+    np.testing.assert_allclose(curves["tool position"].values[0], X[:3, 3], atol=1e-9)
 
 
 def test_no_touch_between_two_times_is_lost() -> None:
@@ -153,7 +157,7 @@ def test_no_touch_between_two_times_is_lost() -> None:
     gathered = _Contacts()
     gathered.add([touch(0.0, ("b", 1.0)), touch(0.011, ("b", 9.0), ("c", 2.0)), touch(0.012)], np.array([0.0, 0.02]))
     gathered.add([touch(0.05, ("c", 3.0))], np.array([0.04, 0.06]))
-    found = [[(one.b, one.force) for one in each] for each in gathered.finish()]
+    found = [[(one.b, one.force) for one in each] for each in gathered.found]
     assert found == [[("b", 1.0)], [("b", 9.0), ("c", 2.0)], [], [("c", 3.0)]]
 
 
@@ -456,6 +460,9 @@ def test_without_a_description_there_are_frames_and_curves(tmp_path: Path) -> No
     assert {body.name for body in shown.scene.bodies} >= {"base", "camera"}  # type: ignore[union-attr]
     assert [one.name for one in shown.curves()] == ["joint position"]
     assert "no /robot_description" in "\n".join(shown.notes)
+    page = player_page(shown)
+    assert "manipcli did not write this log" in page
+    assert '"frames":[' in page and '"curves":[{"name":"joint position"' in page
 
 
 def test_a_log_with_nothing_that_moves_is_refused(tmp_path: Path) -> None:

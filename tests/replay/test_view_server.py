@@ -18,9 +18,7 @@ from websockets.typing import Origin, Subprotocol
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.description.elements import Joint, JointLimits
-from manipcli.replay.panel import pose_text, slider_range
-from manipcli.replay.server import is_meant_for
-from manipcli.replay.view import View
+from manipcli.replay.view import View, pose_text, slider_range
 from manipcli.task.viewed import load_sight
 
 ROOT = Path(__file__).parents[2]
@@ -83,23 +81,6 @@ def test_no_other_page_gets_the_data(page: View) -> None:
         with pytest.raises(InvalidStatus) as refused:
             connect(url, origin=Origin(origin), subprotocols=protocols)
         assert refused.value.response.status_code == 403
-
-
-@pytest.mark.parametrize(
-    ("host", "origin", "meant"),
-    [
-        ("127.0.0.1:80", None, True),
-        ("localhost:80", "http://localhost:80", True),
-        ("127.0.0.1:80", "http://localhost:80", True),
-        (None, None, False),
-        ("127.0.0.1", None, False),
-        ("127.0.0.1:81", None, False),
-        ("127.0.0.1:80", "https://127.0.0.1:80", False),
-        ("127.0.0.1:80", "http://127.0.0.1:80.evil.example", False),
-    ],
-)
-def test_who_is_meant(host: str | None, origin: str | None, meant: bool) -> None:
-    assert is_meant_for(host, origin, 80) is meant
 
 
 def test_nobody_can_ask_for_a_tunnel(page: View) -> None:

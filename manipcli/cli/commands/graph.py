@@ -1,4 +1,4 @@
-"""`manipcli graph TASK|LOG`: who feeds whom."""
+"""`manipcli graph TASK|LOG`: the data-flow graph."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def graph(
     file: Annotated[Path, typer.Argument(metavar="TASK|LOG", help="A task file, or a log.", show_default=False)],
     *,
     format_: Annotated[
-        Literal["text", "dot", "mermaid", "json"],
-        typer.Option("--format", help="A tree, a graph for Graphviz or for Mermaid, or one JSON object."),
+        Literal["text", "mermaid", "json"],
+        typer.Option("--format", help="A tree, a flowchart for Mermaid, or one JSON object."),
     ] = "text",
     package_path: PackagePath = None,
     allow_outside: AllowOutside = False,
 ) -> ExitCode:
-    """Show who feeds whom, from the task to the topics.
+    """Show the data-flow graph, from the task to the topics.
 
     Task, planner, controllers, joint limits, drives, engine, sensors, topics; of a log with how many messages each has.
     """

@@ -1,4 +1,4 @@
-"""`manipcli plot LOG... [TOPIC.FIELD...]`: curves of a log in the terminal, in a file or as a table."""
+"""`manipcli plot LOG... [TOPIC.FIELD...]`: curves of a log as a figure or a table."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def plot(
 ) -> ExitCode:
     """Plot numbers of one log, or of several over each other.
 
-    In the terminal, with -o in a file, with --csv as a table. Any ROS 2 log will do.
+    -o writes a figure, --csv a table, --fields lists the numbers of a log. Any ROS 2 log will do.
     """
     logs = [Path(word) for word in words if _is_log(word)]
     asked = [word for word in words if not _is_log(word)]
@@ -61,6 +61,9 @@ def plot(
     if format_ == "json":
         message = "--format json is for --fields alone"
         raise InvalidInput([Finding("USE064", message, hint="`--csv -` gives the numbers")])
+    if output is None and csv is None:
+        hint = "-o FILE.svg writes a figure, --csv - prints a table, --fields lists what can be plotted"
+        raise InvalidInput([Finding("USE065", "no output is given: expected --output, --csv or --fields", hint=hint)])
     check_outputs(("--output", output), ("--csv", Path(csv) if csv not in (None, "-") else None), reads=logs)
     kind = None
     if output is not None:
@@ -81,11 +84,6 @@ def plot(
         console.talk(f"drawn: {output}")
     if csv is not None:
         _write_table(chart, csv)
-    if output is None and csv is None:
-        from manipcli.replay import terminal_plot
-
-        lines = terminal_plot.render(chart, columns=console.columns(), colours=console.is_coloured())
-        console.painted([[(piece.text, piece.colour) for piece in line] for line in lines])
     return ExitCode.PASSED
 
 
@@ -98,7 +96,7 @@ def _write_table(chart: Chart, csv: str) -> None:
     from io import StringIO
 
     from manipcli.core.whole_file import write_whole
-    from manipcli.replay.curve_table import write_table
+    from manipcli.replay.curves import write_table
 
     stream = StringIO()
     write_table(chart, stream)

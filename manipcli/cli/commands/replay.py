@@ -1,4 +1,4 @@
-"""`manipcli replay LOG`: a run in the browser, or as a page that plays by itself."""
+"""`manipcli replay LOG`: a run in the browser, as a page, as pictures or as a video."""
 
 from __future__ import annotations
 
@@ -27,49 +27,51 @@ def replay(
     *,
     html: Annotated[
         Path | None,
-        typer.Option("--html", metavar="FILE", help="Write one page that plays offline, instead of serving one."),
+        typer.Option("--html", metavar="FILE", help="Write the page to FILE instead of serving it; it plays offline."),
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw one moment of the run.")
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Draw the run at one time.")
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step; the end of the run when absent."),
+        typer.Option("--at", metavar="T", help="With --picture: seconds, or a step [default: end of the run]."),
     ] = None,
     sheet: Annotated[
         Path | None,
-        typer.Option("--sheet", metavar="FILE.png", help="Draw all steps, each at its most telling moment."),
+        typer.Option("--sheet", metavar="FILE.png", help="Draw all steps on one contact sheet."),
     ] = None,
     video: Annotated[
         Path | None,
-        typer.Option("--video", metavar="FILE", help="Make a film: .webp, .gif, or .mp4 with the extra 'video'."),
+        typer.Option("--video", metavar="FILE", help="Write a video: .webp, .gif, or .mp4 with the extra 'video'."),
     ] = None,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="Of a picture, 960x720 when absent; of a film, 640x360.")
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Size of pictures [default: 960x720, videos: 640x360]."),
     ] = None,
     view: Annotated[
         str | None,
         typer.Option(
             "--view",
             metavar="VIEW",
-            help="Of pictures and films: iso, front, back, left, right, top, or AZIMUTH,ELEVATION; iso when absent.",
+            help="View of pictures: iso, front, back, left, right, top, or AZIMUTH,ELEVATION [default: iso].",
         ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", metavar="N", help="Frames of a film in one second; 25 when absent.")
+        float | None, typer.Option("--fps", metavar="N", help="Frames of a video per second [default: 25].")
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", metavar="X", help="Seconds of the run in one second of a film; 1 when absent."),
+        typer.Option("--speed", metavar="X", help="Seconds of the run per second of a video [default: 1]."),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option("--robot", metavar="NAMESPACE", help="Of several robots in a ROS 2 log, as /left.")
+        str | None,
+        typer.Option("--robot", metavar="NAMESPACE", help="Robot to show, where a log has several."),
     ] = None,
     port: PagePort = None,
     open_: OpenPage = False,
     verify: Annotated[
         bool,
-        typer.Option("--verify", help="Show nothing: simulate the run again from the log, and compare every message."),
+        typer.Option("--verify", help="Simulate the run again from the log and compare every message."),
     ] = False,
     allow_different: Annotated[
         bool, typer.Option("--allow-different", help="With --verify: also with other versions or meshes.")
@@ -86,7 +88,7 @@ def replay(
     drawn = (("--at", at), ("--size", size), ("--view", view), ("--fps", fps), ("--speed", speed))
     shows = (*files, *drawn, ("--robot", robot), ("--port", port), ("--open", open_ or None))
     verifies = (("--allow-different", allow_different or None), ("--format json", format_ == "json" or None))
-    _check_options(verify=verify, shows=shows, verifies=verifies)
+    _refuse(shows if verify else verifies, verify=verify)
     with Interrupts() as interrupts:
         if verify:
             from manipcli.cli.commands.verify import verify as verified
@@ -104,7 +106,9 @@ def replay(
         from manipcli.logs.replay import open_playback
 
         check_outputs(*files, reads=(log,))
-        pictures = Pictures(picture, at, sheet, video, size=size, view=view, fps=fps, speed=speed)
+        pictures = Pictures(
+            picture=picture, at=at, sheet=sheet, video=video, size=size, view=view, fps=fps, speed=speed
+        )
         playback = open_playback(
             log,
             rate=pictures.rate,
@@ -116,45 +120,37 @@ def replay(
     return ExitCode.PASSED
 
 
-def _check_options(
-    *, verify: bool, shows: Sequence[tuple[str, object]], verifies: Sequence[tuple[str, object]]
-) -> None:
-    """Refuses options of the other use; those that are None were not given.
-
-    Args:
-        verify: whether the run is verified.
-        shows: options (name, value) of what shows a run.
-        verifies: options of what verifies one.
+def _refuse(options: Sequence[tuple[str, object]], *, verify: bool) -> None:
+    """Refuses the options of the other use; those that are None were not given.
 
     Raises:
-        InvalidInput: of the two uses both are meant.
+        InvalidInput: an option has no effect.
     """
-    asked = [option for option, value in (shows if verify else verifies) if value is not None]
-    if not asked:
-        return
-    if verify:
-        message = f"--verify shows nothing: leave out {listed(asked)}"
-    else:
-        message = f"{listed(asked)} {'is' if len(asked) == 1 else 'are'} for --verify alone"
-    raise InvalidInput([Finding("USE080", message)])
+    given = [option for option, value in options if value is not None]
+    if given:
+        reason = "with" if verify else "without"
+        raise InvalidInput([Finding("USE080", f"{listed(given)}: no effect {reason} --verify")])
 
 
 def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:
-    """Tells what is missing, writes the files asked for; where none is, serves the page until Ctrl-C."""
+    """Prints what is missing and writes the requested files; without any, serves the page until Ctrl-C."""
     if playback.lost is not None:
         console.talk(f"the log is not closed: {playback.lost}")
     for note in playback.notes:
         console.talk(f"note: {note}")
-    if html is not None:
-        from manipcli.core.whole_file import write_whole
+    pages = html is not None or not pictures.wanted
+    if pages:
         from manipcli.replay.player import player_page
 
-        write_whole(html, player_page(playback).encode())
+        page = player_page(playback)
+    if html is not None:
+        from manipcli.core.whole_file import write_whole
+
+        write_whole(html, page.encode())
         console.result(str(html))
     pictures.make(playback)
-    if html is not None or pictures.wanted:
-        return
-    from manipcli.replay.replay import Replay
+    if html is None and pages:
+        from manipcli.replay.page_server import PageServer
 
-    with Replay(playback, port=port) as page:
-        stay(page, open_=open_)
+        with PageServer(page, port=port) as server:
+            stay(server.url, open_=open_)

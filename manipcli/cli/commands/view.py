@@ -47,5 +47,5 @@ def view(
             console.talk(text.describe(finding))
         with View(sight.robot, sight.scene, q=sight.q, port=port) as page:
             console.not_drawn(page.missing)
-            stay(page, open_=open_)
+            stay(page.url, open_=open_)
     return ExitCode.PASSED

@@ -1,4 +1,4 @@
-"""Pictures, sheets and films of a run: what is seen where, what is written in, how many and how long."""
+"""Pictures, sheets and videos of a run: what is seen where, what is written in, how many and how long."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ from PIL import Image
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
 from manipcli.judge.verdict import StepOutcome, Verdict
-from manipcli.replay import film as films
-from manipcli.replay import sheet as sheets
+from manipcli.replay import contact_sheet as sheets
+from manipcli.replay import video as videos
 from manipcli.replay.camera import VIEWS, Camera, direction
 from manipcli.replay.caption import NOW
 from manipcli.replay.drawing import draw
-from manipcli.replay.image import png_bytes
-from manipcli.replay.picture import Studio
+from manipcli.replay.frames import Frames, moment, parse_size, telling
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
-from manipcli.replay.shots import Shots, moment, parse_size, telling
+from manipcli.replay.renderer import Renderer, png_bytes
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry, Sphere
 
@@ -104,17 +103,17 @@ def middle_of(image: np.ndarray, channel: int) -> tuple[float, float]:
 
 def test_things_are_where_the_camera_says() -> None:
     playback = run()
-    with Shots(playback, size=SIZE, captions=False) as shots:
+    with Frames(playback, size=SIZE, captions=False) as frames:
         for time in (0.0, 0.5, 1.0, 1.7, 2.0):
             k = playback.index(time)
-            expected = seen_at(shots.camera, tuple(playback.body_position[k, 0]), SIZE)
-            assert middle_of(shots.at(time), 0) == pytest.approx(expected, abs=1.5)
-            expected = seen_at(shots.camera, (0.0, -0.15, 0.0), SIZE)
-            assert middle_of(shots.at(time), 1) == pytest.approx(expected, abs=2.5)
+            expected = seen_at(frames.camera, tuple(playback.body_position[k, 0]), SIZE)
+            assert middle_of(frames.at(time), 0) == pytest.approx(expected, abs=1.5)
+            expected = seen_at(frames.camera, (0.0, -0.15, 0.0), SIZE)
+            assert middle_of(frames.at(time), 1) == pytest.approx(expected, abs=2.5)
         points = playback.body_position[::10, 0]
-        x, y, depth = shots.camera.project(points, SIZE)
+        x, y, depth = frames.camera.project(points, SIZE)
         for k, point in enumerate(points):
-            assert (x[k], y[k]) == pytest.approx(seen_at(shots.camera, tuple(point), SIZE))
+            assert (x[k], y[k]) == pytest.approx(seen_at(frames.camera, tuple(point), SIZE))
         assert (depth > 0).all()
 
 
@@ -122,10 +121,10 @@ def test_things_are_where_the_camera_says() -> None:
 @pytest.mark.parametrize("view", [*VIEWS, "90,0", "-45,60", "10,-20", "0,90"])
 def test_all_of_the_run_is_in_view_from_everywhere(view: str) -> None:
     playback = run()
-    with Shots(playback, size=SIZE, towards=direction(view)) as shots:
-        x, y, depth = shots.camera.project(playback.body_position.reshape(-1, 3), SIZE)
+    with Frames(playback, size=SIZE, towards=direction(view)) as frames:
+        x, y, depth = frames.camera.project(playback.body_position.reshape(-1, 3), SIZE)
         assert x.min() > 0.0 and x.max() < SIZE[0] and y.min() > 0.0 and y.max() < SIZE[1] and depth.min() > 0.0
-        backward = np.subtract(shots.camera.eye, shots.camera.target)
+        backward = np.subtract(frames.camera.eye, frames.camera.target)
         assert np.cross(backward, direction(view)) == pytest.approx(np.zeros(3), abs=1e-6)
 
 
@@ -144,7 +143,7 @@ def test_what_stands_still_is_drawn_once_and_looks_the_same() -> None:
     camera = Camera((1.6, 0.5, 0.5), (0.0, 0.1, 0.0))
     near = Camera((0.2, -0.15, 0.05), (0.0, -0.15, 0.0))  # its near plane is in the cube
     away = Camera((1.6, 0.5, 0.5), (3.0, 0.5, 0.5))
-    with Studio(drawing, size=SIZE) as whole, Studio(drawing, size=SIZE, still=placing.still) as parts:
+    with Renderer(drawing, size=SIZE) as whole, Renderer(drawing, size=SIZE, still=placing.still) as parts:
         for one in (camera, near, away, camera):
             for k in (0, 50, 100):
                 now = Poses(poses.position[k], poses.quat_xyzw[k])
@@ -154,8 +153,8 @@ def test_what_stands_still_is_drawn_once_and_looks_the_same() -> None:
 
 def test_step_time_and_timeline_are_written_in() -> None:
     playback = run()
-    with Shots(playback, size=(320, 240)) as shots, Shots(playback, size=(320, 240), captions=False) as bare:
-        drawn = {time: shots.at(time) for time in (0.5, 1.5, 2.0)}
+    with Frames(playback, size=(320, 240)) as frames, Frames(playback, size=(320, 240), captions=False) as bare:
+        drawn = {time: frames.at(time) for time in (0.5, 1.5, 2.0)}
         plain = {time: bare.at(time) for time in drawn}
     changed = {time: np.any(drawn[time] != plain[time], axis=2) for time in drawn}
     for image in changed.values():
@@ -175,18 +174,18 @@ def test_step_time_and_timeline_are_written_in() -> None:
 def test_a_long_name_is_cut_and_a_tiny_picture_is_drawn() -> None:
     steps = (replace(STEPS[0], label="x" * 500 + "\x1b"),)
     for size in ((64, 64), (320, 240)):
-        with Shots(run(steps=steps), size=size) as shots:
-            assert shots.at(0.0).shape == (size[1], size[0], 3)
+        with Frames(run(steps=steps), size=size) as frames:
+            assert frames.at(0.0).shape == (size[1], size[0], 3)
 
 
 def test_a_sheet_has_one_tile_a_step_at_its_moment() -> None:
     playback = run()
-    image = sheets.sheet(playback, size=SIZE)
+    image = sheets.contact_sheet(playback, size=SIZE)
     shown = sheets.tiles(playback)
     assert [tile.label for tile in shown] == ["carry_1", "drop_1", "rest_1"]
     assert image.shape[1] == 3 * (SIZE[0] + sheets.GAP) + sheets.GAP
     top = image.shape[0] - sheets.GAP - SIZE[1] - round(2.1 * 9)
-    with Shots(playback, size=SIZE, captions=False) as shots:
+    with Frames(playback, size=SIZE, captions=False) as frames:
         for k, tile in enumerate(shown):
             left = sheets.GAP + k * (SIZE[0] + sheets.GAP)
             part = image[top : top + SIZE[1], left : left + SIZE[0]]
@@ -195,7 +194,7 @@ def test_a_sheet_has_one_tile_a_step_at_its_moment() -> None:
             if tile.time is None:
                 assert (part.reshape(-1, 3) == (240, 242, 245)).all(axis=1).mean() > 0.8
             else:
-                assert np.array_equal(part, shots.at(tile.time))
+                assert np.array_equal(part, frames.at(tile.time))
 
 
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (2, 2), (3, 3), (4, 4), (6, 3), (9, 3), (10, 4), (30, 4)])
@@ -206,7 +205,7 @@ def test_a_sheet_is_about_as_wide_as_a_page(count: int, columns: int) -> None:
 def test_a_run_without_steps_is_shown_by_moments() -> None:
     shown = sheets.tiles(run(steps=(), verdict=None))
     assert [tile.time for tile in shown] == pytest.approx(np.linspace(0.0, 2.0, sheets.MOMENTS))
-    assert sheets.sheet(run(steps=(), verdict=None), size=SIZE).ndim == 3
+    assert sheets.contact_sheet(run(steps=(), verdict=None), size=SIZE).ndim == 3
 
 
 def test_a_step_is_shown_at_its_end_or_while_something_falls() -> None:
@@ -246,47 +245,47 @@ def test_a_film_has_its_frames_and_lasts_as_long_as_the_run(
     tmp_path: Path, ending: str, fps: float, speed: float
 ) -> None:
     playback = run()
-    film = films.cutting(playback, fps=fps, speed=speed)
-    frames = math.floor(2.0 * fps / speed) + 1
-    assert len(film.times) == frames
-    assert np.diff(film.times) == pytest.approx(speed / fps)
+    video = videos.Video.of(playback, fps=fps, speed=speed)
+    count = math.floor(2.0 * fps / speed) + 1
+    assert len(video.times) == count
+    assert np.diff(video.times) == pytest.approx(speed / fps)
     path, told = tmp_path / f"a.{ending}", []
     path.write_bytes(b"old")
-    with Shots(playback, size=(96, 72)) as shots:
-        films.write_film(path, shots, film, progress=lambda done, total: told.append((done, total)))
-    assert told == [(k + 1, frames) for k in range(frames)]
+    with Frames(playback, size=(96, 72)) as frames:
+        videos.write_video(path, frames, video, progress=lambda done, total: told.append((done, total)))
+    assert told == [(k + 1, count) for k in range(count)]
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
     with Image.open(path) as image:
-        assert (image.n_frames, image.size) == (frames, (96, 72))  # type: ignore[attr-defined]
+        assert (image.n_frames, image.size) == (count, (96, 72))  # type: ignore[attr-defined]
         lasted = 0
-        for k in range(frames):
+        for k in range(count):
             image.seek(k)
             image.load()
             lasted += image.info["duration"]
-        assert lasted == pytest.approx(1000.0 * frames / fps, abs=10)
+        assert lasted == pytest.approx(1000.0 * count / fps, abs=10)
 
 
 def test_the_frames_of_a_film_show_the_run(tmp_path: Path) -> None:
     playback = run()
     for ending in ("webp", "gif"):
         path = tmp_path / f"a.{ending}"
-        with Shots(playback, size=SIZE, captions=False) as shots:
-            # Without its clock the film would have equal frames, which are written as one.
-            film = films.Film((0.0, 0.5, 1.0, 1.8), 4.0)
-            films.write_film(path, shots, film)
+        with Frames(playback, size=SIZE, captions=False) as frames:
+            # Without its clock the video would have equal frames, which are written as one.
+            video = videos.Video((0.0, 0.5, 1.0, 1.8), 4.0)
+            videos.write_video(path, frames, video)
             with Image.open(path) as image:
-                for k, time in enumerate(film.times):
+                for k, time in enumerate(video.times):
                     image.seek(k)
                     frame = np.asarray(image.convert("RGB"))
-                    assert np.abs(frame.astype(int) - shots.at(time)).mean() < 4.0
-                    assert middle_of(frame, 0) == pytest.approx(middle_of(shots.at(time), 0), abs=1.5)
+                    assert np.abs(frame.astype(int) - frames.at(time)).mean() < 4.0
+                    assert middle_of(frame, 0) == pytest.approx(middle_of(frames.at(time), 0), abs=1.5)
 
 
 def test_an_mp4_has_its_frames_too(tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     playback, path = run(), tmp_path / "a.mp4"
-    with Shots(playback, size=(97, 73)) as shots:
-        films.write_film(path, shots, films.cutting(playback, fps=10.0))
+    with Frames(playback, size=(97, 73)) as frames:
+        videos.write_video(path, frames, videos.Video.of(playback, fps=10.0))
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert (stream.width, stream.height) == (96, 72)
@@ -297,7 +296,7 @@ def test_an_mp4_has_its_frames_too(tmp_path: Path) -> None:
 def test_without_the_extra_an_mp4_is_refused_with_the_way_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(InvalidArgument, match=r"\.mp4 needs the extra 'video'") as told:
-        films.kind_of(Path("a.mp4"))
+        videos.check_ending(Path("a.mp4"))
     assert "pip install 'manipcli[video]'" in (told.value.findings[0].hint or "")
 
 
@@ -309,8 +308,8 @@ def test_a_film_that_breaks_off_leaves_the_old_one(tmp_path: Path) -> None:
         if done == 3:
             raise KeyboardInterrupt
 
-    with Shots(run(), size=(96, 72)) as shots, pytest.raises(KeyboardInterrupt):
-        films.write_film(path, shots, films.cutting(run(), fps=10.0), progress=stop)
+    with Frames(run(), size=(96, 72)) as frames, pytest.raises(KeyboardInterrupt):
+        videos.write_video(path, frames, videos.Video.of(run(), fps=10.0), progress=stop)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -321,14 +320,14 @@ def test_a_film_that_breaks_off_leaves_the_old_one(tmp_path: Path) -> None:
 )
 def test_what_makes_no_film_is_told(fps: float, speed: float) -> None:
     with pytest.raises(InvalidArgument, match=r"REPLAY014"):
-        films.cutting(run(), fps=fps, speed=speed)
+        videos.Video.of(run(), fps=fps, speed=speed)
 
 
 def test_the_same_picture_is_the_same_bytes() -> None:
     made = []
     for _ in range(2):
-        with Shots(run(), size=SIZE) as shots:
-            made.append(png_bytes(shots.at(1.8)))
+        with Frames(run(), size=SIZE) as frames:
+            made.append(png_bytes(frames.at(1.8)))
     assert made[0] == made[1]
     with Image.open(io.BytesIO(made[0])) as image:
         assert image.size == SIZE

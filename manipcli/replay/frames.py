@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-
 import numpy as np
 import numpy.typing as npt
 
@@ -12,12 +10,10 @@ from manipcli.core.text import did_you_mean, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
 from manipcli.replay.camera import FROM, Camera, Vector, framing
 from manipcli.replay.caption import caption
-from manipcli.replay.drawing import draw
-from manipcli.replay.ground import FLOOR
-from manipcli.replay.image import Image
-from manipcli.replay.picture import Studio
+from manipcli.replay.drawing import FLOOR, draw
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.playback import Playback, PlaybackStep
+from manipcli.replay.renderer import Image, Renderer
 
 Numbers = npt.NDArray[np.int64]
 
@@ -33,8 +29,8 @@ HALF_WAY = 0.6
 """A thing that falls is shown when it has this part of its greatest speed."""
 
 
-class Shots:
-    """A run before a camera that does not move. A context manager: what draws ends with it.
+class Frames(Renderer):
+    """The pictures of a run, from one camera that does not move.
 
     Args:
         playback: the run.
@@ -62,18 +58,12 @@ class Shots:
         self.camera: Camera = framing(
             drawing, self._poses(some), aspect=size[0] / size[1], leave_out=self._furniture(some), towards=towards
         )
-        self._studio = Studio(drawing, size=size, still=self._placing.still)
-
-    def __enter__(self) -> Shots:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self._studio.__exit__(kind, error, at)
+        super().__init__(drawing, size=size, still=self._placing.still)
 
     def at(self, time: float) -> Image:
         """The picture at the recorded moment nearest to `time` [s]."""
         k = self.playback.index(time)
-        image = self._studio.picture(self._poses(k), self.camera)
+        image = self.picture(self._poses(k), self.camera)
         return caption(image, self.playback, float(self.playback.times[k])) if self._captions else image
 
     def _poses(self, k: int | Numbers) -> Poses:

@@ -9,12 +9,12 @@ another page (`Origin`), and has no tunnel. What remains: programs of this machi
 from __future__ import annotations
 
 import http
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from manipcli.core.errors import Finding, InvalidInput, ManipcliError
+from manipcli.core.errors import ManipcliError
+from manipcli.replay.page_server import DEFAULT_PORT, HOST, is_meant_for, unusable_port
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-HOST = "127.0.0.1"
-DEFAULT_PORT = 8080
-
 Answer = Callable[["ServerConnection", "Request"], "Response | None"]
 
 
@@ -33,12 +30,6 @@ class Unguarded(ManipcliError):
     """The installed viser starts its server in another way, so that the checks of requests would not be made."""
 
     code = "VIEW101"
-
-
-def is_meant_for(host: str | None, origin: str | None, port: int) -> bool:
-    """Whether a request with these headers was made for the server at `port`, by its own page or by no page."""
-    names = [f"{HOST}:{port}", f"localhost:{port}"]
-    return host in names and (origin is None or origin in [f"http://{name}" for name in names])
 
 
 class LocalServer:
@@ -69,8 +60,7 @@ class LocalServer:
             raise Unguarded("the installed viser cannot be kept to its own page; install viser 1.1")
         if port and server.get_port() != port:
             self.stop()
-            message = f"port {port} is taken"
-            raise InvalidInput([Finding("VIEW001", message, hint="give another one, or none for the next free one")])
+            raise unusable_port(port)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
         server.gui.main_panel.dock_right()
 
@@ -96,10 +86,6 @@ class LocalServer:
             self._stopped = True
             with _silent():
                 self.viser.stop()
-
-    def wait(self) -> None:
-        """Never returns; a KeyboardInterrupt gets through."""
-        threading.Event().wait()
 
 
 @contextmanager

@@ -1,20 +1,16 @@
-"""A drawing in the browser: its frames as nodes that move, its surfaces as meshes below them.
-
-`view` moves it by sliders, a replay by the states of a log.
-"""
+"""A drawing in the browser with viser: its frames as nodes that move, its surfaces as meshes below them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 import numpy as np
 
 from manipcli.core.geometry import Transform
-from manipcli.replay.camera import Camera, framing
-from manipcli.replay.drawing import LAYERS, WORLD, Drawable, Drawing, Layer
-from manipcli.replay.ground import ground_height
-from manipcli.replay.image import sky
+from manipcli.replay.camera import framing
+from manipcli.replay.drawing import WORLD, Drawable, Drawing, ground_height
 from manipcli.replay.placing import Poses
+from manipcli.replay.renderer import sky
 from manipcli.shapes.primitives import Rgba
 
 if TYPE_CHECKING:
@@ -30,11 +26,15 @@ BRIGHTNESS = 0.7
 """Of the surroundings that light the scene; at 1 colours look washed out."""
 
 
-class _Shown(Protocol):
+Shown = Literal["visual", "collision", "inertia", "frames", "names"]
+"""What can be shown or hidden."""
+
+
+class _Node(Protocol):
     visible: bool
 
 
-class Stage:
+class ViserScene:
     """Shows one drawing on one server.
 
     Args:
@@ -47,13 +47,13 @@ class Stage:
     def __init__(self, server: viser.ViserServer, drawing: Drawing, poses: Poses, *, floors: frozenset[str]) -> None:
         self._server = server
         self._nodes: list[viser.FrameHandle] = []
-        self._layers: dict[Layer, list[_Shown]] = {layer: [] for layer in LAYERS}
+        self._layers: dict[Shown, list[_Node]] = {layer: [] for layer in get_args(Shown)}
         self._solid: list[tuple[viser.MeshHandle, float]] = []
-        self._axes: list[_Shown] = []
-        self._labels: list[_Shown] = []
         camera = framing(drawing, poses, leave_out=floors).further(1.2)
         self._length = AXES * float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
-        _furnish(server)
+        # The presets of lighting come with viser: nothing is fetched.
+        server.scene.configure_environment_map("warehouse", environment_intensity=BRIGHTNESS)
+        server.scene.set_background_image(np.repeat(sky(64), 64, axis=1))
         paths = {frame: _path(frame, k) for k, frame in enumerate(drawing.frames)}
         with server.atomic():
             for frame in drawing.frames:
@@ -66,8 +66,20 @@ class Stage:
                 if drawable.frame not in floors:
                     self._mesh(f"{paths[drawable.frame]}/{drawable.layer}_{k}", drawable)
         self.place(poses)
-        self._ground(drawing, poses, floors)
-        self.look(camera)
+        server.scene.add_grid(  # for the shadows
+            "/ground",
+            width=6.0,
+            height=6.0,
+            cell_size=GRID,
+            section_size=10 * GRID,
+            cell_color=(205, 210, 216),
+            section_color=(165, 172, 180),
+            shadow_opacity=0.25,
+            position=(0.0, 0.0, ground_height(drawing, poses, floors)),
+        )
+        start = server.initial_camera
+        start.position, start.look_at, start.up = camera.eye, camera.target, (0.0, 0.0, 1.0)
+        start.fov = float(np.radians(camera.field))
 
     def _frame(self, path: str, label: str, X: Transform | None = None) -> None:
         """Axes with a name beside them (not below: one is shown without the other), both hidden at first."""
@@ -84,8 +96,8 @@ class Stage:
         name = self._server.scene.add_label(
             f"{path}_name", label, position=X.p, visible=False, font_screen_scale=0.75, anchor="bottom-left"
         )
-        self._axes.append(axes)
-        self._labels.append(name)
+        self._layers["frames"].append(axes)
+        self._layers["names"].append(name)
 
     def _mesh(self, path: str, drawable: Drawable) -> None:
         clear = drawable.rgba[3]
@@ -104,20 +116,6 @@ class Stage:
         if drawable.layer == "visual":
             self._solid.append((mesh, clear))
 
-    def _ground(self, drawing: Drawing, poses: Poses, floors: frozenset[str]) -> None:
-        """A grid for the shadows."""
-        self._server.scene.add_grid(
-            "/ground",
-            width=6.0,
-            height=6.0,
-            cell_size=GRID,
-            section_size=10 * GRID,
-            cell_color=(205, 210, 216),
-            section_color=(165, 172, 180),
-            shadow_opacity=0.25,
-            position=(0.0, 0.0, ground_height(drawing, poses, floors)),
-        )
-
     def place(self, poses: Poses) -> None:
         """Move every frame to where it is at one instant; the browser shows them all at once."""
         with self._server.atomic():
@@ -125,39 +123,15 @@ class Stage:
                 node.position = poses.position[k]
                 node.wxyz = np.roll(poses.quat_xyzw[k], 1)
 
-    def look(self, camera: Camera) -> None:
-        """Where browsers that open from now on look from."""
-        start = self._server.initial_camera
-        start.position, start.look_at, start.up = camera.eye, camera.target, (0.0, 0.0, 1.0)
-        start.fov = float(np.radians(camera.field))
-
-    def show(self, layer: Layer, shown: bool) -> None:
-        """Show or hide all surfaces of a layer."""
-        _set(self._layers[layer], shown)
+    def show(self, layer: Shown, shown: bool) -> None:
+        """Show or hide a layer: surfaces, the axes of all frames and marks, or their names."""
+        for node in self._layers[layer]:
+            node.visible = shown
 
     def see_through(self, clear: bool) -> None:
         """Let the visual meshes show what lies inside of them, or not."""
         for mesh, opacity in self._solid:
             mesh.opacity = CLEAR * opacity if clear else (opacity if opacity < 1.0 else None)
-
-    def show_frames(self, shown: bool) -> None:
-        """Show or hide the axes of all frames and marks."""
-        _set(self._axes, shown)
-
-    def show_labels(self, shown: bool) -> None:
-        """Show or hide the names of all frames and marks."""
-        _set(self._labels, shown)
-
-
-def _furnish(server: viser.ViserServer) -> None:
-    """Light and sky. The presets come with viser: nothing is fetched."""
-    server.scene.configure_environment_map("warehouse", environment_intensity=BRIGHTNESS)
-    server.scene.set_background_image(np.repeat(sky(64), 64, axis=1))
-
-
-def _set(nodes: list[_Shown], shown: bool) -> None:
-    for node in nodes:
-        node.visible = shown
 
 
 def _path(frame: str, k: int) -> str:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.replay.camera import FROM, Vector
-from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, cut, font, text_size
-from manipcli.replay.image import Image
+from manipcli.replay.caption import DONE, FAILED, INK, QUIET, Rgb, font, text_size, write_line
+from manipcli.replay.frames import Frames, telling
 from manipcli.replay.playback import Playback
-from manipcli.replay.shots import Shots, telling
+from manipcli.replay.renderer import Image
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
@@ -51,7 +51,7 @@ def columns_of(count: int) -> int:
     return min(count, 3 if count <= 9 and count != 4 else 4)
 
 
-def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
+def contact_sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector = FROM) -> Image:
     """The sheet.
 
     Args:
@@ -72,7 +72,7 @@ def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector =
     whole = PillowImage.new("RGB", (columns * (size[0] + GAP) + GAP, head + rows * (high + GAP)), PAPER)
     pen = Drawing.Draw(whole)
     _heading(pen, playback, whole.width, head, letter)
-    with Shots(playback, size=size, towards=towards, captions=False) as shots:
+    with Frames(playback, size=size, towards=towards, captions=False) as frames:
         for k, tile in enumerate(shown):
             row, column = divmod(k, columns)
             left, top = GAP + column * (size[0] + GAP), head + row * (high + GAP)
@@ -81,7 +81,7 @@ def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector =
                 middle = (left + size[0] / 2, top + size[1] / 2)
                 pen.text(middle, "not begun", fill=QUIET, font=font(letter), anchor="mm")
             else:
-                whole.paste(PillowImage.fromarray(shots.at(tile.time)), (left, top))
+                whole.paste(PillowImage.fromarray(frames.at(tile.time)), (left, top))
             _label(pen, tile, k + 1, (left, top + size[1], size[0], strip), letter)
     return np.asarray(whole)
 
@@ -89,35 +89,24 @@ def sheet(playback: Playback, *, size: tuple[int, int] = TILE, towards: Vector =
 def _heading(pen: ImageDraw, playback: Playback, width: int, height: int, letter: int) -> None:
     """The task and why it failed at the left, its verdict at the right."""
     verdict = playback.verdict
-    right = ""
+    left, right = [(playback.name, INK)], []
     if verdict is not None:
-        right = f"{verdict.verdict}  {verdict.simulated_time:.2f} s"
+        left += [(verdict.text, QUIET)] if verdict.text else []
         colour = DONE if verdict.verdict == "passed" else FAILED
-        pen.text((width - GAP, height / 2), right, fill=colour, font=font(letter), anchor="rm")
-    room = width - 4 * GAP - pen.textlength(right, font=font(letter))
-    large = round(1.2 * letter)
-    name = cut(pen, playback.name, large, room)
-    pen.text((GAP, height / 2), name, fill=INK, font=font(large), anchor="lm")
-    if verdict is not None and verdict.text:
-        x = GAP + pen.textlength(f"{name}    ", font=font(large))
-        pen.text((x, height / 2), cut(pen, verdict.text, letter, room - x), fill=QUIET, font=font(letter), anchor="lm")
+        right = [(f"{verdict.verdict}  {verdict.simulated_time:.2f} s", colour)]
+    write_line(pen, (GAP, width - GAP, height / 2), letter, left, right)
 
 
 def _label(pen: ImageDraw, tile: Tile, number: int, box: tuple[int, int, int, int], letter: int) -> None:
-    """Number and name at the left, outcome and time at the right; why, where the step failed."""
+    """Number and name at the left, with the reason where the step failed; outcome and time at the right."""
     left, top, width, height = box
-    y = top + height / 2
-    left, end = left + 3, float(left + width - 3)
-    if tile.time is not None:
-        clock = f"{tile.time:.2f} s"
-        pen.text((end, y), clock, fill=QUIET, font=font(letter), anchor="rm")
-        end -= pen.textlength(f"{clock}  ", font=font(letter))
     colour = DONE if tile.outcome == "done" else QUIET if tile.outcome in ("", "not_run") else FAILED
-    outcome = tile.outcome.replace("_", " ")
-    pen.text((end, y), outcome, fill=colour, font=font(letter), anchor="rm")
-    end -= pen.textlength(f"{outcome}  ", font=font(letter))
-    figure = f"{number}  "
-    pen.text((left, y), figure, fill=QUIET, font=font(letter), anchor="lm")
-    x = left + pen.textlength(figure, font=font(letter))
+    time = [] if tile.time is None else [(f"{tile.time:.2f} s", QUIET)]
     why = f": {tile.text}" if tile.text and tile.outcome not in ("done", "") else ""
-    pen.text((x, y), cut(pen, tile.label + why, letter, end - x), fill=INK, font=font(letter), anchor="lm")
+    write_line(
+        pen,
+        (left + 3, left + width - 3, top + height / 2),
+        letter,
+        [(str(number), QUIET), (tile.label + why, INK)],
+        [*time, (tile.outcome.replace("_", " "), colour)],
+    )

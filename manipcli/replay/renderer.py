@@ -1,7 +1,6 @@
-"""Pictures of robots and scenes as PNG files: no window, no GPU, the same bytes every time.
+"""Pictures of robots and scenes with Bullet's TinyRenderer: no window, no GPU, the same bytes every time.
 
-Bullet's TinyRenderer draws surfaces of ours (it reads no file), twice as large in each direction; the average of four
-pixels smooths the edges.
+Bullet draws our surfaces (it reads no file) at twice the size; the average of four pixels smooths the edges.
 """
 
 from __future__ import annotations
@@ -9,8 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +20,14 @@ from manipcli.model.configuration import posture
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw
-from manipcli.replay.image import Image, png_bytes, sky
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.surface import Surface, surface
 
+Image = npt.NDArray[np.uint8]
+"""(height, width, 3) red, green, blue; row 0 is the top."""
+
+SKY = ((203, 213, 224), (246, 248, 250))
+"""Colours behind everything, at the top and at the bottom."""
 SIZE = (960, 720)
 """Of a picture [pixel]."""
 FINER = 2
@@ -37,7 +42,23 @@ AMBIENT, DIFFUSE, SPECULAR = 0.62, 0.42, 0.08
 """How bright is what does not face the light, what faces it, and what mirrors it."""
 
 
-class Studio:
+def sky(height: int) -> Image:
+    """(height, 1, 3) the background of every picture and view."""
+    part = np.linspace(0.0, 1.0, height)[:, None, None]
+    image: Image = ((1.0 - part) * np.array(SKY[0]) + part * np.array(SKY[1])).round().astype(np.uint8)
+    return image
+
+
+def png_bytes(image: Image) -> bytes:
+    """The PNG file of an image."""
+    from PIL import Image as PillowImage
+
+    stream = BytesIO()
+    PillowImage.fromarray(image).save(stream, "PNG", compress_level=9)
+    return stream.getvalue()
+
+
+class Renderer:
     """A drawing in Bullet clients that only draw. A context manager: the clients end with it.
 
     Args:
@@ -47,20 +68,14 @@ class Studio:
             picture only the part that the others may cover.
     """
 
-    def __init__(
-        self,
-        drawing: Drawing,
-        *,
-        size: tuple[int, int] = SIZE,
-        still: frozenset[str] = frozenset(),
-    ) -> None:
+    def __init__(self, drawing: Drawing, *, size: tuple[int, int] = SIZE, still: frozenset[str] = frozenset()) -> None:
         self._size = size
         shown = [one for one in drawing.layer("visual") if one.rgba[3] > 0.0]
         self._still = _Client(drawing, [one for one in shown if one.frame in still])
         self._moving = _Client(drawing, [one for one in shown if one.frame not in still])
         self._before: tuple[Camera, _Raster, Image] | None = None
 
-    def __enter__(self) -> Studio:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -79,7 +94,7 @@ class Studio:
             return image.copy()
         front = self._moving.render(poses, camera, whole, window)
         rows, columns = window.slices
-        nearer = front.seen & (front.depth <= behind.depth[rows, columns])
+        nearer = front.depth <= behind.depth[rows, columns]
         rgb = np.where(nearer[..., None], front.rgb, behind.rgb[rows, columns])
         image = image.copy()
         rows, columns = window.divided(FINER).slices
@@ -89,7 +104,7 @@ class Studio:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Part of a picture, from `left` and `top` up to `right` and `bottom` [pixel]."""
+    """Part of a picture [pixel]; `right` and `bottom` are the first column and row beyond it."""
 
     left: int
     top: int
@@ -108,11 +123,10 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class _Raster:
-    """Colours (h, w, 3), depth (h, w) as the graphics library counts it, and where anything is (h, w)."""
+    """Colours (h, w, 3), and depth (h, w) as the graphics library counts it, infinite where nothing is."""
 
     rgb: Image
     depth: npt.NDArray[np.float32]
-    seen: npt.NDArray[np.bool_]
 
 
 class _Client:
@@ -201,7 +215,6 @@ class _Client:
         return _Raster(
             np.where(there[..., None], rgb, behind),
             np.where(there, np.asarray(depth, dtype=np.float32).reshape(height, width), np.inf),
-            there,
         )
 
 
@@ -227,12 +240,12 @@ def _parts(whole: Surface) -> list[Surface]:
 
 
 def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
-    """A picture of a robot at `home`, or else at zero, as a PNG file; what is at `path` is replaced.
+    """Writes a picture of a robot at `home`, or else at zero, as a PNG file.
 
     Returns:
-        What could not be drawn, a line each.
+        What could not be drawn, one line each.
     """
     drawing, poses = draw(robot), Placing(robot).start(posture(robot))
-    with Studio(drawing) as studio:
-        path.write_bytes(png_bytes(studio.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))))
+    with Renderer(drawing) as renderer:
+        path.write_bytes(png_bytes(renderer.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))))
     return drawing.missing
