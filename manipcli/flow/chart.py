@@ -15,8 +15,7 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, short, ways
-from manipcli.record.layout import Part
+from manipcli.record.fields import FieldName, Part, UnknownField, Way, numbers, parse_field, short, ways
 from manipcli.record.namespaces import meant
 from manipcli.record.reading import open_recording
 from manipcli.record.schemas import CONTROLLER_STATE

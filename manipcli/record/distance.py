@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -10,14 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.decode import Run, runs
+from manipcli.record.columns import Int
+from manipcli.record.decode import Bytes, Layouts, Run, runs, stretches
 from manipcli.record.definition import Message
 
-REMEMBERED = 16
-"""Layouts of one topic that are tried before a message is taken apart."""
-
 Value = float | int | str
-Bytes = npt.NDArray[np.uint8]
 
 
 def first_difference(
@@ -62,14 +58,11 @@ def _near(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating], tolerance: f
 
 
 @dataclass(frozen=True, slots=True)
-class _Layout:
-    """Of messages of one length: the bytes that decide where things stand, what those are, and where numbers are."""
+class _Places:
+    """Where messages of one layout have floating-point numbers, by their code, and all other bytes."""
 
-    length: int
-    guards: npt.NDArray[np.int64]
-    letters: Bytes
-    floats: tuple[tuple[str, npt.NDArray[np.int64]], ...]
-    others: npt.NDArray[np.int64]
+    floats: tuple[tuple[str, Int], ...]
+    others: Int
 
 
 class Near:
@@ -78,57 +71,32 @@ class Near:
     def __init__(self, message: Message, tolerance: float) -> None:
         self._message = message
         self._tolerance = tolerance
-        self._known: deque[_Layout] = deque(maxlen=REMEMBERED)
+        self._layouts = Layouts(self._places)
 
     def within(self, a: Bytes, b: Bytes) -> npt.NDArray[np.bool_]:
         """(n,) whether the messages (n, length) differ in floating-point numbers alone, and by no more."""
         near = np.zeros(len(a), dtype=bool)
-        rest = np.arange(len(a))
-        while len(rest):
-            layout = self._layout(a[rest[0]])
-            if layout is None:
-                rest = rest[1:]
-                continue
-            fits = (a[rest][:, layout.guards] == layout.letters).all(axis=1)
-            some = rest[fits]
-            near[some] = self._alike(layout, a[some], b[some])
-            rest = rest[~fits]
+        n, length = a.shape
+        for found, some in self._layouts.groups(a.reshape(-1), np.arange(n) * length, np.full(n, length)):
+            near[some] = self._alike(found, a[some], b[some])
         return near
 
-    def _alike(self, layout: _Layout, a: Bytes, b: Bytes) -> npt.NDArray[np.bool_]:
-        alike = (a[:, layout.others] == b[:, layout.others]).all(axis=1)
-        for code, at in layout.floats:
+    def _alike(self, found: _Places, a: Bytes, b: Bytes) -> npt.NDArray[np.bool_]:
+        alike = (a[:, found.others] == b[:, found.others]).all(axis=1)
+        for code, at in found.floats:
             u, v = (np.ascontiguousarray(rows[:, at]).view(code) for rows in (a, b))
             alike &= _near(u, v, self._tolerance).all(axis=1)
         return np.asarray(alike)
 
-    def _layout(self, row: Bytes) -> _Layout | None:
-        for one in self._known:
-            if one.length == len(row) and np.array_equal(row[one.guards], one.letters):
-                return one
+    def _places(self, data: memoryview) -> tuple[_Places, Int]:
+        every = np.arange(len(data))
         try:
-            found = runs(self._message, row.tobytes())
-        except CdrError:
-            return None
-        guards = [np.arange(0)]
-        floats: dict[str, list[npt.NDArray[np.int64]]] = {}
-        for run in found:
-            place = np.arange(run.offset, run.offset + run.size)
-            if run.code in ("<f8", "<f4"):
-                floats.setdefault(run.code, []).append(place)
-            elif not run.code:
-                guards.append(np.arange(_length_of_text(run), run.offset + run.size))
-            elif run.code == "#":
-                guards.append(place)
-        numbers = tuple((code, np.concatenate(places)) for code, places in floats.items())
-        every = np.concatenate([np.arange(0), *(places for _, places in numbers)])
-        at = np.concatenate(guards)
-        others = np.setdiff1d(np.arange(len(row)), every)
-        made = _Layout(len(row), at, row[at], numbers, others)
-        self._known.appendleft(made)
-        return made
-
-
-def _length_of_text(run: Run) -> int:
-    """Its four bytes stand right before the text."""
-    return run.offset - 4
+            found = runs(self._message, data)
+        except CdrError:  # not a message of this type: all its bytes count
+            return _Places((), every), every
+        numbers = tuple(
+            (code, stretches([(run.offset, run.offset + run.size) for run in found if run.code == code]))
+            for code in ("<f8", "<f4")
+        )
+        guards = stretches([(run.begin, run.offset + run.size) for run in found if run.code in ("", "#")])
+        return _Places(numbers, np.setdiff1d(every, np.concatenate([at for _, at in numbers]))), guards

@@ -14,7 +14,6 @@ from itertools import islice
 
 from manipcli.core.text import any_of, did_you_mean, listed, nearest, shorten
 from manipcli.record.definition import MAX_DEPTH, Array, Field, Message, Number, Text, Type
-from manipcli.record.layout import Key, Part
 
 MAX_WAYS = 64
 """Fields that one word may stand for."""
@@ -24,6 +23,26 @@ _NAME = re.compile(r"(?P<topic>[^.\[\]]+)")
 _PART = re.compile(r"\.(?P<name>\w+)|\[(?P<key>[^\[\]]*)\]")
 _UNINTERESTING = frozenset({"header", "time_from_start"})
 """Left out where a whole message is asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """What is in brackets: `words`, one of which an element must have; of a word `a+b` it must have every part."""
+
+    words: tuple[str, ...]
+
+    def takes(self, names: tuple[str, ...], number: int, count: int) -> bool:
+        """Whether an element with these names is meant, the one with this number of so many."""
+        known = {*names, str(number), str(number - count)}
+        return any(word in known or set(word.split("+")) <= known for word in self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One field on the way to the wanted number; `key` where only some of its elements are meant."""
+
+    name: str
+    key: Key | None = None
 
 
 class UnknownField(ValueError):

@@ -1,12 +1,10 @@
-"""Numbers of any ROS 2 log over time: every message of a topic through the layout of its type.
+"""Numbers of any ROS 2 log over time: every message of a topic by the definition of its type.
 
-Messages that have the same layout are read at once, one numpy index a number; layouts are remembered from chunk to
-chunk, so that a channel whose names never change is walked once.
+Messages that have the same layout are read together, with one numpy index per number.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,19 +13,20 @@ import numpy as np
 from manipcli.core.geometry import Array, frozen
 from manipcli.record.cdr import CdrError
 from manipcli.record.columns import Int, Places, every
+from manipcli.record.decode import Layouts, Run, runs, stretches
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import Way
-from manipcli.record.layout import MANY, MAX_LEAVES, Layout, layout
+from manipcli.record.fields import Key, Way
 from manipcli.record.schemas import CONTACTS
 from manipcli.record.topics import Topics
 
 MAX_VALUES = 50_000_000
 """Of all series together: 800 MB with their times."""
-MAX_WALKED = 50_000_000
-"""Values that are passed one by one in messages of which each has a layout of its own; about a minute."""
-REMEMBERED = 16
-"""Layouts of one topic that are tried before a message is walked."""
+MAX_DECODED = 10_000_000
+"""Values of messages that each have a layout of their own; about a minute."""
+MAX_LEAVES = 2000
+"""Wanted numbers in one message."""
+MANY = f"has more than {MAX_LEAVES} numbers there; say which ones in brackets"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +36,15 @@ class Wanted:
     topic: str
     message: Message
     way: Way
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A wanted number: the names of the elements it is in, its first byte in the message, and its code."""
+
+    label: str
+    offset: int
+    code: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,16 +123,16 @@ def _between(
 
 
 class _Gathered:
-    """The series of one field on their way."""
+    """The series of one field, from stretch to stretch of the log."""
 
     def __init__(self, way: Way, message: Message, *, held: bool) -> None:
         self._way = way
         self._message = message
         self._held = held
-        self._layouts: deque[tuple[int, Layout, Int, bytes]] = deque(maxlen=REMEMBERED)
+        self._layouts = Layouts(self._leaves)
         self._parts: dict[str, list[tuple[Array, Array]]] = {}
         self._seen: list[Array] = []
-        self._walked = 0
+        self._decoded = 0
 
     @property
     def type(self) -> str:
@@ -132,50 +140,31 @@ class _Gathered:
 
     def add(self, data: bytes, places: Places, seconds: Array) -> int:
         """Messages of one stretch; how many numbers they hold."""
-        rest = np.arange(len(seconds))
         added = 0
         if self._held:
             self._seen.append(seconds)
-        while len(rest):
-            found, alike = self._alike(data, places, rest)
-            times = seconds[alike]
-            for leaf, values in _values(data, places.starts[alike], found):
-                if leaf not in self._parts and len(self._parts) >= MAX_LEAVES:
+        for leaves, alike in self._layouts.groups(np.frombuffer(data, np.uint8), places.starts, places.lengths):
+            for leaf in leaves:
+                values = _numbers(data, places.starts[alike] + leaf.offset, leaf.code)
+                if self._way.is_time:
+                    values = values + _numbers(data, places.starts[alike] + leaf.offset + 4, "<u4") / 1e9
+                if leaf.label not in self._parts and len(self._parts) >= MAX_LEAVES:
                     raise CdrError(MANY)
-                self._parts.setdefault(leaf, []).append((times, values))
+                self._parts.setdefault(leaf.label, []).append((seconds[alike], values))
                 added += len(values)
-            rest = np.setdiff1d(rest, alike, assume_unique=True)
         return added
 
-    def _alike(self, data: bytes, places: Places, rest: Int) -> tuple[Layout, Int]:
-        """A layout, and those of the messages `rest` that have it, the first among them."""
-        first = int(rest[0])
-        start, length = int(places.starts[first]), int(places.lengths[first])
-        message = memoryview(data)[start : start + length]
-        own = np.frombuffer(message, np.uint8)
-        fitting = (one for one in self._layouts if one[0] == length and bytes(own[one[2]]) == one[3])
-        found = next(fitting, None)
-        if found is None:
-            made = layout(self._message, self._way.parts, message)
-            self._walked += made.steps
-            if self._walked > MAX_WALKED:
-                raise CdrError("has other parts each time, and there are too many of them")
-            at = np.array(made.guards, dtype=np.int64)
-            found = (length, made, at, bytes(own[at]))
-            self._layouts.appendleft(found)
-        _, known, guards, letters = found
-        same = rest[places.lengths[rest] == length]
-        if len(guards):
-            bytes_of = np.frombuffer(data, np.uint8)
-            wanted = np.frombuffer(letters, np.uint8)
-            # A few megabytes at a time.
-            step = max(1, (1 << 22) // len(guards))
-            fits = [
-                (bytes_of[places.starts[some][:, None] + guards] == wanted).all(axis=1)
-                for some in (same[k : k + step] for k in range(0, len(same), step))
-            ]
-            same = same[np.concatenate(fits)]
-        return known, same
+    def _leaves(self, message: memoryview) -> tuple[tuple[Leaf, ...], Int]:
+        found = runs(self._message, message)
+        self._decoded += len(found)
+        if self._decoded > MAX_DECODED:
+            raise CdrError("has other parts each time, and there are too many of them")
+        fields = tuple(part.name for part in self._way.parts)
+        names = [run for run in found if not run.code and _names(tuple(name for name, _ in run.steps), fields)]
+        # Lengths decide where things are, and texts on the way to the number which element it is in.
+        guards = [(run.begin, run.begin + 4) for run in found if run.code in ("", "#")]
+        guards += [(run.offset, run.offset + run.count) for run in names]
+        return leaves(found, self._way), stretches(guards)
 
     def series(self) -> list[Series]:
         """What was gathered."""
@@ -197,18 +186,52 @@ class _Gathered:
         return Series(label, frozen(times), frozen(values), self._held)
 
 
-def _values(data: bytes, starts: Int, found: Layout) -> list[tuple[str, Array]]:
-    """The numbers of messages that begin at `starts`, each with its label; what has a label twice is numbered."""
-    result: list[tuple[str, Array]] = []
+def _names(text: tuple[str, ...], fields: tuple[str, ...]) -> bool:
+    """Whether a text is in one of the messages on the way to a number, where it may name an element."""
+    return text[:-1] == fields[: len(text) - 1] and len(text) <= len(fields)
+
+
+def leaves(found: Sequence[Run], way: Way) -> tuple[Leaf, ...]:
+    """The wanted numbers of a message; a label that occurs again gets a number.
+
+    Raises:
+        CdrError: they are too many.
+    """
+    fields = tuple(part.name for part in way.parts) + (("sec",) if way.is_time else ())
+    result: list[Leaf] = []
     used: dict[str, int] = {}
-    for leaf in found.leaves:
-        values = _numbers(data, starts + leaf.offset, leaf.code)
-        if leaf.time:
-            values = values + _numbers(data, starts + leaf.offset + 4, "<u4") / 1e9
-        used[leaf.label] = used.get(leaf.label, 0) + 1
-        label = leaf.label if used[leaf.label] == 1 else f"{leaf.label} #{used[leaf.label]}"
-        result.append((label, values))
-    return result
+    for run in found:
+        if run.code in ("", "#") or len(run.steps) != len(fields):
+            continue
+        if tuple(name for name, _ in run.steps) != fields:
+            continue
+        above = [(one, part.key) for (_, one), part in zip(run.steps, way.parts, strict=False) if one is not None]
+        if not all(key is None or key.takes(one.names, one.number, one.count) for one, key in above):
+            continue
+        labels = ["+".join(one.names) or str(one.number) for one, _ in above]
+        key = way.parts[-1].key if run.array else None
+        size = np.dtype(run.code).itemsize
+        for k in _few(run.count, key):
+            name = run.names[k] if run.names else str(k)
+            if key is not None and not key.takes((name,), k, run.count):
+                continue
+            label = " ".join([*labels, name] if run.array else labels)
+            used[label] = used.get(label, 0) + 1
+            again = "" if used[label] == 1 else f" #{used[label]}"
+            result.append(Leaf(label + again, run.offset + k * size, run.code))
+        if len(result) > MAX_LEAVES:
+            raise CdrError(MANY)
+    return tuple(result)
+
+
+def _few(count: int, key: Key | None) -> Sequence[int]:
+    """Which numbers of an array may be meant: all, unless it is long and numbers are asked for."""
+    if count <= MAX_LEAVES:
+        return range(count)
+    asked = [int(word) % count for word in (key.words if key else ()) if word.lstrip("-").isdecimal()]
+    if not asked:
+        raise CdrError(MANY)
+    return asked[:MAX_LEAVES]
 
 
 def _numbers(data: bytes, at: Int, code: str) -> Array:

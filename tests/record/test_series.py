@@ -13,14 +13,14 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.record.cdr import CdrError
+from manipcli.record.decode import runs
 from manipcli.record.definition import read_definition
 from manipcli.record.faults import BadRecording
 from manipcli.record.fields import FieldName, UnknownField, parse_field, ways
 from manipcli.record.inventory import inventory
-from manipcli.record.layout import layout
 from manipcli.record.repair import repair
 from manipcli.record.scan import CHUNK, MESSAGE_INDEX, Scan
-from manipcli.record.series import Series, Wanted, read_series
+from manipcli.record.series import Series, Wanted, leaves, read_series
 from manipcli.record.topics import open_topics
 from manipcli.record.units import unit_of
 
@@ -249,7 +249,7 @@ def test_an_image_of_one_colour_is_packed_well_and_not_damaged(tmp_path: Path, s
 def test_a_message_of_millions_of_parts_is_not_walked_to_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("manipcli.record.layout.MAX_STEPS", 100_000)
+    monkeypatch.setattr("manipcli.record.decode.MAX_RUNS", 100_000)
     store = get_typestore(Stores.EMPTY)
     store.register(get_types_from_msg("p/Nothing[] parts\nfloat64 x", "p/msg/Many"))
     store.register(get_types_from_msg("", "p/msg/Nothing"))
@@ -269,7 +269,7 @@ def test_a_message_of_millions_of_parts_is_not_walked_to_its_end(
 
 
 def test_messages_that_differ_each_time_are_walked_only_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("manipcli.record.series.MAX_WALKED", 200)
+    monkeypatch.setattr("manipcli.record.series.MAX_DECODED", 200)
     messages = [
         (k, "/joint_states", "sensor_msgs/msg/JointState", joint_state(k, [f"j{k:03}"], [1.0])) for k in range(100)
     ]
@@ -298,12 +298,12 @@ def test_a_message_with_any_bytes_changed_is_read_or_refused(log: Path) -> None:
                 bad[k : k + len(new)] = new
                 del bad[k : k + (len(new) == 0)]
             try:
-                result = layout(message, found[int(rng.integers(len(found)))].parts, bytes(bad))
+                result = leaves(runs(message, bytes(bad)), found[int(rng.integers(len(found)))])
             except CdrError:
                 refused += 1
                 continue
-            assert all(leaf.offset + int(leaf.code[-1]) <= len(bad) for leaf in result.leaves)
-            read += bool(result.leaves)
+            assert all(leaf.offset + int(leaf.code[-1]) <= len(bad) for leaf in result)
+            read += bool(result)
     assert read > 50 and refused > 50
 
 
