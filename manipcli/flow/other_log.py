@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -24,11 +23,10 @@ from manipcli.model.scene import Body, Scene
 from manipcli.model.urdf import read_parts
 from manipcli.record import channels
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.columns import singly
+from manipcli.record.chunk import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
 from manipcli.record.namespaces import TYPES, meant, namespaces
-from manipcli.record.scan import METADATA, Scan
 from manipcli.record.snapshot import joint_state, transforms
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
@@ -46,13 +44,7 @@ def is_own(path: Path) -> bool:
     Raises:
         BadRecording: it is no MCAP file, or damaged.
     """
-    from mcap.data_stream import ReadDataStream
-    from mcap.records import Metadata
-
-    return any(
-        record.opcode == METADATA and Metadata.read(ReadDataStream(BytesIO(record.body))).name == RECORD
-        for record in Scan(path)
-    )
+    return RECORD in open_topics(path).metadata
 
 
 @dataclass(slots=True)

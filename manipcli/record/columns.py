@@ -1,4 +1,4 @@
-"""Messages to columns of numbers: where messages stand in a chunk, and the numbers of all of them at once.
+"""Messages of one channel to columns of numbers, many messages at once.
 
 All messages of a channel in a chunk normally have one length, and the same bytes where names and counts stand, so one
 layout; then each run of doubles is gathered with one numpy index over all messages. Others are taken one by one through
@@ -7,7 +7,7 @@ the same code.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,106 +15,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.rows import MESSAGE_HEAD, MESSAGE_OPCODE
-from manipcli.record.scan import RECORD_HEAD
-
-Int = npt.NDArray[np.int64]
-_MAX_OTHERS = 8192
-"""Schemas and channels in a chunk."""
-PAYLOAD = MESSAGE_HEAD.size
-"""From the beginning of a message record to its CDR bytes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Places:
-    """The messages of one channel in a chunk, in the order of the file: log times [ns], payload offsets and lengths."""
-
-    times: Int
-    starts: Int
-    lengths: Int
-
-    def at(self, which: Int) -> Places:
-        """Some of them."""
-        return Places(self.times[which], self.starts[which], self.lengths[which])
-
-
-def indexed(data: bytes, indexes: Mapping[int, bytes], *, whole: bool = True) -> dict[int, Places] | None:
-    """Messages by channel from a chunk's message indexes (channel -> pairs of log time and offset).
-
-    None when a message is not where they say or, with `whole`, unless they account for every byte of the chunk.
-    """
-    found: dict[int, Places] = {}
-    for channel, raw in indexes.items():
-        places = _located(data, channel, raw)
-        if places is None:
-            return None
-        if len(places.times):
-            found[channel] = places
-    if not found:
-        return None
-    if not whole:
-        return found
-    begins = np.sort(np.concatenate([places.starts for places in found.values()])) - PAYLOAD
-    stops = np.sort(np.concatenate([places.starts + places.lengths for places in found.values()]))
-    covered = begins[0] == 0 and stops[-1] == len(data) and np.array_equal(begins[1:], stops[:-1])
-    return found if covered else None
-
-
-def _located(data: bytes, channel: int, raw: bytes) -> Places | None:
-    """The messages of one channel from its message index; None when one of them is not there."""
-    size = len(data)
-    entries = np.frombuffer(raw, dtype="<u8").reshape(-1, 2)
-    if len(entries) and (size < PAYLOAD or entries[:, 1].max() > size - PAYLOAD):
-        return None
-    at = entries[:, 1].astype(np.int64)
-    lengths = every(data, "<u8")[at + 1]
-    fits = (
-        (np.frombuffer(data, dtype=np.uint8)[at] == MESSAGE_OPCODE)
-        & (lengths >= PAYLOAD - 9)
-        & (lengths <= size)
-        & (every(data, "<u2")[at + 9] == channel)
-        & (every(data, "<u8")[at + 15] == entries[:, 0])
-    )
-    if not fits.all():
-        return None
-    return Places(entries[:, 0].astype(np.int64), at + PAYLOAD, lengths.astype(np.int64) - (PAYLOAD - 9))
-
-
-def walked(data: bytes) -> tuple[dict[int, Places], list[tuple[int, bytes]]]:
-    """Messages by channel, found by walking over the records; and the records of other kinds (opcode, body).
-
-    Raises:
-        CdrError: a record does not fit into the chunk, or there are too many that are no messages.
-    """
-    rows: dict[int, list[tuple[int, int, int]]] = {}
-    others: list[tuple[int, bytes]] = []
-    offset = 0
-    while offset < len(data):
-        if offset + 9 > len(data):
-            raise CdrError("ends too early")
-        opcode, length = RECORD_HEAD.unpack_from(data, offset)
-        end = offset + 9 + length
-        if end > len(data) or (opcode == MESSAGE_OPCODE and length < PAYLOAD - 9):
-            raise CdrError("ends too early")
-        if opcode == MESSAGE_OPCODE:
-            _, _, channel, _, time, _ = MESSAGE_HEAD.unpack_from(data, offset)
-            rows.setdefault(channel, []).append((min(time, 2**63 - 1), offset + PAYLOAD, length - (PAYLOAD - 9)))
-        elif opcode == 0 or len(others) == _MAX_OTHERS:
-            raise CdrError("holds too much that is no message")
-        else:
-            others.append((opcode, data[offset + 9 : end]))
-        offset = end
-    found = {}
-    for channel, entries in rows.items():
-        table = np.array(entries, dtype=np.int64)
-        found[channel] = Places(table[:, 0], table[:, 1], table[:, 2])
-    return found, others
-
-
-def every(data: bytes, code: str) -> npt.NDArray[np.uint64]:
-    """The number that begins at each byte of `data`, as a view."""
-    kind = np.dtype(code)
-    return np.ndarray((max(len(data) - kind.itemsize + 1, 0),), dtype=kind, buffer=data, strides=(1,))
+from manipcli.record.chunk import Int, Places
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,18 +140,6 @@ def _gather(data: bytes, starts: Int, count: int) -> Array:
     if count == 0:
         return np.zeros((len(starts), 0))
     return _rows(data, starts, 8 * count).view("<f8").reshape(len(starts), count)
-
-
-def singly(data: bytes, places: Places) -> Iterator[tuple[int, CdrReader]]:
-    """(log time [ns], reader) of each message."""
-    view = memoryview(data)
-    for ns, start, length in zip(places.times.tolist(), places.starts.tolist(), places.lengths.tolist(), strict=True):
-        yield ns, CdrReader(view[start : start + length])
-
-
-def sequences(data: bytes, places: Places) -> Int:
-    """The sequence number of each message."""
-    return every(data, "<u4")[places.starts - PAYLOAD + 11].astype(np.int64)
 
 
 def joint_state_runs(reader: CdrReader) -> NamedRuns:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Int, Places
+from manipcli.record.chunk import Int, Places
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.distance import Near, Value, first_difference
 from manipcli.record.topics import Topic, Topics, open_topics

@@ -18,17 +18,16 @@ from typing import TYPE_CHECKING
 from manipcli.core.lock import Taken, lock
 from manipcli.record.block import ChunkContent
 from manipcli.record.faults import PARTIAL, RecordingFailed, RecordingRefused
+from manipcli.record.records import MAGIC, MESSAGE_INDEX
 
 if TYPE_CHECKING:
     from mcap.records import Attachment, AttachmentIndex, ChunkIndex, McapRecord, MetadataIndex, Schema
     from mcap.records import Channel as ChannelRecord
 
-MAGIC = b"\x89MCAP0\r\n"
 PROFILE = "ros2"
 LIBRARY = "manipcli"
 COMPRESSION_LEVEL = -1
 """zstd: a quarter less time than level 1 for 1 % more bytes."""
-MESSAGE_INDEX = 0x07
 _INDEX_HEAD = struct.Struct("<BQHI")
 
 
@@ -264,17 +263,6 @@ def _truncate(fd: int, size: int) -> None:
     except OSError:
         # The disk is in trouble already; a torn end is what readers of a partial file are made for.
         return
-
-
-def begins_as_log(path: Path) -> bool:
-    """Whether a regular file begins with the eight bytes of every MCAP file; False where it cannot be read."""
-    try:
-        if not path.is_file():
-            return False
-        with path.open("rb") as stream:
-            return stream.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
 
 
 def _claim(path: Path, partial: Path, *, overwrite: bool) -> int:

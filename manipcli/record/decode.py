@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.columns import Int
+from manipcli.record.chunk import Int
 from manipcli.record.definition import Array, Message, Number, Text, Type
 
 MAX_RUNS = 200_000

@@ -16,26 +16,12 @@ from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.columns import indexed, singly, walked
+from manipcli.record.chunk import indexed, open_chunk, singly, walked
 from manipcli.record.contents import RECORD, REPAIR, Contents, contents
 from manipcli.record.faults import BadRecording
 from manipcli.record.recording import Recording, TaskEvent
-from manipcli.record.scan import (
-    ATTACHMENT,
-    CHANNEL,
-    CHUNK,
-    HEADER,
-    MAX_NAMED,
-    MESSAGE,
-    METADATA,
-    SCHEMA,
-    ChunkPlace,
-    Piece,
-    Record,
-    Scan,
-    guarded,
-    open_chunk,
-)
+from manipcli.record.records import ATTACHMENT, CHANNEL, CHUNK, HEADER, MESSAGE, METADATA, SCHEMA
+from manipcli.record.scan import MAX_NAMED, Record, Scan, guarded
 from manipcli.record.spans import FileSpans
 
 if TYPE_CHECKING:
@@ -58,11 +44,11 @@ def open_recording(path: Path, *, being_written: bool = False) -> Recording:
     """
     reader = _Reader(path)
     scan = Scan(path, being_written=being_written)
-    for piece in scan.pieces():
-        if piece.record.opcode == CHUNK:
-            reader.chunk(piece)
+    for record, indexes in scan.pieces():
+        if record.opcode == CHUNK:
+            reader.chunk(record, indexes)
         else:
-            reader.declaration(piece.record)
+            reader.declaration(record)
     return reader.recording(scan.lost)
 
 
@@ -85,7 +71,7 @@ class _Reader:
         self._contents: Contents | None = None
         self._types: dict[str, str] = {}
         self._events: list[TaskEvent] = []
-        self._chunks: list[ChunkPlace] = []
+        self._chunks: list[int] = []
         self._newest = -1
         self._heard: set[str] = set()
 
@@ -149,11 +135,10 @@ class _Reader:
         for topic in self._contents.absent:
             self._types.pop(topic, None)
 
-    def chunk(self, piece: Piece) -> None:
+    def chunk(self, record: Record, indexes: Mapping[int, bytes]) -> None:
         """A chunk; its indexes say whether anything in it is needed yet."""
-        record, indexes = piece.record, piece.indexes
         self._known()
-        self._chunks.append(ChunkPlace(record.offset, piece.end))
+        self._chunks.append(record.offset)
         of = {channel: self._channels.get(channel, ("", ""))[0] for channel in indexes}
         if not indexes or "" in of.values():
             guarded(self._path, record, lambda record: self._opened(record, {}))

@@ -11,11 +11,13 @@ import numpy as np
 
 from manipcli.core.lock import Taken, lock
 from manipcli.record.block import ChunkContent
-from manipcli.record.columns import PAYLOAD, Int, Places
+from manipcli.record.chunk import Int, Places
 from manipcli.record.container import LIBRARY, Container
 from manipcli.record.contents import REPAIR
 from manipcli.record.faults import PARTIAL, BadRecording, CopyFailed, RecordingFailed, RecordingRefused
-from manipcli.record.salvage import Damage, OpenChunk, Salvage
+from manipcli.record.records import PAYLOAD
+from manipcli.record.salvage import Salvage, Stretch
+from manipcli.record.scan import Damage
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
@@ -167,7 +169,7 @@ class _Copy:
                 self._attachments.append(piece.name)
             case records.Metadata():
                 self.container.metadata(piece.name, piece.metadata)
-            case OpenChunk():
+            case Stretch():
                 self._chunk(piece)
 
     def _declare(self, one: Schema | Channel) -> None:
@@ -182,11 +184,11 @@ class _Copy:
             self._channels[one.id] = one
             self.container.declare([], [one])
 
-    def _chunk(self, chunk: OpenChunk) -> None:
+    def _chunk(self, chunk: Stretch) -> None:
         if not chunk.places.keys() <= self._channels.keys():
             # What declared them is damaged; the index may know.
-            for one in self.salvage.index.declared:
-                self._declare(one)  # type: ignore[arg-type]  # it holds schemas and channels alone
+            for one in self.salvage.scan.index.declared:
+                self._declare(one)
         known = {channel: places for channel, places in chunk.places.items() if channel in self._channels}
         strangers = sum(len(places.times) for channel, places in chunk.places.items() if channel not in known)
         if strangers:
@@ -212,12 +214,12 @@ class _Copy:
         """What became of it; says so in the clean file, too."""
         if not self._begun or not (self._messages or self._attachments or self._channels):
             raise BadRecording(path, "holds nothing that could be kept")
-        if self.salvage.end is not None:
-            self._open.append(self.salvage.end)
+        if self.salvage.scan.lost is not None:
+            self._open.append(self.salvage.scan.lost)
         self._settle(None)
-        total = self.salvage.index.messages
+        total = self.salvage.scan.index.messages
         lost = None if total is None else max(total - self._messages, 0)
-        if self.salvage.end is None and not self._losses:
+        if self.salvage.scan.lost is None and not self._losses:
             lost = 0
         if self._losses:
             what = "; ".join(map(str, self._losses[:8])) + ("; and more" if len(self._losses) > 8 else "")

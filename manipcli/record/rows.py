@@ -10,7 +10,6 @@ all T rows at a time.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
@@ -20,17 +19,16 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.record.records import MESSAGE, MESSAGE_HEAD
 from manipcli.spec.controllers import Interface
 
 Times = npt.NDArray[np.int64]
 Field = npt.NDArray[np.number]
-MESSAGE_HEAD = struct.Struct("<BQHIQQ")
-MESSAGE_OPCODE = 5
 
 
 def message_record(channel: int, sequence: int, ns: int, data: bytes) -> bytes:
     """One MCAP message record; log time and publish time are both `ns`."""
-    return MESSAGE_HEAD.pack(MESSAGE_OPCODE, 22 + len(data), channel, sequence, ns, ns) + data
+    return MESSAGE_HEAD.pack(MESSAGE, 22 + len(data), channel, sequence, ns, ns) + data
 
 
 @dataclass(frozen=True, slots=True)

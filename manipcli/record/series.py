@@ -12,7 +12,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Int, Places, every
+from manipcli.record.chunk import Int, Places, every
 from manipcli.record.decode import Layouts, Run, runs, stretches
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording

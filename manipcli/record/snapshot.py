@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+
+import numpy as np
 
 from manipcli.record import channels as topics
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.inventory import Inventory
+from manipcli.record.chunk import singly
 from manipcli.record.namespaces import TYPES, Meant, meant, namespaces
-from manipcli.record.salvage import OpenChunk, Salvage
+from manipcli.record.topics import Topics
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,42 +49,30 @@ class Snapshot:
     unread: dict[str, None] = field(default_factory=dict)
 
 
-def snapshot(path: Path, found: Inventory, time: float) -> Snapshot:
+def snapshot(log: Topics, time: float) -> Snapshot:
     """The newest of everything at `time` [s of log time].
 
     Raises:
-        BadRecording: the file is no MCAP file, or cannot be read.
+        BadRecording: the file cannot be read.
     """
-    from mcap import records
-
     # A time since 1970 in nanoseconds has more digits than a double.
     limit = round(time * 1e9) + 512
-    types = {topic.name: topic.type for topic in found.topics}
-    known = meant(types)
-    told = {known[topic.name].usual for topic in found.topics if topic.messages and topic.name in known}
-    taken = Snapshot(lacks=tuple(usual for usual in TYPES if usual not in told and usual != topics.TF_STATIC))
+    known = meant({name: topic.type for name, topic in log.all.items()})
+    there = {known[name].usual for name, topic in log.all.items() if topic.count and name in known}
+    taken = Snapshot(lacks=tuple(usual for usual in TYPES if usual not in there and usual != topics.TF_STATIC))
     several = len(namespaces(known.values())) > 1
-    names: dict[int, str] = {}
-    for piece in Salvage(path):
-        if isinstance(piece, records.Channel):
-            names[piece.id] = piece.topic
-            expected = TYPES.get(known[piece.topic].usual if piece.topic in known else piece.topic)
-            if expected is not None and (types.get(piece.topic) != expected or piece.message_encoding != "cdr"):
-                del names[piece.id]
-                kind = f"{types.get(piece.topic) or 'an unknown type'}, {piece.message_encoding or 'no encoding'}"
-                taken.unread[f"{piece.topic} is {kind}, not {expected} in CDR"] = None
-        elif isinstance(piece, OpenChunk) and piece.start_ns <= limit:
-            for channel, places in piece.places.items():
-                topic = names.get(channel, "")
-                if topic not in known:
-                    continue
-                for ns, start, length in zip(places.times, places.starts, places.lengths, strict=True):
-                    if ns > limit:
-                        continue
-                    try:
-                        _take(taken, known[topic], several, int(ns), CdrReader(piece.data[start : start + length]))
-                    except CdrError as error:
-                        taken.unread[f"a message of {topic} {error}"] = None
+    for name, topic in log.all.items():
+        expected = TYPES.get(known[name].usual if name in known else name)
+        if expected is not None and (topic.type, topic.encoding) != (expected, "cdr"):
+            kind = f"{topic.type or 'an unknown type'}, {topic.encoding or 'no encoding'}"
+            taken.unread[f"{name} is {kind}, not {expected} in CDR"] = None
+            known.pop(name, None)
+    for name, data, places in log.messages(known):
+        for ns, reader in singly(data, places.at(np.flatnonzero(places.times <= limit))):
+            try:
+                _take(taken, known[name], several, ns, reader)
+            except CdrError as error:
+                taken.unread[f"a message of {name} {error}"] = None
     return taken
 
 

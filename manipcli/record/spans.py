@@ -14,24 +14,19 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
+from manipcli.record.chunk import Int, Places, chunk_places, open_chunk, sequences, singly
 from manipcli.record.columns import (
     Columns,
-    Int,
-    Places,
     body_runs,
     controller_state_runs,
-    indexed,
     joint_state_runs,
-    sequences,
-    singly,
-    walked,
 )
 from manipcli.record.contents import Contents
 from manipcli.record.differences import body_velocities
 from manipcli.record.faults import Thinned
 from manipcli.record.messages import WORLD
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
-from manipcli.record.scan import ChunkPlace, Record, guarded, message_index, open_chunk, readable, records_at
+from manipcli.record.scan import Record, chunk_at, guarded, readable
 from manipcli.record.selection import common_stride
 
 
@@ -43,14 +38,14 @@ class FileSpans:
         path: the file.
         contents: what it says it holds.
         channels: channel id -> topic.
-        chunks: where its chunks stand.
+        chunks: where its chunks begin.
         cut: whether its end is missing, or parts of it, so that messages of some ticks may be, too.
     """
 
     path: Path
     contents: Contents
     channels: Mapping[int, str]
-    chunks: tuple[ChunkPlace, ...]
+    chunks: tuple[int, ...]
     cut: bool
 
     def __iter__(self) -> Iterator[Span]:
@@ -71,8 +66,8 @@ class FileSpans:
         reader = _SpanReader(self.contents, self.channels, gaps=self.cut)
         empty = True
         with readable(self.path), self.path.open("rb") as file:
-            for place in self.chunks:
-                span = self._chunk(file, place, reader)
+            for start in self.chunks:
+                span = self._chunk(file, start, reader)
                 if span is not None:
                     empty = False
                     yield span
@@ -81,14 +76,12 @@ class FileSpans:
         if empty:
             yield reader.span(0)
 
-    def _chunk(self, file: BinaryIO, place: ChunkPlace, reader: _SpanReader) -> Span | None:
-        chunk, *indexes = records_at(self.path, file, place)
+    def _chunk(self, file: BinaryIO, start: int, reader: _SpanReader) -> Span | None:
+        chunk, indexes = chunk_at(self.path, file, start)
 
         def read(record: Record) -> Span | None:
             data = open_chunk(self.path, record)
-            found = indexed(data, dict(message_index(index) for index in indexes))
-            # No indexes that account for every byte: they were cut off, or another tool wrote the file.
-            reader.add(data, walked(data)[0] if found is None else found)
+            reader.add(data, chunk_places(data, indexes))
             return reader.span(reader.ready) if reader.ready else None
 
         try:

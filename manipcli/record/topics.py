@@ -1,41 +1,22 @@
-"""What any ROS 2 log holds: its topics, their types, and where their messages stand. Knows no robot and no task.
+"""The content of any MCAP file short of its messages, and where those are. Knows no robot and no task.
 
-One pass verifies the file and opens a chunk only where it does not say from outside what it holds.
+One pass verifies everything in the memory of one chunk; messages are read again when they are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING
 
-import numpy as np
+from manipcli.record.chunk import Int, Places, chunk_places, open_chunk, walked
+from manipcli.record.faults import REPAIRABLE, BadRecording
+from manipcli.record.salvage import Salvage, Stretch
+from manipcli.record.scan import Damage, chunk_at, guarded, readable
 
-from manipcli.record.cdr import CdrError
-from manipcli.record.columns import Int, Places, indexed, walked
-from manipcli.record.faults import BadRecording
-from manipcli.record.scan import (
-    CHANNEL,
-    CHUNK,
-    MAX_NAMED,
-    MESSAGE,
-    RECORD_HEAD,
-    SCHEMA,
-    ChunkPlace,
-    Piece,
-    Record,
-    Scan,
-    guarded,
-    message_index,
-    open_chunk,
-    readable,
-    records_at,
-)
-
-RUN = 1 << 22
-"""[byte] Messages outside chunks are taken together up to this."""
+if TYPE_CHECKING:
+    from mcap.records import Channel, Schema
 
 
 @dataclass(slots=True)
@@ -44,54 +25,79 @@ class Topic:
 
     Attributes:
         name: `/joint_states`.
-        type: `sensor_msgs/msg/JointState`, as the log calls it.
+        type: `sensor_msgs/msg/JointState`, as the log calls it; "" where it does not say.
         definition: the text of the schema; "" where it is not `ros2msg`, or messages are not CDR.
-        encoding: how messages are written, `cdr`.
+        encoding: of the messages, `cdr`; of those that are not ROS 2's with that of the schema, `json/jsonschema`.
         count: messages.
         first, last: log times [ns]; 0 where there is no message.
     """
 
     name: str
-    type: str
-    definition: str
-    encoding: str
+    type: str = ""
+    definition: str = ""
+    encoding: str = ""
     count: int = 0
     first: int = 0
     last: int = 0
 
+    @property
+    def rate(self) -> float | None:
+        """[Hz] the mean; None below two messages, or where all have one time."""
+        return None if self.last <= self.first else (self.count - 1) * 1e9 / (self.last - self.first)
+
     def saw(self, times: Int) -> None:
         """Counts messages."""
-        if len(times):
-            low, high = int(times.min()), int(times.max())
-            self.first = low if self.count == 0 else min(self.first, low)
-            self.last = high if self.count == 0 else max(self.last, high)
-            self.count += len(times)
+        low, high = int(times.min()), int(times.max())
+        self.first = low if self.count == 0 else min(self.first, low)
+        self.last = high if self.count == 0 else max(self.last, high)
+        self.count += len(times)
+
+
+@dataclass(frozen=True, slots=True)
+class Attached:
+    """An attachment: the last part of its name, its media type, and its size in bytes."""
+
+    name: str
+    media_type: str
+    size: int
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """A stretch of the file that holds messages: a chunk, or messages that are in none; of which channels."""
+    """A stretch of the file with messages of some channels: a chunk, or messages outside chunks."""
 
-    at: ChunkPlace
+    start: int
+    end: int
     chunk: bool
     channels: frozenset[int]
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Topics:
-    """The topics of a log by name, and its messages.
+    """A log.
 
     Attributes:
         path: the file.
-        all: by name, in the order in which they were declared.
-        lost: why the end is missing, or None.
+        all: topics by name, in the order in which they were declared.
+        size: [byte] of the file.
+        profile, library: as the writer calls itself.
+        attachments: in the order of the file.
+        metadata: name -> key -> value; later records of a name replace keys of earlier ones.
+        lost: what is missing at the end, or None.
+        damage: what else cannot be read, a sentence each.
     """
 
     path: Path
-    all: Mapping[str, Topic]
-    lost: str | None
-    _channels: Mapping[int, str] = field(repr=False)
-    _places: tuple[_Place, ...] = field(repr=False)
+    all: dict[str, Topic] = field(default_factory=dict)
+    size: int = 0
+    profile: str = ""
+    library: str = ""
+    attachments: list[Attached] = field(default_factory=list)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    lost: str | None = None
+    damage: list[str] = field(default_factory=list)
+    _channels: dict[int, str] = field(default_factory=dict, repr=False)
+    _places: list[_Place] = field(default_factory=list, repr=False)
 
     @property
     def start(self) -> int:
@@ -103,133 +109,101 @@ class Topics:
         """[ns] log time of the last message."""
         return max((topic.last for topic in self.all.values() if topic.count), default=0)
 
+    @property
+    def count(self) -> int:
+        """Of all messages."""
+        return sum(topic.count for topic in self.all.values())
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first message to the last."""
+        return (self.end - self.start) / 1e9
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What is damaged or missing."""
+        return (*self.damage, *([] if self.lost is None else [self.lost]))
+
     def messages(self, names: Collection[str]) -> Iterator[tuple[str, bytes, Places]]:
         """The messages of some topics: name, bytes, and where in them they are; in the order of the file.
 
         Raises:
-            BadRecording: a chunk is damaged, or the file changed.
+            BadRecording: the file changed.
         """
         wanted = {number: name for number, name in self._channels.items() if name in names}
         with readable(self.path), self.path.open("rb") as file:
             for place in self._places:
-                if not place.channels.isdisjoint(wanted):
-                    for number, data, found in _read(self.path, file, place, frozenset(wanted)):
-                        yield wanted[number], data, found
+                if place.channels.isdisjoint(wanted):
+                    continue
+                if place.chunk:
+                    chunk, indexes = chunk_at(self.path, file, place.start)
+                    data = open_chunk(self.path, chunk)
+                    found = guarded(self.path, chunk, lambda _: chunk_places(data, indexes))  # noqa: B023
+                else:
+                    file.seek(place.start)
+                    data = file.read(place.end - place.start)
+                    found = walked(data)[0]
+                for number, places in found.items():
+                    if number in wanted:
+                        yield wanted[number], data, places
 
 
-def open_topics(path: Path) -> Topics:
-    """The topics of a log, finished or not.
+def open_topics(path: Path, *, damaged: bool = False) -> Topics:
+    """The content of a log, finished or not.
+
+    Args:
+        path: an MCAP file.
+        damaged: where it is damaged, what is sound of it.
 
     Raises:
         BadRecording: it is no MCAP file, or damaged.
     """
-    reader = _Reader(path)
-    scan = Scan(path)
-    for piece in scan.pieces():
-        reader.take(piece)
-    reader.close_run()
-    return Topics(path, reader.topics, scan.lost, reader.channels, tuple(reader.places))
+    from mcap import records
+
+    log = Topics(path)
+    salvage = Salvage(path)
+    schemas: dict[int, Schema] = {}
+    for piece in salvage:
+        match piece:
+            case records.Header():
+                log.profile, log.library = piece.profile, piece.library
+            case records.Schema():
+                schemas.setdefault(piece.id, piece)
+            case records.Channel():
+                _declare(log, piece, schemas.get(piece.schema_id))
+            case records.Attachment():
+                name = piece.name.replace("\\", "/").rpartition("/")[2]
+                log.attachments.append(Attached(name, piece.media_type, len(piece.data)))
+            case records.Metadata():
+                log.metadata.setdefault(piece.name, {}).update(piece.metadata)
+            case Stretch():
+                log._places.append(_Place(piece.start, piece.end, piece.chunk, frozenset(piece.places)))
+                for channel, places in piece.places.items():
+                    if channel not in log._channels:
+                        log.damage.append(f"it has messages of channel {channel}, which is not declared")
+                        log._channels[channel] = f"(channel {channel})"
+                    name = log._channels[channel]
+                    log.all.setdefault(name, Topic(name)).saw(places.times)
+            case Damage():
+                log.damage.append(f"bytes {piece.start} to {piece.end} cannot be read: {piece.what}")
+    log.size, log.lost = salvage.scan.size, salvage.scan.lost
+    if log.damage and not damaged:
+        raise BadRecording(path, log.damage[0], hint=REPAIRABLE)
+    return log
 
 
-class _Reader:
-    """What was declared so far."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._schemas: dict[int, tuple[str, str, str]] = {}
-        self._named = 0
-        self._run: list[Record] = []
-        self._run_size = 0
-        self.topics: dict[str, Topic] = {}
-        self.channels: dict[int, str] = {}
-        self.places: list[_Place] = []
-
-    def take(self, piece: Piece) -> None:
-        """The next piece of the file."""
-        record = piece.record
-        if record.opcode == MESSAGE:
-            self._run.append(record)
-            self._run_size += len(record.body)
-            if self._run_size >= RUN:
-                self.close_run()
-            return
-        self.close_run()
-        if record.opcode == CHUNK:
-            self._chunk(piece)
-        elif record.opcode in (SCHEMA, CHANNEL):
-            guarded(self._path, record, self._declared)
-
-    def _declared(self, record: Record) -> None:
-        from mcap import records
-        from mcap.data_stream import ReadDataStream
-
-        self._named += 1
-        if self._named > MAX_NAMED:
-            raise BadRecording(self._path, f"declares more than {MAX_NAMED} channels and schemas")
-        stream = ReadDataStream(BytesIO(record.body))
-        if record.opcode == SCHEMA:
-            schema = records.Schema.read(stream)
-            self._schemas[schema.id] = (schema.name, schema.encoding, schema.data.decode("utf-8", "replace"))
-            return
-        channel = records.Channel.read(stream)
-        name, encoding, text = self._schemas.get(channel.schema_id, ("", "", ""))
-        readable = encoding == "ros2msg" and channel.message_encoding == "cdr"
-        self.channels[channel.id] = channel.topic
-        known = self.topics.get(channel.topic)
-        if known is None:
-            words = (
-                channel.message_encoding if encoding in ("", "ros2msg") else f"{channel.message_encoding}/{encoding}"
-            )
-            self.topics[channel.topic] = Topic(channel.topic, name, text if readable else "", words)
-        elif known.definition != (text if readable else ""):
-            raise CdrError(f"{channel.topic} has two types, {known.type} and {name}")
-
-    def _chunk(self, piece: Piece) -> None:
-        at = ChunkPlace(piece.record.offset, piece.end)
-        if piece.indexes and all(channel in self.channels for channel in piece.indexes):
-            for channel, entries in piece.indexes.items():
-                self._saw(channel, np.frombuffer(entries, dtype="<u8")[::2].astype(np.int64))
-            self.places.append(_Place(at, chunk=True, channels=frozenset(piece.indexes)))
-        else:
-            guarded(self._path, piece.record, lambda one: self._opened(open_chunk(self._path, one), at, chunk=True))
-
-    def close_run(self) -> None:
-        """Messages outside chunks end here, if there were any."""
-        run, self._run, self._run_size = self._run, [], 0
-        if run:
-            data = b"".join(RECORD_HEAD.pack(one.opcode, len(one.body)) + one.body for one in run)
-            place = ChunkPlace(run[0].offset, run[-1].end)
-            guarded(self._path, run[0], lambda _: self._opened(data, place, chunk=False))
-
-    def _opened(self, data: bytes, at: ChunkPlace, *, chunk: bool) -> None:
-        found, others = walked(data)
-        for opcode, body in others:
-            if opcode in (SCHEMA, CHANNEL):
-                self._declared(Record(opcode, at.start, body))
-        for channel, places in found.items():
-            self._saw(channel, places.times)
-        self.places.append(_Place(at, chunk=chunk, channels=frozenset(found)))
-
-    def _saw(self, channel: int, times: Int) -> None:
-        if channel not in self.channels:
-            raise CdrError(f"it has a message of channel {channel}, which is not declared")
-        self.topics[self.channels[channel]].saw(times)
-
-
-def _read(path: Path, file: BinaryIO, place: _Place, wanted: frozenset[int]) -> Iterator[tuple[int, bytes, Places]]:
-    """The messages of some channels in one stretch."""
-    indexes: dict[int, bytes] = {}
-    if place.chunk:
-        chunk, *others = records_at(path, file, place.at)
-        data = open_chunk(path, chunk)
-        indexes = dict(guarded(path, other, message_index) for other in others)
-    else:
-        file.seek(place.at.start)
-        data = file.read(place.at.end - place.at.start)
-    found = indexed(data, {channel: raw for channel, raw in indexes.items() if channel in wanted}, whole=False)
-    if found is None:
-        record = Record(CHUNK, place.at.start, data)
-        found = guarded(path, record, lambda one: walked(one.body)[0])
-    for channel, places in found.items():
-        if channel in wanted:
-            yield channel, data, places
+def _declare(log: Topics, channel: Channel, schema: Schema | None) -> None:
+    """A channel, the first of each number."""
+    if channel.id in log._channels:
+        return
+    log._channels[channel.id] = channel.topic
+    encoding = channel.message_encoding
+    written = schema.encoding if schema is not None else ""
+    text = ""
+    if schema is not None and (written, encoding) == ("ros2msg", "cdr"):
+        text = schema.data.decode("utf-8", "replace")
+    name = schema.name if schema is not None else ""
+    words = encoding if written in ("", "ros2msg") else f"{encoding}/{written}"
+    known = log.all.setdefault(channel.topic, Topic(channel.topic, name, text, words))
+    if known.definition != text:
+        log.damage.append(f"{channel.topic} has two types, {known.type} and {name}")

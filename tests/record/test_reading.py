@@ -481,7 +481,7 @@ def test_time_running_backwards_is_refused(tmp_path: Path, make_run: MakeRun) ->
 
 def test_chunks_hold_indexes_that_cover_every_message(small: tuple[Any, Path]) -> None:
     """The fast way through a file of ours is taken: indexes account for each byte of each chunk."""
-    from manipcli.record.columns import indexed, walked
+    from manipcli.record.chunk import indexed, walked
 
     pending: Chunk | None = None
     indexes: dict[int, bytes] = {}

@@ -18,10 +18,10 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from manipcli.record import recorder as recorder_module
 from manipcli.record.faults import BadRecording, CopyFailed, RecordingRefused
-from manipcli.record.inventory import inventory
 from manipcli.record.reading import open_recording, read_recording
 from manipcli.record.repair import default_output, repair
 from manipcli.record.snapshot import snapshot
+from manipcli.record.topics import open_topics
 
 MakeRun = Callable[[int], Any]
 MAGIC = b"\x89MCAP0\r\n"
@@ -191,7 +191,7 @@ def test_logs_of_other_writers(small: Path, tmp_path: Path, compression: Compres
     done, messages, _ = repaired(data, tmp_path)
     assert messages == whole
     assert done.losses == ()
-    assert inventory(tmp_path / "good.mcap").library == "somebody"
+    assert open_topics(tmp_path / "good.mcap").library == "somebody"
     done, messages, _ = repaired(data[: len(data) // 2], tmp_path)
     assert messages == whole[: len(messages)]
     assert len(messages) > len(whole) // 8
@@ -344,13 +344,13 @@ def test_whatever_was_done_to_a_log_it_is_refused_or_repaired(small: Path, tmp_p
                     spoilt[at:at] = rng.bytes(size)
         (tmp_path / "bad.mcap").write_bytes(spoilt)
         try:
-            inventory(tmp_path / "bad.mcap")
+            open_topics(tmp_path / "bad.mcap", damaged=True)
             repaired(bytes(spoilt), tmp_path)
             done += 1
         except BadRecording:
             pass
         with contextlib.suppress(BadRecording):
-            snapshot(tmp_path / "bad.mcap", inventory(tmp_path / "bad.mcap"), 1.0)
+            snapshot(open_topics(tmp_path / "bad.mcap", damaged=True), 1.0)
     assert done > 35
 
 
