@@ -27,6 +27,7 @@ from manipcli.record.chunk import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
 from manipcli.record.namespaces import TYPES, meant, namespaces
+from manipcli.record.salvage import Salvage
 from manipcli.record.snapshot import joint_state, transforms
 from manipcli.record.topics import Topics, open_topics
 from manipcli.replay.drawing import WORLD
@@ -44,7 +45,9 @@ def is_own(path: Path) -> bool:
     Raises:
         BadRecording: it is no MCAP file, or damaged.
     """
-    return RECORD in open_topics(path).metadata
+    from mcap.records import Metadata
+
+    return any(isinstance(piece, Metadata) and piece.name == RECORD for piece in Salvage(path))
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.lock import Taken, lock
 from manipcli.record.block import ChunkContent
-from manipcli.record.chunk import Int, Places
+from manipcli.record.chunk import Places, walked
 from manipcli.record.container import LIBRARY, Container
 from manipcli.record.contents import REPAIR
 from manipcli.record.faults import PARTIAL, BadRecording, CopyFailed, RecordingFailed, RecordingRefused
@@ -240,7 +240,13 @@ class _Copy:
 def _content(data: bytes, places: dict[int, Places], *, whole: bool) -> ChunkContent:
     """The messages at `places`; with `whole` these are all, and the data stays as it is."""
     if not whole:
-        data, places = _only(data, places)
+        spans = sorted(
+            (start - PAYLOAD, start + length)
+            for found in places.values()
+            for start, length in zip(found.starts.tolist(), found.lengths.tolist(), strict=True)
+        )
+        data = b"".join(data[begin:end] for begin, end in spans)
+        places = walked(data)[0]
     indexes = {}
     for channel, found in sorted(places.items()):
         index = np.empty((len(found.times), 2), dtype=np.uint64)
@@ -248,21 +254,3 @@ def _content(data: bytes, places: dict[int, Places], *, whole: bool) -> ChunkCon
         indexes[channel] = index
     times = np.concatenate([found.times for found in places.values()])
     return ChunkContent(data, int(times.min()), int(times.max()), indexes)
-
-
-def _only(data: bytes, places: dict[int, Places]) -> tuple[bytes, dict[int, Places]]:
-    """The records at `places` alone, in the order of the file, and where they stand then."""
-    begins = np.concatenate([found.starts for found in places.values()]) - PAYLOAD
-    sizes = np.concatenate([found.lengths for found in places.values()]) + PAYLOAD
-    order = np.argsort(begins)
-    moved = np.empty_like(begins)
-    moved[order] = np.cumsum(sizes[order]) - sizes[order]
-    parts = [data[a : a + n] for a, n in zip(begins[order].tolist(), sizes[order].tolist(), strict=True)]
-    at = 0
-
-    def shifted(found: Places) -> Int:
-        nonlocal at
-        at += len(found.starts)
-        return moved[at - len(found.starts) : at] + PAYLOAD
-
-    return b"".join(parts), {c: Places(found.times, shifted(found), found.lengths) for c, found in places.items()}
