@@ -27,7 +27,7 @@ from manipcli.flow.vocabulary import meanings
 from manipcli.judge.steps import RunStatus
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.record.faults import RecordingFailed
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
 

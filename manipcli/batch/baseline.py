@@ -121,7 +121,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
         log: of the run.
     """
     from manipcli.flow.log import recorded_robot
-    from manipcli.record.reading import open_recording
+    from manipcli.record.read.reading import open_recording
     from manipcli.report.step_measures import step_measures
 
     found: Measures = {("duration",): Measure(verdict.simulated_time, "s")}

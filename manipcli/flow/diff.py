@@ -8,9 +8,9 @@ from manipcli.flow.log import judge_recording, recorded_robot
 from manipcli.flow.other_log import is_own
 from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
 from manipcli.record.channels import EVENTS, ROSOUT
-from manipcli.record.compare import Comparison, compare_logs
-from manipcli.record.compare_entries import compare_entries
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.compare import Comparison, compare_logs
+from manipcli.record.read.compare_entries import compare_entries
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.log_diff import LogDiff, LogSide
 from manipcli.report.step_measures import step_measures

@@ -17,7 +17,7 @@ from manipcli.flow.plan import Plan
 from manipcli.flow.steps_run import StepsRun, cuts_of
 from manipcli.model.condition import World
 from manipcli.model.kinematics import Kinematics
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor

@@ -30,9 +30,9 @@ from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.record import channels
 from manipcli.record.channels import channel_table
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.topics import Topic, open_topics
+from manipcli.record.read.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word
-from manipcli.record.topics import Topic, open_topics
 from manipcli.report.graph import Edge, Graph, Node
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec

@@ -29,10 +29,10 @@ from manipcli.model.scene_file import scene_from_json, scene_to_json
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
-from manipcli.record.reading import open_recording
-from manipcli.record.recorder import Recorder
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import EMBEDDED, Recording, Span
 from manipcli.record.selection import Selection
+from manipcli.record.write.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text

@@ -9,9 +9,9 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.record import channels
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
-from manipcli.record.namespaces import meant
-from manipcli.record.reading import open_recording
-from manipcli.record.topics import open_topics
+from manipcli.record.foreign.namespaces import meant
+from manipcli.record.foreign.topics import open_topics
+from manipcli.record.read.reading import open_recording
 from manipcli.report.log_info import LogInfo
 
 COMMON = (channels.ROBOT_DESCRIPTION, channels.JOINT_STATES, channels.TF)

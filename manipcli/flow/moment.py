@@ -18,12 +18,12 @@ from manipcli.model.state import Contact
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
+from manipcli.record.foreign.snapshot import snapshot
+from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
-from manipcli.record.snapshot import snapshot
-from manipcli.record.topics import Topics, open_topics
-from manipcli.record.units import joint_units
 from manipcli.replay.sampling import references
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 

@@ -14,8 +14,8 @@ from manipcli.flow.live import Live
 from manipcli.flow.plan import PlannedStep
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import Contact, WorldState
-from manipcli.record.contact_filter import ContactFilter
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.contact_filter import ContactFilter
+from manipcli.record.write.recorder import Recorder
 
 FEEDBACK_PERIOD: Final = 0.05
 """[s] between two records of how far a goal is, as ROS's action servers tell it."""

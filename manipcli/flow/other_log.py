@@ -23,13 +23,13 @@ from manipcli.model.scene import Body, Scene
 from manipcli.model.urdf import read_parts
 from manipcli.record import channels
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.chunk import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
-from manipcli.record.namespaces import TYPES, meant, namespaces
-from manipcli.record.salvage import Salvage
-from manipcli.record.snapshot import joint_state, transforms
-from manipcli.record.topics import Topics, open_topics
+from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
+from manipcli.record.foreign.snapshot import joint_state, transforms
+from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.read.chunk import singly
+from manipcli.record.read.salvage import Salvage
 from manipcli.replay.drawing import WORLD
 from manipcli.replay.playback import Playback
 

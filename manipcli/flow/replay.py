@@ -17,7 +17,7 @@ from manipcli.flow.other_log import is_own, open_other
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
 from manipcli.replay.sampling import plot_tables, sampled

@@ -29,7 +29,7 @@ from manipcli.model.conditions.at_pose import SLIDE, AtPoseSpec
 from manipcli.model.conditions.contact_force import ContactForceSpec
 from manipcli.model.conditions.moved import UnmovedSpec
 from manipcli.model.conditions.slip import SlipSpec
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback
 from manipcli.replay.shots import Shots, telling

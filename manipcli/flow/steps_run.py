@@ -25,7 +25,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
 from manipcli.model.touch import grips, held_force
 from manipcli.plan.step import Motion, Situation
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
 from manipcli.simulate.session import Session

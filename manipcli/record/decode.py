@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.chunk import Int
 from manipcli.record.definition import Array, Message, Number, Text, Type
 
 MAX_RUNS = 200_000
@@ -26,6 +25,7 @@ MAX_NAME = 256
 REMEMBERED = 16
 """Layouts of one topic that are tried before a message is decoded."""
 
+Int = npt.NDArray[np.int64]
 Bytes = npt.NDArray[np.uint8]
 T = TypeVar("T")
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
+from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
-from manipcli.record.topics import Topic, Topics
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.table import table
 from manipcli.report.text import FAIL, PASS, steps_table

@@ -15,7 +15,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.flow import execute, steps_run
 from manipcli.judge.verdict import Verdict
 from manipcli.plan.step import Motion
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 TABLE = "table: {box: {size: [0.4, 0.4, 0.2]}, pose: {xyz: [0.7, 0, 0.1]}, fixed: true}"

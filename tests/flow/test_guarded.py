@@ -12,7 +12,7 @@ from manipcli.flow.check import check_files
 from manipcli.flow.load import load_task
 from manipcli.model.kinematics import Kinematics
 from manipcli.pipeline import run_task
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 
 ROOT = Path(__file__).parents[2]
 ARM = f"robot: {ROOT}/robots/arm7_hand3/robot.yaml\ncontrollers: {ROOT}/controllers/arm7_hand3.yaml\n"

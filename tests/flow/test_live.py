@@ -19,7 +19,7 @@ from manipcli.model.conditions import CONDITIONS
 from manipcli.model.formula import leaves
 from manipcli.model.moments import Moments
 from manipcli.model.reading import Reading
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.spec.condition import ConditionSpec
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from manipcli.flow.load import Task
 from manipcli.flow.plan import plan_task
 from manipcli.flow.sample import load_task
 from manipcli.pipeline import run_task, verify_log
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 

@@ -11,7 +11,7 @@ import pytest
 from manipcli.core.errors import InvalidInput
 from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 
 ROOT = Path(__file__).parents[2]
 ARM = ", ".join(f"joint_{k}" for k in range(1, 8))

@@ -18,7 +18,7 @@ from manipcli.flow.tune import Tuning, chart_of, tune, written
 from manipcli.model.build_robot import build_robot
 from manipcli.model.scene import Scene
 from manipcli.pipeline import run_task
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_controllers, load_robot

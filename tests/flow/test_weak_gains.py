@@ -13,7 +13,7 @@ from manipcli.core.errors import Finding
 from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 POSES = "poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}"
 WEIGHT = 1.0 * 9.80665 * 0.25 * math.sin(1.2)

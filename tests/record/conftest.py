@@ -27,7 +27,7 @@ from manipcli.model.robot import (
 from manipcli.model.scene import Body, Frame, Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 
 PERIOD = 0.001
 CONTROLLERS = (

@@ -23,7 +23,7 @@ from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.model.robot import Mesh
 from manipcli.model.state import Contact
 from manipcli.pipeline import run_task
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
 from manipcli.replay.drawing import draw

@@ -14,7 +14,7 @@ import pytest
 from manipcli import pipeline
 from manipcli.flow import execute
 from manipcli.judge.verdict import Verdict
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.simulate.engines import ENGINES
 
 pytestmark = pytest.mark.slow

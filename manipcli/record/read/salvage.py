@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.chunk import Places, open_chunk, walked
 from manipcli.record.faults import BadRecording
+from manipcli.record.read.chunk import Places, open_chunk, walked
+from manipcli.record.read.scan import MAX_NAMED, Damage, Record, Scan
 from manipcli.record.records import (
     ATTACHMENT,
     CHANNEL,
@@ -28,7 +29,6 @@ from manipcli.record.records import (
     RECORD_HEAD,
     SCHEMA,
 )
-from manipcli.record.scan import MAX_NAMED, Damage, Record, Scan
 
 if TYPE_CHECKING:
     from mcap.records import Attachment, Channel, Header, Metadata, Schema

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from manipcli.core.geometry import Array
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.chunk import Int, Places
+from manipcli.record.read.chunk import Int, Places
 
 
 @dataclass(frozen=True, slots=True)

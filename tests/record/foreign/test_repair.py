@@ -16,12 +16,12 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import CompressionType, IndexType, Writer
 
-from manipcli.record import recorder as recorder_module
 from manipcli.record.faults import BadRecording, CopyFailed, RecordingRefused
-from manipcli.record.reading import open_recording, read_recording
-from manipcli.record.repair import default_output, repair
-from manipcli.record.snapshot import snapshot
-from manipcli.record.topics import open_topics
+from manipcli.record.foreign.repair import default_output, repair
+from manipcli.record.foreign.snapshot import snapshot
+from manipcli.record.foreign.topics import open_topics
+from manipcli.record.read.reading import open_recording, read_recording
+from manipcli.record.write import recorder as recorder_module
 
 MakeRun = Callable[[int], Any]
 MAGIC = b"\x89MCAP0\r\n"

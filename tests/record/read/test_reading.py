@@ -21,11 +21,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import ExitCode
 from manipcli.model.state import WorldState
-from manipcli.record import recorder as recorder_module
-from manipcli.record.differences import body_velocities
 from manipcli.record.faults import BadRecording, Thinned
-from manipcli.record.reading import open_recording, read_recording
+from manipcli.record.read.differences import body_velocities
+from manipcli.record.read.reading import open_recording, read_recording
 from manipcli.record.recording import Recording
+from manipcli.record.write import recorder as recorder_module
 
 MakeRun = Callable[[int], Any]
 Rewrite = Callable[..., Path]
@@ -481,7 +481,7 @@ def test_time_running_backwards_is_refused(tmp_path: Path, make_run: MakeRun) ->
 
 def test_chunks_hold_indexes_that_cover_every_message(small: tuple[Any, Path]) -> None:
     """The fast way through a file of ours is taken: indexes account for each byte of each chunk."""
-    from manipcli.record.chunk import indexed, walked
+    from manipcli.record.read.chunk import indexed, walked
 
     pending: Chunk | None = None
     indexes: dict[int, bytes] = {}

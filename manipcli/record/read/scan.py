@@ -21,6 +21,7 @@ from typing import BinaryIO, TypeVar
 
 from manipcli.record.cdr import CdrError
 from manipcli.record.faults import REPAIRABLE, BadRecording
+from manipcli.record.read.resync import Index, next_chunk, read_index
 from manipcli.record.records import (
     CHUNK,
     DATA_END,
@@ -32,7 +33,6 @@ from manipcli.record.records import (
     MESSAGE_INDEX,
     RECORD_HEAD,
 )
-from manipcli.record.resync import Index, next_chunk, read_index
 
 MAX_NAMED = 4096
 """Channels, schemas, attachments and metadata records in one file."""

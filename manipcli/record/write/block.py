@@ -21,7 +21,8 @@ from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
 from manipcli.record.channels import Channel, ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.messages import WORLD
-from manipcli.record.rows import (
+from manipcli.record.selection import Selection
+from manipcli.record.write.rows import (
     RowBlock,
     Template,
     Times,
@@ -30,7 +31,6 @@ from manipcli.record.rows import (
     tf_template,
     wrench_template,
 )
-from manipcli.record.selection import Selection
 from manipcli.spec.controllers import Interface
 
 Index = npt.NDArray[np.uint64]

@@ -16,13 +16,13 @@ from manipcli.record import channels as topics
 from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.chunk import indexed, open_chunk, singly, walked
 from manipcli.record.contents import RECORD, REPAIR, Contents, contents
 from manipcli.record.faults import BadRecording
+from manipcli.record.read.chunk import indexed, open_chunk, singly, walked
+from manipcli.record.read.scan import MAX_NAMED, Record, Scan, guarded
+from manipcli.record.read.spans import FileSpans
 from manipcli.record.recording import Recording, TaskEvent
 from manipcli.record.records import ATTACHMENT, CHANNEL, CHUNK, HEADER, MESSAGE, METADATA, SCHEMA
-from manipcli.record.scan import MAX_NAMED, Record, Scan, guarded
-from manipcli.record.spans import FileSpans
 
 if TYPE_CHECKING:
     from mcap.records import Attachment

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.faults import REPAIRABLE, BadRecording
+from manipcli.record.read.scan import Record
 from manipcli.record.records import CHUNK_HEAD, MESSAGE, MESSAGE_HEAD, PAYLOAD, RECORD_HEAD
-from manipcli.record.scan import Record
 
 MAX_CHUNK = 1 << 26
 """[byte] of a chunk, unpacked; below, it may compress as well as it likes: images and maps of one value do."""

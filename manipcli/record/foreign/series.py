@@ -12,13 +12,13 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.record.cdr import CdrError
-from manipcli.record.chunk import Int, Places, every
 from manipcli.record.decode import Layouts, Run, runs, stretches
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import Key, Way
+from manipcli.record.foreign.fields import Key, Way
+from manipcli.record.foreign.topics import Topics
+from manipcli.record.read.chunk import Int, Places, every
 from manipcli.record.schemas import CONTACTS
-from manipcli.record.topics import Topics
 
 MAX_VALUES = 50_000_000
 """Of all series together: 800 MB with their times."""

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.chunk import Int, Places
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
-from manipcli.record.distance import Near, Value, first_difference
-from manipcli.record.topics import Topic, Topics, open_topics
+from manipcli.record.foreign.distance import Near, Value, first_difference
+from manipcli.record.foreign.topics import Topic, Topics, open_topics
+from manipcli.record.read.chunk import Int, Places
 
 MAX_WAITING = 1 << 28
 """[byte] of messages that wait for their partner. One that did not come by then counts as absent."""

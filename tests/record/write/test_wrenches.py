@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from manipcli.control.controller import ControllerOutput
 from manipcli.model.state import WorldState
 from manipcli.record.channels import ControllerChannel, WrenchChannel
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 ARM = ControllerChannel("arm", ("shoulder", "slide"))
 HAND = ControllerChannel("hand", ("spin",), interfaces=("position",))

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.chunk import Int
 from manipcli.record.decode import Bytes, Layouts, Run, runs, stretches
 from manipcli.record.definition import Message
+from manipcli.record.read.chunk import Int
 
 Value = float | int | str
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from manipcli.core.errors import InvalidInput
 from manipcli.model.located_xml import parse_document
-from manipcli.record.fields import Way
+from manipcli.record.foreign.fields import Way
 
 JointUnits = Mapping[str, str]
 """Unit of the position of each joint whose kind is known: rad or m."""

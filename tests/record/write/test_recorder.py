@@ -23,9 +23,9 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.geometry import Transform, matrix_from_axis_angle, quat_from_matrix
-from manipcli.record import recorder as recorder_module
 from manipcli.record.faults import RecordingFailed, RecordingRefused
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
+from manipcli.record.write import recorder as recorder_module
 
 MakeRun = Callable[[int], Any]
 T = 1203  # two full blocks and a part of a third

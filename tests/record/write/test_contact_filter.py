@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manipcli.model.state import Contact
-from manipcli.record.contact_filter import ContactFilter
+from manipcli.record.write.contact_filter import ContactFilter
 
 TICK = 0.001
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from manipcli.record import channels as topics
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.chunk import singly
-from manipcli.record.namespaces import TYPES, Meant, meant, namespaces
-from manipcli.record.topics import Topics
+from manipcli.record.foreign.namespaces import TYPES, Meant, meant, namespaces
+from manipcli.record.foreign.topics import Topics
+from manipcli.record.read.chunk import singly
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from manipcli.control.action import ErrorCode, Feedback, GoalResult
 from manipcli.record import messages
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 MakeRun = Callable[[int], Any]
 MS = 1_000_000

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipcli.core.lock import Taken, lock
-from manipcli.record.block import ChunkContent
-from manipcli.record.chunk import Places, walked
-from manipcli.record.container import LIBRARY, Container
 from manipcli.record.contents import REPAIR
 from manipcli.record.faults import PARTIAL, BadRecording, CopyFailed, RecordingFailed, RecordingRefused
+from manipcli.record.read.chunk import Places, walked
+from manipcli.record.read.salvage import Salvage, Stretch
+from manipcli.record.read.scan import Damage
 from manipcli.record.records import PAYLOAD
-from manipcli.record.salvage import Salvage, Stretch
-from manipcli.record.scan import Damage
+from manipcli.record.write.block import ChunkContent
+from manipcli.record.write.container import LIBRARY, Container
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema

@@ -14,19 +14,19 @@ from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.chunk import Int, Places, chunk_places, open_chunk, sequences, singly
-from manipcli.record.columns import (
+from manipcli.record.contents import Contents
+from manipcli.record.faults import Thinned
+from manipcli.record.messages import WORLD
+from manipcli.record.read.chunk import Int, Places, chunk_places, open_chunk, sequences, singly
+from manipcli.record.read.columns import (
     Columns,
     body_runs,
     controller_state_runs,
     joint_state_runs,
 )
-from manipcli.record.contents import Contents
-from manipcli.record.differences import body_velocities
-from manipcli.record.faults import Thinned
-from manipcli.record.messages import WORLD
+from manipcli.record.read.differences import body_velocities
+from manipcli.record.read.scan import Record, chunk_at, guarded, readable
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
-from manipcli.record.scan import Record, chunk_at, guarded, readable
 from manipcli.record.selection import common_stride
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from manipcli.core.lock import Taken, lock
-from manipcli.record.block import ChunkContent
 from manipcli.record.faults import PARTIAL, RecordingFailed, RecordingRefused
 from manipcli.record.records import MAGIC, MESSAGE_INDEX
+from manipcli.record.write.block import ChunkContent
 
 if TYPE_CHECKING:
     from mcap.records import Attachment, AttachmentIndex, ChunkIndex, McapRecord, MetadataIndex, Schema

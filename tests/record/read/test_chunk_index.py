@@ -9,8 +9,8 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.chunk import Places, indexed, walked
-from manipcli.record.columns import Columns, NamedRuns, joint_state_runs
+from manipcli.record.read.chunk import Places, indexed, walked
+from manipcli.record.read.columns import Columns, NamedRuns, joint_state_runs
 
 HEAD = struct.Struct("<BQHIQQ")
 """MCAP: opcode, length, channel, sequence, log time, publish time; the length counts what follows it."""

@@ -16,13 +16,13 @@ from manipcli.record.cdr import CdrError
 from manipcli.record.decode import runs
 from manipcli.record.definition import read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import FieldName, UnknownField, parse_field, ways
+from manipcli.record.foreign.fields import FieldName, UnknownField, parse_field, ways
+from manipcli.record.foreign.repair import repair
+from manipcli.record.foreign.series import Series, Wanted, leaves, read_series
+from manipcli.record.foreign.topics import open_topics
+from manipcli.record.foreign.units import unit_of
+from manipcli.record.read.scan import Scan
 from manipcli.record.records import CHUNK, MESSAGE_INDEX
-from manipcli.record.repair import repair
-from manipcli.record.scan import Scan
-from manipcli.record.series import Series, Wanted, leaves, read_series
-from manipcli.record.topics import open_topics
-from manipcli.record.units import unit_of
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = STORE.types
@@ -269,7 +269,7 @@ def test_a_message_of_millions_of_parts_is_not_walked_to_its_end(
 
 
 def test_messages_that_differ_each_time_are_walked_only_so_far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("manipcli.record.series.MAX_DECODED", 200)
+    monkeypatch.setattr("manipcli.record.foreign.series.MAX_DECODED", 200)
     messages = [
         (k, "/joint_states", "sensor_msgs/msg/JointState", joint_state(k, [f"j{k:03}"], [1.0])) for k in range(100)
     ]

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from mcap.records import Message
 from mcap.writer import Writer
 
-from manipcli.record import compare
-from manipcli.record.compare import compare_logs, compared_with_itself
-from manipcli.record.compare_entries import compare_entries
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign import compare
+from manipcli.record.foreign.compare import compare_logs, compared_with_itself
+from manipcli.record.read.compare_entries import compare_entries
+from manipcli.record.read.reading import open_recording
 from manipcli.report.comparison import counted
 
 T = 1203

@@ -21,16 +21,16 @@ from manipcli.model.scene import Scene
 from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
 from manipcli.record import messages
-from manipcli.record.block import Block, Single
 from manipcli.record.channels import TRANSIENT_LOCAL, Channel, ControllerChannel, Recorded, channel_table
-from manipcli.record.container import Container
 from manipcli.record.contents import RECORD, Contents
 from manipcli.record.faults import RecordingRefused
-from manipcli.record.goals import GoalLog
 from manipcli.record.recording import TaskEvent
-from manipcli.record.rows import message_record
 from manipcli.record.schemas import schema_text
 from manipcli.record.selection import EVERYTHING, Selection, word
+from manipcli.record.write.block import Block, Single
+from manipcli.record.write.container import Container
+from manipcli.record.write.goals import GoalLog
+from manipcli.record.write.rows import message_record
 from manipcli.spec.task import JUDGED
 
 BLOCK_SECONDS = 0.5
