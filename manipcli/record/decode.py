@@ -65,6 +65,11 @@ class Run:
     array: bool = False
 
     @property
+    def fields(self) -> tuple[str, ...]:
+        """Without the elements that were entered."""
+        return tuple(name for name, _ in self.steps)
+
+    @property
     def path(self) -> str:
         """Fields, and elements by their number: `points[0].positions`."""
         text = ".".join(name if one is None else f"{name}[{one.number}]" for name, one in self.steps)
@@ -85,6 +90,11 @@ class Run:
     def begin(self) -> int:
         """Of its first byte, with the length before a text."""
         return self.offset - 4 if not self.code else self.offset
+
+    @property
+    def end(self) -> int:
+        """Behind its last byte."""
+        return self.offset + self.size
 
     def name(self, k: int) -> str:
         """Label of number `k`."""
@@ -190,11 +200,10 @@ class _Walk:
 
 @dataclass(frozen=True, slots=True)
 class _Layout(Generic[T]):
-    """What was made of the messages that have this length, and `letters` at their bytes `guards`."""
+    """What was made of the messages that have this length, and these bytes from these offsets on."""
 
     length: int
-    guards: Int
-    letters: Bytes
+    guards: tuple[tuple[int, Bytes], ...]
     made: T
 
 
@@ -202,14 +211,14 @@ class Layouts(Generic[T]):
     """Messages of one topic in groups of one layout.
 
     Args:
-        make: one message to what is wanted of its layout, and the bytes by which another has the same.
+        make: one message to what is wanted of its layout, and the bytes [begin, end) that other messages share with it.
     """
 
-    def __init__(self, make: Callable[[memoryview], tuple[T, Int]]) -> None:
+    def __init__(self, make: Callable[[memoryview], tuple[T, Sequence[tuple[int, int]]]]) -> None:
         self._make = make
         self._known: deque[_Layout[T]] = deque(maxlen=REMEMBERED)
 
-    def groups(self, data: Bytes, starts: Int, lengths: Int) -> Iterator[tuple[T, Int]]:
+    def groups(self, data: bytes, starts: Int, lengths: Int) -> Iterator[tuple[T, Int]]:
         """A layout, and which of the messages have it.
 
         Args:
@@ -222,28 +231,34 @@ class Layouts(Generic[T]):
         rest = np.arange(len(starts))
         while len(rest):
             start, length = int(starts[rest[0]]), int(lengths[rest[0]])
-            layout = self._layout(data[start : start + length])
-            same = rest[lengths[rest] == length]
-            if len(layout.guards):
-                step = max(1, (1 << 22) // len(layout.guards))  # a few megabytes at a time
-                fits = [
-                    (data[starts[some][:, None] + layout.guards] == layout.letters).all(axis=1)
-                    for some in (same[k : k + step] for k in range(0, len(same), step))
-                ]
-                same = same[np.concatenate(fits)]
+            layout = self._layout(memoryview(data)[start : start + length])
+            alike = lengths[rest] == length
+            same = rest if alike.all() else rest[alike]
+            for offset, letters in layout.guards:
+                unlike = rows(data, starts[same] + offset, len(letters)) != letters
+                if unlike.any():
+                    same = same[~unlike.any(axis=1)]
             yield layout.made, same
-            rest = np.setdiff1d(rest, same, assume_unique=True)
+            rest = rest[:0] if len(same) == len(rest) else np.setdiff1d(rest, same, assume_unique=True)
 
-    def _layout(self, message: Bytes) -> _Layout[T]:
+    def _layout(self, message: memoryview) -> _Layout[T]:
+        own = np.frombuffer(message, np.uint8)
         for one in self._known:
-            if one.length == len(message) and np.array_equal(message[one.guards], one.letters):
+            if one.length == len(own) and all(np.array_equal(own[at : at + len(x)], x) for at, x in one.guards):
                 return one
-        made, guards = self._make(message.data)
-        found = _Layout(len(message), guards, message[guards], made)
+        made, guards = self._make(message)
+        merged: list[tuple[int, int]] = []
+        for begin, end in sorted(guards):
+            if merged and begin - merged[-1][1] < 4:  # nothing between them but what aligns
+                begin = merged.pop()[0]
+            merged.append((begin, end))
+        found = _Layout(len(own), tuple((begin, own[begin:end].copy()) for begin, end in merged), made)
         self._known.appendleft(found)
         return found
 
 
-def stretches(found: Sequence[tuple[int, int]]) -> Int:
-    """Every byte of some stretches [begin, end)."""
-    return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, end) for begin, end in found)])
+def rows(data: bytes, starts: Int, size: int) -> Bytes:
+    """(T, size) the bytes that begin at `starts`; `size` is not 0."""
+    kind = np.dtype((np.void, size))
+    every = np.ndarray((len(data) - size + 1,), dtype=kind, buffer=data, strides=(1,))
+    return every[starts].view(np.uint8).reshape(len(starts), size)

@@ -15,17 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
+from manipcli.record.decode import Bytes, Int, rows
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.foreign.distance import Near, Value, first_difference
 from manipcli.record.foreign.topics import Topic, Topics, open_topics
-from manipcli.record.read.chunk import Int, Places
+from manipcli.record.read.chunk import Places
 
 MAX_WAITING = 1 << 28
 """[byte] of messages that wait for their partner. One that did not come by then counts as absent."""
 HEAD = 20
 """[byte] before a message: sequence number, log time, publish time."""
-
-Rows = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,12 +185,9 @@ class _Block:
         start = int(self.places.starts[k])
         return self.data[start - before : start + int(self.places.lengths[k])]
 
-    def rows(self, which: Int, length: int, before: int) -> Rows:
+    def rows(self, which: Int, length: int, before: int) -> Bytes:
         """(n, before + length) messages of one length."""
-        kind = np.dtype((np.void, before + length))
-        every = np.ndarray((len(self.data) - kind.itemsize + 1,), dtype=kind, buffer=self.data, strides=(1,))
-        taken = every[self.places.starts[which] - before]
-        return taken.view(np.uint8).reshape(len(which), before + length)
+        return rows(self.data, self.places.starts[which] - before, before + length)
 
 
 class _Side:
@@ -298,10 +294,10 @@ class _Merge:
             which = np.flatnonzero(same & (a.places.lengths == length))
             step = max(1, (1 << 22) // (length + self._before))
             for some in (which[k : k + step] for k in range(0, len(which), step)):
-                rows = (a.rows(some, length, self._before), b.rows(some, length, self._before))
-                other = np.flatnonzero((rows[0] != rows[1]).any(axis=1))
+                both = (a.rows(some, length, self._before), b.rows(some, length, self._before))
+                other = np.flatnonzero((both[0] != both[1]).any(axis=1))
                 if len(other) and self._tolerance and name in self._near:
-                    near = self._near[name].within(rows[0][other, self._before :], rows[1][other, self._before :])
+                    near = self._near[name].within(both[0][other, self._before :], both[1][other, self._before :])
                     other = other[~near]
                 unlike.append(some[other])
         every = np.concatenate(unlike)

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError
-from manipcli.record.decode import Bytes, Layouts, Run, runs, stretches
+from manipcli.record.decode import Bytes, Int, Layouts, Run, runs
 from manipcli.record.definition import Message
-from manipcli.record.read.chunk import Int
 
 Value = float | int | str
 
@@ -77,7 +76,7 @@ class Near:
         """(n,) whether the messages (n, length) differ in floating-point numbers alone, and by no more."""
         near = np.zeros(len(a), dtype=bool)
         n, length = a.shape
-        for found, some in self._layouts.groups(a.reshape(-1), np.arange(n) * length, np.full(n, length)):
+        for found, some in self._layouts.groups(a.tobytes(), np.arange(n) * length, np.full(n, length)):
             near[some] = self._alike(found, a[some], b[some])
         return near
 
@@ -88,15 +87,15 @@ class Near:
             alike &= _near(u, v, self._tolerance).all(axis=1)
         return np.asarray(alike)
 
-    def _places(self, data: memoryview) -> tuple[_Places, Int]:
+    def _places(self, data: memoryview) -> tuple[_Places, list[tuple[int, int]]]:
         every = np.arange(len(data))
         try:
             found = runs(self._message, data)
         except CdrError:  # not a message of this type: all its bytes count
-            return _Places((), every), every
-        numbers = tuple(
-            (code, stretches([(run.offset, run.offset + run.size) for run in found if run.code == code]))
-            for code in ("<f8", "<f4")
-        )
-        guards = stretches([(run.begin, run.offset + run.size) for run in found if run.code in ("", "#")])
-        return _Places(numbers, np.setdiff1d(every, np.concatenate([at for _, at in numbers]))), guards
+            return _Places((), every), [(0, len(data))] if len(data) else []
+        numbers = []
+        for code in ("<f8", "<f4"):
+            places = [np.arange(run.offset, run.end) for run in found if run.code == code]
+            numbers.append((code, np.concatenate([np.zeros(0, dtype=np.int64), *places])))
+        guards = [(run.begin, run.end) for run in found if run.code in ("", "#")]
+        return _Places(tuple(numbers), np.setdiff1d(every, np.concatenate([at for _, at in numbers]))), guards

@@ -12,12 +12,12 @@ import numpy as np
 
 from manipcli.core.geometry import Array, frozen
 from manipcli.record.cdr import CdrError
-from manipcli.record.decode import Layouts, Run, runs, stretches
+from manipcli.record.decode import Int, Layouts, Run, runs
 from manipcli.record.definition import Message
 from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.fields import Key, Way
 from manipcli.record.foreign.topics import Topics
-from manipcli.record.read.chunk import Int, Places, every
+from manipcli.record.read.chunk import Places, every
 from manipcli.record.schemas import CONTACTS
 
 MAX_VALUES = 50_000_000
@@ -143,7 +143,7 @@ class _Gathered:
         added = 0
         if self._held:
             self._seen.append(seconds)
-        for leaves, alike in self._layouts.groups(np.frombuffer(data, np.uint8), places.starts, places.lengths):
+        for leaves, alike in self._layouts.groups(data, places.starts, places.lengths):
             for leaf in leaves:
                 values = _numbers(data, places.starts[alike] + leaf.offset, leaf.code)
                 if self._way.is_time:
@@ -154,17 +154,17 @@ class _Gathered:
                 added += len(values)
         return added
 
-    def _leaves(self, message: memoryview) -> tuple[tuple[Leaf, ...], Int]:
+    def _leaves(self, message: memoryview) -> tuple[tuple[Leaf, ...], list[tuple[int, int]]]:
         found = runs(self._message, message)
         self._decoded += len(found)
         if self._decoded > MAX_DECODED:
             raise CdrError("has other parts each time, and there are too many of them")
         fields = tuple(part.name for part in self._way.parts)
-        names = [run for run in found if not run.code and _names(tuple(name for name, _ in run.steps), fields)]
+        names = [run for run in found if not run.code and _names(run.fields, fields)]
         # Lengths decide where things are, and texts on the way to the number which element it is in.
         guards = [(run.begin, run.begin + 4) for run in found if run.code in ("", "#")]
-        guards += [(run.offset, run.offset + run.count) for run in names]
-        return leaves(found, self._way), stretches(guards)
+        guards += [(run.offset, run.end) for run in names]
+        return leaves(found, self._way), guards
 
     def series(self) -> list[Series]:
         """What was gathered."""
@@ -201,9 +201,7 @@ def leaves(found: Sequence[Run], way: Way) -> tuple[Leaf, ...]:
     result: list[Leaf] = []
     used: dict[str, int] = {}
     for run in found:
-        if run.code in ("", "#") or len(run.steps) != len(fields):
-            continue
-        if tuple(name for name, _ in run.steps) != fields:
+        if run.code in ("", "#") or len(run.steps) != len(fields) or run.fields != fields:
             continue
         above = [(one, part.key) for (_, one), part in zip(run.steps, way.parts, strict=False) if one is not None]
         if not all(key is None or key.takes(one.names, one.number, one.count) for one, key in above):

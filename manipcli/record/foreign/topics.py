@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from manipcli.record.decode import Int
 from manipcli.record.faults import REPAIRABLE, BadRecording
-from manipcli.record.read.chunk import Int, Places, chunk_places, open_chunk, walked
+from manipcli.record.read.chunk import Places, chunk_places, open_chunk, walked
 from manipcli.record.read.salvage import Salvage, Stretch
 from manipcli.record.read.scan import Damage, chunk_at, guarded, readable
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.decode import Int
 from manipcli.record.faults import REPAIRABLE, BadRecording
 from manipcli.record.read.scan import Record
 from manipcli.record.records import CHUNK_HEAD, MESSAGE, MESSAGE_HEAD, PAYLOAD, RECORD_HEAD
@@ -20,8 +21,6 @@ MAX_CHUNK = 1 << 26
 """[byte] of a chunk, unpacked; below, it may compress as well as it likes: images and maps of one value do."""
 _MAX_OTHERS = 8192
 """Schemas and channels in a chunk."""
-
-Int = npt.NDArray[np.int64]
 
 
 def open_chunk(path: Path, record: Record) -> bytes:

@@ -12,12 +12,14 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.model.state import Contact, WorldState
 from manipcli.record import channels as topics
+from manipcli.record import schemas
 from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import ControllerChannel
 from manipcli.record.contents import Contents
+from manipcli.record.decode import Int
 from manipcli.record.faults import Thinned
 from manipcli.record.messages import WORLD
-from manipcli.record.read.chunk import Int, Places, chunk_places, open_chunk, sequences, singly
+from manipcli.record.read.chunk import Places, chunk_places, open_chunk, sequences, singly
 from manipcli.record.read.columns import (
     Columns,
     body_runs,
@@ -107,13 +109,19 @@ class _SpanReader:
         everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
         self._controllers = [one for one in everyone if one.state_topic not in contents.absent]
         self._bodies = m
-        self._columns = {topics.JOINT_STATES: Columns(topics.JOINT_STATES, joint_state_runs, contents.joints, (n,) * 3)}
+        self._columns = {
+            topics.JOINT_STATES: Columns(
+                topics.JOINT_STATES, schemas.JOINT_STATE, joint_state_runs, contents.joints, (n,) * 3
+            )
+        }
         if topics.TF not in contents.absent:
             poses = body_runs(frozenset(contents.bodies), WORLD)
-            self._columns[topics.TF] = Columns(topics.TF, poses, contents.bodies, (7,) * m)
+            self._columns[topics.TF] = Columns(topics.TF, schemas.TF_MESSAGE, poses, contents.bodies, (7,) * m)
         for controller in self._controllers:
             topic, widths = controller.state_topic, (len(controller.joints),) * 4
-            self._columns[topic] = Columns(topic, controller_state_runs, controller.joints, widths)
+            self._columns[topic] = Columns(
+                topic, schemas.CONTROLLER_STATE, controller_state_runs, controller.joints, widths
+            )
         strides = {topic: contents.strides.get(topic, 1) for topic in self._columns}
         self._grid_ns = common_stride(strides) * contents.period * 1e9
         self._strided = len(set(strides.values())) > 1

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
+from manipcli.record import schemas
 from manipcli.record.cdr import CdrError
 from manipcli.record.read.chunk import Places, indexed, walked
 from manipcli.record.read.columns import Columns, NamedRuns, joint_state_runs
@@ -96,12 +97,12 @@ def test_of_some_channels_the_others_need_not_be_known() -> None:
 def test_of_one_channel_each_message_is_later_than_the_one_before(
     first: list[int], second: list[int], named: int
 ) -> None:
-    data = bytes([0, 1, 0, 0, 0, 0, 0, 0])  # an empty CDR message
-    columns = Columns("/x", lambda _: NamedRuns((), ()), (), ())
+    data = bytes([0, 1, 0, 0, 1, 0, 0, 0, 0])  # an empty text
+    columns = Columns("/x", schemas.STRING, lambda _, __: NamedRuns((), ()), (), ())
     with pytest.raises(CdrError, match=f"time runs backwards in /x after t = {named:.3f} s"):
         for times in (first, second):
             at = np.zeros(len(times), dtype=np.int64)
-            columns.add(data, Places(np.array(times, dtype=np.int64) * 10**9, at, at + 8))
+            columns.add(data, Places(np.array(times, dtype=np.int64) * 10**9, at, at + 9))
 
 
 def test_a_message_that_is_cut_takes_nothing_from_the_next() -> None:
@@ -115,7 +116,7 @@ def test_a_message_that_is_cut_takes_nothing_from_the_next() -> None:
     one = bytes(store.serialize_cdr(message, "sensor_msgs/msg/JointState"))
     times, starts = np.array([1, 2, 3]) * 10**9, np.arange(3) * len(one)
     for lengths, whole in (([0, 0, 0], True), ([0, -8, 0], False), ([0, 0, -1], False), ([-8, -8, -8], False)):
-        columns = Columns("/joint_states", joint_state_runs, ("a",), (1, 1, 1))
+        columns = Columns("/joint_states", schemas.JOINT_STATE, joint_state_runs, ("a",), (1, 1, 1))
         places = Places(times, starts, np.array(lengths) + len(one))
         if not whole:
             with pytest.raises(CdrError, match="ends too early"):
