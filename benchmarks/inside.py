@@ -29,7 +29,7 @@ from manipcli.plan.limits import MotionLimits
 from manipcli.plan.path import joint_path
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.retimer import retime
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineMember, EngineSettings
 from manipcli.simulate.engines import ENGINES

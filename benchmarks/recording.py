@@ -20,8 +20,8 @@ from mcap.writer import Writer
 
 from benchmarks.table import Row
 from manipcli.pipeline import run_task
-from manipcli.record.container import Container
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.container import Container
+from manipcli.record.write.recorder import Recorder
 
 POUR = Path(__file__).resolve().parents[1] / "tasks" / "pour.yaml"
 CALLS = ("tick", "contacts", "event", "goal_sent", "goal_feedback", "goal_ended")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from manipcli.judge.verdict import Verdict
     from manipcli.model.state import WorldState
     from manipcli.pipeline import Plan, Task, check_files, judge_log, load_task, plan_task, run_task
-    from manipcli.record.reading import open_recording, read_recording
+    from manipcli.record.read.reading import open_recording, read_recording
     from manipcli.record.recording import Recording
     from manipcli.report.run_report import RunReport
 
@@ -62,8 +62,8 @@ _HOMES = {
     "load_task": "pipeline",
     "plan_task": "pipeline",
     "run_task": "pipeline",
-    "open_recording": "record.reading",
-    "read_recording": "record.reading",
+    "open_recording": "record.read.reading",
+    "read_recording": "record.read.reading",
     "Recording": "record.recording",
     "RunReport": "report.run_report",
 }

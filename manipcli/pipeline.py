@@ -21,7 +21,7 @@ from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
 from manipcli.preflight.gains import gain_findings
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
 from manipcli.run.execute import build_manager, simulate

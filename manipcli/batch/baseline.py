@@ -122,7 +122,7 @@ def measured(verdict: Verdict, log: Path) -> Measures:
     """
     from manipcli.judge.measures.step_measures import step_measures
     from manipcli.logs.recorded_files import recorded_robot
-    from manipcli.record.reading import open_recording
+    from manipcli.record.read.reading import open_recording
 
     found: Measures = {("duration",): Measure(verdict.simulated_time, "s")}
     for step in verdict.steps:

@@ -110,7 +110,7 @@ class Outputs:
             meshes, package_path, allow_outside: the meshes that are known, and where others may be.
         """
         from manipcli.logs.report import file_places, log_page, log_places
-        from manipcli.record.reading import open_recording
+        from manipcli.record.read.reading import open_recording
         from manipcli.report.html import render_page
         from manipcli.report.junit import render_junit
 

@@ -18,14 +18,13 @@ from manipcli.record.cdr import CdrError, CdrReader
 from manipcli.record.channels import CONTACTS, JOINT_STATES, ROBOT_DESCRIPTION
 from manipcli.record.definition import Message, UnknownDefinition, read_definition
 from manipcli.record.faults import BadRecording
-from manipcli.record.fields import FieldName, UnknownField, Way, numbers, parse_field, short, ways
-from manipcli.record.layout import Part
-from manipcli.record.namespaces import meant
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.fields import FieldName, Part, UnknownField, Way, numbers, parse_field, short, ways
+from manipcli.record.foreign.namespaces import meant
+from manipcli.record.foreign.series import Series, Wanted, read_series
+from manipcli.record.foreign.topics import Topic, Topics, open_topics
+from manipcli.record.foreign.units import JointUnits, joint_units, unit_of
+from manipcli.record.read.reading import open_recording
 from manipcli.record.schemas import CONTROLLER_STATE
-from manipcli.record.series import Series, Wanted, read_series
-from manipcli.record.topics import Topic, Topics, open_topics
-from manipcli.record.units import JointUnits, joint_units, unit_of
 from manipcli.replay.curves import Chart, Curve, Interval, Panel
 
 MAX_CURVES = 400

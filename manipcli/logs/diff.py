@@ -10,9 +10,9 @@ from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_robot
 from manipcli.record.channels import EVENTS, ROSOUT
-from manipcli.record.compare import Comparison, compare_logs
-from manipcli.record.compare_entries import compare_entries
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.compare import Comparison, compare_logs
+from manipcli.record.read.compare_entries import compare_entries
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.log_diff import LogDiff, LogSide
 

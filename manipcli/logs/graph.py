@@ -21,9 +21,9 @@ from manipcli.logs.recorded_files import recorded_controllers_file, recorded_rob
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.channels import channel_table
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.topics import Topic, open_topics
+from manipcli.record.read.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word
-from manipcli.record.topics import Topic, open_topics
 from manipcli.report.graph import Edge, Graph, Node
 from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene

@@ -9,7 +9,7 @@ from pathlib import Path
 from manipcli.judge.judge import judge
 from manipcli.judge.verdict import Verdict
 from manipcli.logs.recorded_files import recorded_robot, recorded_scene, recorded_task_file
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span
 
 

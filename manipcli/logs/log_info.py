@@ -9,9 +9,9 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.record import channels
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
-from manipcli.record.inventory import inventory
-from manipcli.record.namespaces import meant
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.namespaces import meant
+from manipcli.record.foreign.topics import open_topics
+from manipcli.record.read.reading import open_recording
 from manipcli.report.log_info import LogInfo
 
 COMMON = (channels.ROBOT_DESCRIPTION, channels.JOINT_STATES, channels.TF)
@@ -23,7 +23,7 @@ def log_info(path: Path) -> LogInfo:
     Raises:
         BadRecording: the file is no MCAP file, or cannot be read.
     """
-    found = inventory(path)
+    found = open_topics(path, damaged=True)
     ours = RECORD in found.metadata
     missing = list(found.faults)
     steps: tuple[StepOutcome, ...] = ()
@@ -45,7 +45,7 @@ def log_info(path: Path) -> LogInfo:
                 missing.append("the run did not come to its end: the log has no status and no verdict")
     else:
         missing.append("manipcli did not write it: it tells of no task, no steps and no verdict")
-        known = meant({topic.name: topic.type for topic in found.topics})
-        there = {known[topic.name].usual for topic in found.topics if topic.messages and topic.name in known}
+        known = meant({name: topic.type for name, topic in found.all.items()})
+        there = {known[name].usual for name, topic in found.all.items() if topic.count and name in known}
         missing += [f"there is no {topic}" for topic in COMMON if topic not in there]
-    return LogInfo(inventory=found, ours=ours, steps=steps, missing=tuple(missing))
+    return LogInfo(found=found, ours=ours, steps=steps, missing=tuple(missing))

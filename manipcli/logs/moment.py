@@ -20,12 +20,12 @@ from manipcli.record.attachments import URDF
 from manipcli.record.channels import CONTACTS, EVENTS, TF
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import LEFT_OUT, BadRecording, Thinned
-from manipcli.record.inventory import Inventory, inventory
+from manipcli.record.foreign.snapshot import snapshot
+from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
-from manipcli.record.snapshot import snapshot
-from manipcli.record.units import joint_units
 from manipcli.report.moment import JointMoment, Moment, PoseMoment
 
 
@@ -35,7 +35,7 @@ def moment(path: Path, time: float) -> Moment:
     Raises:
         InvalidInput: the file is no log, is damaged, or ends before.
     """
-    found = inventory(path)
+    found = open_topics(path, damaged=True)
     if not 0.0 <= time <= found.duration + ROUNDING:
         message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
         raise InvalidInput([Finding("LOG110", message)])
@@ -53,7 +53,7 @@ def step_ends(path: Path) -> dict[str, float]:
     Raises:
         InvalidInput: the file is no log, or is damaged.
     """
-    end = inventory(path).duration
+    end = open_topics(path, damaged=True).duration
     try:
         recording = open_recording(path)
     except BadRecording:  # manipcli did not write it: it tells of no steps
@@ -162,9 +162,9 @@ def active(events: Iterable[TaskEvent], time: float) -> tuple[TaskEvent | None, 
     return step, phase
 
 
-def _others(path: Path, found: Inventory, time: float, *, why: str) -> Moment:
-    start = found.start or 0.0
-    taken = snapshot(path, found, start + time)
+def _others(path: Path, found: Topics, time: float, *, why: str) -> Moment:
+    start = found.start / 1e9
+    taken = snapshot(found, start + time)
     missing = [f"there is no {topic}" for topic in taken.lacks]
     missing += [f"{why}: it tells of no steps, references and contacts", *taken.unread]
     units = {

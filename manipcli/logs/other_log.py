@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -24,13 +23,13 @@ from manipcli.model.build_robot import bare_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.columns import singly
 from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
-from manipcli.record.namespaces import TYPES, meant, namespaces
-from manipcli.record.scan import METADATA, Scan
-from manipcli.record.snapshot import joint_state, transforms
-from manipcli.record.topics import Topics, open_topics
+from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
+from manipcli.record.foreign.snapshot import joint_state, transforms
+from manipcli.record.foreign.topics import Topics, open_topics
+from manipcli.record.read.chunk import singly
+from manipcli.record.read.salvage import Salvage
 from manipcli.replay.drawing import WORLD
 from manipcli.replay.playback import Playback
 from manipcli.scene.scene import Body, Scene
@@ -47,13 +46,9 @@ def is_own(path: Path) -> bool:
     Raises:
         BadRecording: it is no MCAP file, or damaged.
     """
-    from mcap.data_stream import ReadDataStream
     from mcap.records import Metadata
 
-    return any(
-        record.opcode == METADATA and Metadata.read(ReadDataStream(BytesIO(record.body))).name == RECORD
-        for record in Scan(path)
-    )
+    return any(isinstance(piece, Metadata) and piece.name == RECORD for piece in Salvage(path))
 
 
 @dataclass(slots=True)

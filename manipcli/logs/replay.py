@@ -18,7 +18,7 @@ from manipcli.logs.other_log import is_own, open_other
 from manipcli.logs.recorded_files import recorded_robot, recorded_scene
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep
 from manipcli.replay.sampling import sampled

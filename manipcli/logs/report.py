@@ -22,7 +22,7 @@ from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.recorded_files import recorded_robot, recorded_scene, recorded_task_file
 from manipcli.logs.replay import open_playback
 from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.frames import Frames, telling
 from manipcli.replay.playback import RATE, Playback

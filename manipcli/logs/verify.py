@@ -11,9 +11,9 @@ from pathlib import Path
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
 from manipcli.judge.steps import RunStatus
-from manipcli.record.compare import compare_logs, compared_with_itself
-from manipcli.record.compare_entries import compare_entries
-from manipcli.record.reading import open_recording
+from manipcli.record.foreign.compare import compare_logs, compared_with_itself
+from manipcli.record.read.compare_entries import compare_entries
+from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.report.verification import Verification
 

@@ -146,11 +146,6 @@ class CdrReader:
     def texts(self) -> tuple[str, ...]:
         return tuple(self.text() for _ in range(self.count(4)))
 
-    def doubles(self) -> tuple[int, int]:
-        """(offset of the first element, count) of a float64[]."""
-        count = self.count(8)
-        return (self.skip(8 * count, 8), count) if count else (self.offset, 0)
-
     def expect(self, size: int) -> None:
         """Raises CdrError where fewer than `size` bytes are left."""
         if size > len(self._data) - self.offset:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 from manipcli.core.text import number_of, shorten, shorten_apart
-from manipcli.record.compare import Comparison, Difference, TopicComparison
-from manipcli.record.compare_entries import EntryDifference
+from manipcli.record.foreign.compare import Comparison, Difference, TopicComparison
+from manipcli.record.read.compare_entries import EntryDifference
 from manipcli.report.json import Json, picked
 from manipcli.report.table import table
 

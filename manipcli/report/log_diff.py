@@ -9,8 +9,8 @@ from manipcli.core.text import number_of
 from manipcli.judge.measures.step_measures import StepMeasures
 from manipcli.judge.verdict import ExpectationOutcome, Verdict
 from manipcli.record.channels import JOINT_STATES, TF
-from manipcli.record.compare import Comparison
-from manipcli.record.compare_entries import EntryDifference
+from manipcli.record.foreign.compare import Comparison
+from manipcli.record.read.compare_entries import EntryDifference
 from manipcli.report.comparison import (
     Names,
     counted,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
-from manipcli.record.inventory import Inventory
+from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
 from manipcli.report.json import Json, dumps, number, saturated_object, step_object
 from manipcli.report.table import table
@@ -19,13 +19,13 @@ class LogInfo:
     """What can be told of a log without judging it.
 
     Attributes:
-        inventory: the file as an MCAP file.
+        found: the file as an MCAP file.
         ours: whether manipcli wrote it.
         steps: how they went; empty where the file does not say.
         missing: what a log of a finished run has and this one lacks, or what is damaged; a sentence each.
     """
 
-    inventory: Inventory
+    found: Topics
     ours: bool
     steps: tuple[StepOutcome, ...]
     missing: tuple[str, ...]
@@ -33,17 +33,17 @@ class LogInfo:
     @property
     def run(self) -> Mapping[str, str]:
         """Task, seed, engine, period, status."""
-        return self.inventory.metadata.get("run", {})
+        return self.found.metadata.get("run", {})
 
     @property
     def verdict(self) -> Mapping[str, str]:
         """The verdict that the run stored; empty where there is none."""
-        return self.inventory.metadata.get("verdict", {})
+        return self.found.metadata.get("verdict", {})
 
     @property
     def versions(self) -> Mapping[str, str]:
         """Of manipcli and of the engine."""
-        return self.inventory.metadata.get("versions", {})
+        return self.found.metadata.get("versions", {})
 
     @property
     def cuts(self) -> Cuts:
@@ -52,25 +52,25 @@ class LogInfo:
             period = float(self.run.get("period", ""))
         except ValueError:
             period = 0.0
-        return Cuts.from_metadata(self.inventory.metadata, end=self.inventory.end or 0.0, period=period)
+        return Cuts.from_metadata(self.found.metadata, end=self.found.end / 1e9, period=period)
 
     @property
     def size_per_minute(self) -> float | None:
         """[byte] a minute of the log; None where it has no length."""
-        return 60.0 * self.inventory.size / self.inventory.duration if self.inventory.duration > 0.0 else None
+        return 60.0 * self.found.size / self.found.duration if self.found.duration > 0.0 else None
 
 
 def render_text(info: LogInfo) -> str:
     """The verdict first, then the steps, then what there is."""
-    found = info.inventory
+    found = info.found
     lines = [f"missing: {one}" for one in info.missing]
     if lines:
         lines.append("")
     if info.steps:
         lines += [steps_table(info.steps), ""]
     rows = [
-        [topic.name, topic.type or topic.encoding, str(topic.messages), _rate(topic.rate), _seconds(topic.last, found)]
-        for topic in found.topics
+        [topic.name, topic.type or topic.encoding, str(topic.count), _rate(topic.rate), _until(topic, found)]
+        for topic in _by_name(found)
     ]
     lines.append(table(["topic", "type", "messages", "rate", "until"], rows, right=["messages", "rate", "until"]))
     if found.attachments:
@@ -88,14 +88,14 @@ def render_text(info: LogInfo) -> str:
 
 def render_json(info: LogInfo) -> str:
     """The same as one object; numbers are SI, sizes bytes."""
-    found = info.inventory
+    found = info.found
     return dumps(
         {
             "log": str(found.path),
             "size": found.size,
             "size_per_minute": number(info.size_per_minute),
-            "start": number(found.start),
-            "end": number(found.end),
+            "start": _seconds(found.start, found),
+            "end": _seconds(found.end, found),
             "duration": number(found.duration),
             "written_by": found.library,
             "profile": found.profile,
@@ -109,13 +109,13 @@ def render_json(info: LogInfo) -> str:
                 {
                     "name": topic.name,
                     "type": topic.type,
-                    "encoding": topic.encoding,
-                    "messages": topic.messages,
+                    "encoding": topic.encoding.partition("/")[0],
+                    "messages": topic.count,
                     "rate": number(topic.rate),
-                    "first": number(topic.first),
-                    "last": number(topic.last),
+                    "first": _seconds(topic.first, topic),
+                    "last": _seconds(topic.last, topic),
                 }
-                for topic in found.topics
+                for topic in _by_name(found)
             ],
             "attachments": [
                 {"name": one.name, "media_type": one.media_type, "size": one.size} for one in found.attachments
@@ -126,7 +126,7 @@ def render_json(info: LogInfo) -> str:
     )
 
 
-def _meshes(found: Inventory) -> Json:
+def _meshes(found: Topics) -> Json:
     embedded = found.metadata.get(EMBEDDED, {})
     return [
         {"uri": uri, "sha256": digest, "embedded": uri in embedded}
@@ -136,7 +136,7 @@ def _meshes(found: Inventory) -> Json:
 
 def _headline(info: LogInfo) -> str:
     if not info.ours:
-        return f"a log of {info.inventory.library or 'an unknown writer'}, profile '{info.inventory.profile}'"
+        return f"a log of {info.found.library or 'an unknown writer'}, profile '{info.found.profile}'"
     task = info.run.get("task", "")
     if not info.verdict:
         return f"{FAIL} {task}: no verdict is stored"
@@ -148,7 +148,7 @@ def _headline(info: LogInfo) -> str:
 
 
 def _length(info: LogInfo) -> str:
-    found = info.inventory
+    found = info.found
     parts = [f"{found.duration:.2f} s", data_size(found.size)]
     if info.size_per_minute is not None:
         parts.append(f"{data_size(round(info.size_per_minute))} a minute")
@@ -175,6 +175,15 @@ def _rate(rate: float | None) -> str:
     return "" if rate is None else f"{rate:.4g} Hz"
 
 
-def _seconds(time: float | None, found: Inventory) -> str:
-    """From the beginning of the log: others' logs count from 1970."""
-    return "" if time is None or found.start is None else f"{time - found.start:.2f} s"
+def _by_name(found: Topics) -> list[Topic]:
+    return sorted(found.all.values(), key=lambda topic: topic.name)
+
+
+def _seconds(ns: int, of: Topic | Topics) -> Json:
+    """None where there is no message."""
+    return number(ns / 1e9) if of.count else None
+
+
+def _until(topic: Topic, found: Topics) -> str:
+    """From the beginning of the log: other programs count from 1970."""
+    return f"{(topic.last - found.start) / 1e9:.2f} s" if topic.count else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.record.repair import Repaired
+from manipcli.record.foreign.repair import Repaired
 from manipcli.report.json import dumps
 
 

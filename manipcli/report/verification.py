@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from manipcli.core.errors import Finding
 from manipcli.core.text import number_of
-from manipcli.record.compare import Comparison
-from manipcli.record.compare_entries import EntryDifference
+from manipcli.record.foreign.compare import Comparison
+from manipcli.record.read.compare_entries import EntryDifference
 from manipcli.report.comparison import (
     Names,
     counted,

@@ -14,7 +14,7 @@ from manipcli.core.errors import SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.run.live_conditions import Live
 from manipcli.run.observer import Onlooker, Progress
 from manipcli.run.step_loop import StepsRun, cuts_of

@@ -12,8 +12,8 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.core.errors import Finding
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import Contact, WorldState
-from manipcli.record.contact_filter import ContactFilter
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.contact_filter import ContactFilter
+from manipcli.record.write.recorder import Recorder
 from manipcli.run.live_conditions import Live
 from manipcli.task.plan_task import PlannedStep
 

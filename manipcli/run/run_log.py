@@ -22,9 +22,9 @@ from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
-from manipcli.record.recorder import Recorder
 from manipcli.record.recording import EMBEDDED
 from manipcli.record.selection import Selection
+from manipcli.record.write.recorder import Recorder
 from manipcli.run.embedding import embeddable
 from manipcli.scene.scene_file import scene_to_json
 from manipcli.shapes.primitives import Mesh

@@ -18,7 +18,7 @@ from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Motion, Situation
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.run.holding import Holding
 from manipcli.run.live_conditions import Live, Probe
 from manipcli.run.monitors import Watching

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 pytestmark = pytest.mark.slow
 

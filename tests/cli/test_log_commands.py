@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from manipcli.cli.app import main
 from manipcli.pipeline import run_task
-from manipcli.record.reading import open_recording, read_recording
+from manipcli.record.read.reading import open_recording, read_recording
 
 ROOT = Path(__file__).parents[2]
 

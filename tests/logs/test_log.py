@@ -17,7 +17,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.pipeline import judge_log, run_task
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 MESH = next((ROOT / "robots").rglob("*.stl"))

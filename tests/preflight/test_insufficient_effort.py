@@ -12,7 +12,7 @@ import pytest
 from manipcli.core.errors import Finding
 from manipcli.pipeline import run_task
 from manipcli.preflight.gains import gain_findings
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.task.load_task import load_task
 
 POSES = "poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}"

@@ -15,7 +15,7 @@ from manipcli.description.elements import Joint, JointLimits, Link, Mimic, Trans
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 from manipcli.scene.scene import Body, Frame, Scene
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Sphere
 

@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from manipcli.record.cdr import CdrError, CdrWriter
 from manipcli.record.decode import runs
 from manipcli.record.definition import read_definition
-from manipcli.record.distance import Near, first_difference
+from manipcli.record.foreign.distance import Near, first_difference
 
 
 def _at(message: Any, path: str) -> Any:

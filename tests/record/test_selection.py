@@ -12,10 +12,10 @@ import pytest
 from mcap.reader import make_reader
 
 from manipcli.control.action import ErrorCode, GoalResult
-from manipcli.record import recorder as recorder_module
 from manipcli.record.channels import ControllerChannel
-from manipcli.record.reading import open_recording, read_recording
+from manipcli.record.read.reading import open_recording, read_recording
 from manipcli.record.selection import Selection
+from manipcli.record.write import recorder as recorder_module
 
 MakeRun = Callable[[int], Any]
 

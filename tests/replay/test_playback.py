@@ -22,7 +22,7 @@ from manipcli.logs.moment import moment
 from manipcli.logs.replay import open_playback
 from manipcli.model.state import Contact
 from manipcli.pipeline import run_task
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import ContactSnapshot
 from manipcli.record.schemas import schema_text
 from manipcli.replay.drawing import draw

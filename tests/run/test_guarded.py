@@ -11,7 +11,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.model.kinematics import Kinematics
 from manipcli.pipeline import run_task
 from manipcli.preflight.check_files import check_files
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]

@@ -16,7 +16,7 @@ from manipcli.conditions.robustness import Reading
 from manipcli.conditions.state_window import Moments
 from manipcli.judge import expectation
 from manipcli.logs.judge_log import judge_recording
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.run import execute
 from manipcli.run.live_conditions import Live
 from manipcli.spec.condition import ConditionSpec

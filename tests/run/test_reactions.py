@@ -12,7 +12,7 @@ import pytest
 from manipcli import pipeline
 from manipcli.core.errors import InvalidInput
 from manipcli.judge.verdict import Verdict
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.report import json as json_report
 from manipcli.run.observer import SILENT, Progress

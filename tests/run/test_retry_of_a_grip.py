@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from manipcli import pipeline
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 TASK = f"""\

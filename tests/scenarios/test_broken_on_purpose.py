@@ -13,7 +13,7 @@ import pytest
 
 from manipcli import pipeline
 from manipcli.judge.verdict import Verdict
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.run import execute
 from manipcli.simulate.engines import ENGINES
 

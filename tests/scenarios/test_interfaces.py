@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 ARM = "[" + ", ".join(f"joint_{k}" for k in range(1, 8)) + "]"

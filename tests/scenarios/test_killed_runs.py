@@ -14,8 +14,8 @@ import pytest
 from mcap.reader import make_reader
 
 from manipcli.pipeline import judge_log
-from manipcli.record.reading import read_recording
-from manipcli.record.repair import repair
+from manipcli.record.foreign.repair import repair
+from manipcli.record.read.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ CHILD = """
 import mmap, struct, sys
 from pathlib import Path
 from manipcli.pipeline import run_task
-from manipcli.record.recorder import Recorder
+from manipcli.record.write.recorder import Recorder
 task, log, shared = map(Path, sys.argv[1:])
 file = shared.open("r+b")
 memory = mmap.mmap(file.fileno(), 8)

@@ -12,7 +12,7 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.pipeline import run_task
-from manipcli.record.reading import read_recording
+from manipcli.record.read.reading import read_recording
 from manipcli.record.recording import Recording
 
 ROOT = Path(__file__).parents[2]

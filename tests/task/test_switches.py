@@ -10,7 +10,7 @@ import pytest
 
 from manipcli.core.errors import InvalidInput
 from manipcli.pipeline import run_task
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]

@@ -15,7 +15,7 @@ from manipcli.core.errors import InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.pipeline import run_task
 from manipcli.preflight.gains import gain_findings
-from manipcli.record.reading import open_recording
+from manipcli.record.read.reading import open_recording
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES

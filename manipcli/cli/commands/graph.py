@@ -27,7 +27,7 @@ def graph(
     Task, planner, controllers, joint limits, drives, engine, sensors, topics; of a log with how many messages each has.
     """
     from manipcli.logs.graph import log_graph, task_graph
-    from manipcli.record.container import begins_as_log
+    from manipcli.record.records import begins_as_log
     from manipcli.report.graph import render
 
     if file.suffix in (".mcap", ".partial") or begins_as_log(file):

@@ -27,8 +27,8 @@ def repair(
     Of a damaged one, too; what is lost is told. LOG itself is never changed.
     """
     from manipcli.cli.interrupts import Interrupts
-    from manipcli.record.repair import default_output
-    from manipcli.record.repair import repair as repaired
+    from manipcli.record.foreign.repair import default_output
+    from manipcli.record.foreign.repair import repair as repaired
     from manipcli.report.repaired import render_json, render_text
 
     with Interrupts():

@@ -1,0 +1,238 @@
+"""The spans of a recording, read from its file chunk by chunk whenever somebody goes through them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from manipcli.core.geometry import Array
+from manipcli.model.state import Contact, WorldState
+from manipcli.record import channels as topics
+from manipcli.record import schemas
+from manipcli.record.cdr import CdrError, CdrReader
+from manipcli.record.channels import ControllerChannel
+from manipcli.record.contents import Contents
+from manipcli.record.decode import Int
+from manipcli.record.faults import Thinned
+from manipcli.record.messages import WORLD
+from manipcli.record.read.chunk import Places, chunk_places, open_chunk, sequences, singly
+from manipcli.record.read.columns import (
+    Columns,
+    body_runs,
+    controller_state_runs,
+    joint_state_runs,
+)
+from manipcli.record.read.differences import body_velocities
+from manipcli.record.read.scan import Record, chunk_at, guarded, readable
+from manipcli.record.recording import ContactSnapshot, ControllerTrace, Span
+from manipcli.record.selection import common_stride
+
+
+@dataclass(frozen=True, slots=True)
+class FileSpans:
+    """An iterable of the spans in a file; never more of them than three are in memory.
+
+    Attributes:
+        path: the file.
+        contents: what it says it holds.
+        channels: channel id -> topic.
+        chunks: where its chunks begin.
+        cut: whether its end is missing, or parts of it, so that messages of some ticks may be, too.
+    """
+
+    path: Path
+    contents: Contents
+    channels: Mapping[int, str]
+    chunks: tuple[int, ...]
+    cut: bool
+
+    def __iter__(self) -> Iterator[Span]:
+        """
+        Raises:
+            BadRecording: a chunk is damaged, the parts contradict each other, or time runs backwards.
+        """
+        before: Span | None = None
+        span: Span | None = None
+        for after in self._without_velocities():
+            if span is not None:
+                yield _with_velocities(before, span, after)
+            before, span = span, after
+        assert span is not None, "there is one span at least"
+        yield _with_velocities(before, span, None)
+
+    def _without_velocities(self) -> Iterator[Span]:
+        reader = _SpanReader(self.contents, self.channels, gaps=self.cut)
+        empty = True
+        with readable(self.path), self.path.open("rb") as file:
+            for start in self.chunks:
+                span = self._chunk(file, start, reader)
+                if span is not None:
+                    empty = False
+                    yield span
+        if reader.waiting and not self.cut:
+            raise Thinned(self.path)
+        if empty:
+            yield reader.span(0)
+
+    def _chunk(self, file: BinaryIO, start: int, reader: _SpanReader) -> Span | None:
+        chunk, indexes = chunk_at(self.path, file, start)
+
+        def read(record: Record) -> Span | None:
+            data = open_chunk(self.path, record)
+            reader.add(data, chunk_places(data, indexes))
+            return reader.span(reader.ready) if reader.ready else None
+
+        try:
+            return guarded(self.path, chunk, read)
+        except _Apart as error:
+            raise Thinned(self.path) from error
+
+
+class _Apart(Exception):
+    """Joints, bodies and controllers were not recorded at the same times, or not as often as the log says; or contacts
+    are missing among others."""
+
+
+class _SpanReader:
+    """Gathers the messages of successive chunks, and gives them out once a tick is complete.
+
+    `gaps`: ticks may be missing.
+    """
+
+    def __init__(self, contents: Contents, channels: Mapping[int, str], *, gaps: bool) -> None:
+        n, m = len(contents.joints), len(contents.bodies)
+        self._channels = channels
+        everyone = [ControllerChannel(name, joints) for name, joints in contents.controllers.items()]
+        self._controllers = [one for one in everyone if one.state_topic not in contents.absent]
+        self._bodies = m
+        self._columns = {
+            topics.JOINT_STATES: Columns(
+                topics.JOINT_STATES, schemas.JOINT_STATE, joint_state_runs, contents.joints, (n,) * 3
+            )
+        }
+        if topics.TF not in contents.absent:
+            poses = body_runs(frozenset(contents.bodies), WORLD)
+            self._columns[topics.TF] = Columns(topics.TF, schemas.TF_MESSAGE, poses, contents.bodies, (7,) * m)
+        for controller in self._controllers:
+            topic, widths = controller.state_topic, (len(controller.joints),) * 4
+            self._columns[topic] = Columns(
+                topic, schemas.CONTROLLER_STATE, controller_state_runs, controller.joints, widths
+            )
+        strides = {topic: contents.strides.get(topic, 1) for topic in self._columns}
+        self._grid_ns = common_stride(strides) * contents.period * 1e9
+        self._strided = len(set(strides.values())) > 1
+        self._contacts: list[ContactSnapshot] = []
+        self._gaps = gaps
+        self._last = -1
+        self._number: int | None = None
+
+    @property
+    def ready(self) -> int:
+        """Ticks of which every message is there."""
+        return min(len(columns) for columns in self._columns.values())
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there are messages of a tick that is not complete."""
+        return any(len(columns) for columns in self._columns.values())
+
+    def add(self, data: bytes, places: Mapping[int, Places]) -> None:
+        for channel, found in places.items():
+            if channel not in self._channels:
+                raise CdrError(f"it has a message of channel {channel}, which is not declared")
+            topic = self._channels[channel]
+            if topic in self._columns:
+                common = self._common(found) if self._strided else found
+                if len(common.times):
+                    self._columns[topic].add(data, common)
+            elif topic == topics.CONTACTS:
+                self._follow(sequences(data, found))
+                self._contacts += [ContactSnapshot(ns / 1e9, _contacts(reader)) for ns, reader in singly(data, found)]
+
+    def _follow(self, numbers: Int) -> None:
+        """Contacts hold until the next ones, so that nothing but their numbers tells that some are missing; those that
+        another program wrote again may begin at 0, or all be 0."""
+        before = min(int(numbers[0]) - 1, 0) if self._number is None else self._number
+        if not self._gaps and numbers.any() and not np.all(np.diff(numbers, prepend=before) == 1):
+            raise _Apart
+        self._number = int(numbers[-1])
+
+    def _common(self, places: Places) -> Places:
+        """The messages of the ticks at which every topic has one."""
+        ticks = np.rint(places.times / self._grid_ns) * self._grid_ns
+        on = np.abs(places.times - ticks) < 1.0  # [ns] what rounding leaves
+        return Places(places.times[on], places.starts[on], places.lengths[on])
+
+    def span(self, ticks: int) -> Span:
+        """The next `ticks`, with velocities of bodies left at zero; with 0 ticks, all contacts."""
+        ns, (position, velocity, effort) = self._columns[topics.JOINT_STATES].take(ticks)
+        if topics.TF in self._columns:
+            body_ns, poses = self._columns[topics.TF].take(ticks)
+        else:
+            body_ns, poses = ns, [np.full((ticks, 7), np.nan)] * self._bodies
+        taken = [self._columns[controller.state_topic].take(ticks) for controller in self._controllers]
+        for times in (body_ns, *(times for times, _ in taken)):
+            if not np.array_equal(ns, times):
+                raise _Apart
+        self._count(ns)
+        time = _settled(ns / 1e9)
+        bodies = np.stack(poses, axis=1) if poses else np.zeros((ticks, 0, 7))
+        zeros = np.zeros_like(bodies[..., :3])
+        states = WorldState(time, position, velocity, effort, bodies[..., :3], bodies[..., 3:], zeros, zeros)
+        return Span(
+            states=states.map(_settled),
+            controllers=tuple(
+                ControllerTrace(controller.name, controller.joints, time, *map(_settled, runs))
+                for controller, (_, runs) in zip(self._controllers, taken, strict=True)
+            ),
+            contacts=self._contacts_until(time[-1] if ticks else np.inf),
+        )
+
+    def _count(self, ns: Int) -> None:
+        """Ticks begin at 0, and none is left out."""
+        ticks = np.concatenate(([self._last], np.rint(ns / self._grid_ns).astype(np.int64)))
+        if not self._gaps and not np.all(np.diff(ticks) == 1):
+            raise _Apart
+        self._last = int(ticks[-1])
+
+    def _contacts_until(self, time: float) -> tuple[ContactSnapshot, ...]:
+        now = tuple(snapshot for snapshot in self._contacts if snapshot.time <= time)
+        self._contacts = [snapshot for snapshot in self._contacts if snapshot.time > time]
+        return now
+
+
+def _with_velocities(before: Span | None, span: Span, after: Span | None) -> Span:
+    """The span with velocities of its bodies, for which the ticks next to it are needed."""
+    near = [span.states]
+    if before is not None:
+        near.insert(0, before.states.map(lambda a: a[-1:]))
+    if after is not None:
+        near.append(after.states.map(lambda a: a[:1]))
+    linear, angular = body_velocities(
+        np.concatenate([states.time for states in near]),
+        np.concatenate([states.body_position for states in near]),
+        np.concatenate([states.body_quat_xyzw for states in near]),
+    )
+    first = 0 if before is None else 1
+    mine = slice(first, first + len(span.states.time))
+    states = replace(span.states, body_linear=_settled(linear[mine]), body_angular=_settled(angular[mine]))
+    return replace(span, states=states)
+
+
+def _contacts(reader: CdrReader) -> tuple[Contact, ...]:
+    reader.header()
+    return tuple(
+        Contact(a=reader.text(), b=reader.text(), force=reader.f64(), distance=reader.f64())
+        for _ in range(reader.count(16))
+    )
+
+
+def _settled(values: Array) -> Array:
+    """Contiguous and read-only."""
+    array = np.ascontiguousarray(values)
+    array.flags.writeable = False
+    return array

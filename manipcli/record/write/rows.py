@@ -1,0 +1,154 @@
+"""Fixed-size messages by the block: one row of bytes a tick, in which only the numbers change.
+
+Names are constant during a run, so every message of a channel has the same length and each number stands at the same
+place. All such messages of one tick, MCAP message records included, form one row; a block of T rows is an array
+(T, row size) of bytes that holds the constant parts once and for all, and a numpy structured view writes one field of
+all T rows at a time.
+
+    message record:  opcode u8 | length u64 | channel u16 | sequence u32 | log time u64 | publish time u64 | CDR bytes
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array
+from manipcli.record.cdr import NS_PER_S, CdrWriter
+from manipcli.record.records import MESSAGE, MESSAGE_HEAD
+from manipcli.spec.controllers import Interface
+
+Times = npt.NDArray[np.int64]
+Field = npt.NDArray[np.number]
+
+
+def message_record(channel: int, sequence: int, ns: int, data: bytes) -> bytes:
+    """One MCAP message record; log time and publish time are both `ns`."""
+    return MESSAGE_HEAD.pack(MESSAGE, 22 + len(data), channel, sequence, ns, ns) + data
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A message with zeros for numbers. `stamps`: offsets of its times; `runs`: (offset, count) of its doubles."""
+
+    channel: int
+    data: bytes
+    stamps: tuple[int, ...]
+    runs: tuple[tuple[int, int], ...]
+
+
+def joint_state_template(channel: int, joints: Sequence[str], *, effort: bool) -> Template:
+    """sensor_msgs/JointState; runs: position, velocity and, with `effort`, effort."""
+    writer = CdrWriter()
+    stamp = writer.header(0, "")
+    writer.texts(joints)
+    n = len(joints)
+    runs = [(writer.doubles(n), n), (writer.doubles(n), n)]
+    offset = writer.doubles(n if effort else 0)
+    if effort:
+        runs.append((offset, n))
+    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
+
+
+def tf_template(channel: int, frames: Sequence[tuple[str, str]]) -> Template:
+    """tf2_msgs/TFMessage of (parent, child); a run of 7 for each: x y z, quaternion xyzw."""
+    writer = CdrWriter()
+    writer.u32(len(frames))
+    stamps, runs = [], []
+    for parent, child in frames:
+        stamps.append(writer.header(0, parent))
+        writer.text(child)
+        runs.append((writer.f64s([0.0] * 7), 7))
+    return Template(channel=channel, data=writer.data, stamps=tuple(stamps), runs=tuple(runs))
+
+
+def controller_state_template(channel: int, joints: Sequence[str], interfaces: Sequence[Interface]) -> Template:
+    """control_msgs/JointTrajectoryControllerState.
+
+    Runs: reference position, velocity, acceleration; feedback position, velocity, effort; error position, velocity;
+    output, one run an interface, in the order of their fields: position, velocity, acceleration, effort.
+    """
+    n = len(joints)
+    writer = CdrWriter()
+    stamp = writer.header(0, "")
+    writer.texts(joints)
+    output = "".join(interface[0] for interface in interfaces)
+    runs = []
+    for fields in ("pva", "pve", "pv", output):
+        for field in "pvae":
+            offset = writer.doubles(n if field in fields else 0)
+            if field in fields:
+                runs.append((offset, n))
+        writer.time(0)
+    writer.u32(0)
+    for _ in range(4):
+        for _ in range(3):
+            writer.u32(0)
+        writer.time(0)
+    writer.f64(1.0)
+    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=tuple(runs))
+
+
+def wrench_template(channel: int, frame: str) -> Template:
+    """geometry_msgs/WrenchStamped; a run of 6: force, torque."""
+    writer = CdrWriter()
+    stamp = writer.header(0, frame)
+    offset = writer.f64s([0.0] * 6)
+    return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, 6),))
+
+
+class RowBlock:
+    """Up to `capacity` rows of the messages of `templates`, in that order.
+
+    Attributes:
+        channels: channel of each message in a row.
+        starts: where each begins in a row.
+        size: of a row in bytes.
+        bytes: (capacity, size) the rows.
+    """
+
+    def __init__(self, templates: Sequence[Template], capacity: int) -> None:
+        self.channels = tuple(template.channel for template in templates)
+        constant = [message_record(template.channel, 0, 0, template.data) for template in templates]
+        ends = tuple(accumulate(len(record) for record in constant))
+        self.starts = (0, *ends[:-1])[: len(templates)]
+        self.size = ends[-1] if ends else 0
+        self.bytes = np.tile(np.frombuffer(b"".join(constant), dtype=np.uint8), (capacity, 1))
+        self._sequences: list[Field] = []
+        self._times: list[Field] = []
+        self._stamps: list[tuple[Field, Field]] = []
+        self._runs: list[Field] = []
+        for template, start in zip(templates, self.starts, strict=True):
+            self._sequences.append(self._field("<u4", start + 11))
+            self._times += [self._field("<u8", start + 15), self._field("<u8", start + 23)]
+            payload = start + MESSAGE_HEAD.size
+            for stamp in template.stamps:
+                self._stamps.append((self._field("<i4", payload + stamp), self._field("<u4", payload + stamp + 4)))
+            for offset, count in template.runs:
+                self._runs.append(self._field(f"({count},)<f8", payload + offset))
+
+    def _field(self, code: str, offset: int) -> Field:
+        """A view of one field of all rows."""
+        layout = np.dtype({"names": ["field"], "formats": [code], "offsets": [offset], "itemsize": self.size})
+        view: Field = self.bytes.view(layout)[:, 0]["field"]
+        return view
+
+    def fill(self, times_ns: Times, first_sequence: int, values: Sequence[Array]) -> None:
+        """Writes the first T rows: times (T,), sequence numbers from `first_sequence` on, and one array (T, count)
+        for every run of every template, in order."""
+        T = len(times_ns)
+        sequence = np.arange(first_sequence, first_sequence + T)
+        for field in self._sequences:
+            field[:T] = sequence
+        for field in self._times:
+            field[:T] = times_ns
+        sec, nanosec = np.divmod(times_ns, NS_PER_S)
+        for sec_field, nanosec_field in self._stamps:
+            sec_field[:T] = sec
+            nanosec_field[:T] = nanosec
+        for field, value in zip(self._runs, values, strict=True):
+            field[:T] = value
