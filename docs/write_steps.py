@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, BeforeValidator
 from pydantic.fields import FieldInfo
 
+from manipcli.control.controllers.pid import PidGainsSpec
 from manipcli.core.units import readable
 from manipcli.plan.step import StepMember
 from manipcli.plan.steps import STEPS
@@ -24,7 +25,6 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
-from manipcli.spec.other_controllers import PidGainsSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.robot import (

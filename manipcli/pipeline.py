@@ -16,7 +16,6 @@ from manipcli.core.stopwatch import Stopwatch
 from manipcli.flow.check import check_files, kind_of, schema, words
 from manipcli.flow.controllers import controllers_of
 from manipcli.flow.execute import Progress, controllers, simulate
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import Task, load_libraries
 from manipcli.flow.log import default_log, judge_log, known_of, mesh_files, open_log, run_metadata, verdict_metadata
 from manipcli.flow.plan import Plan, plan_task, refused
@@ -26,6 +25,7 @@ from manipcli.flow.verify import compared, refused_as_unlike
 from manipcli.flow.vocabulary import meanings
 from manipcli.judge.steps import RunStatus
 from manipcli.judge.verdict import INTERRUPTED, Verdict
+from manipcli.preflight.preflight_findings import preflight_findings
 from manipcli.record.faults import RecordingFailed
 from manipcli.record.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
@@ -100,7 +100,7 @@ def run_task(
         return RunReport(
             refused(task, refusal), wall_time=took, real_time_factor=None, log=None, timing=timing, warnings=warnings
         )
-    doubts = gain_findings(task, plan)
+    doubts = preflight_findings(task, plan)
     planned = time.perf_counter()
     if progress is not None and doubts:
         progress.warned(doubts)

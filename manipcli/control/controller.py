@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 
+from manipcli.control.control_loop import ControlLoop, HandSettings
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.condition import Problem
@@ -158,9 +159,13 @@ class ControllerMember(Generic[S]):
         spec: what the user writes.
         build: (name of the controller, spec, fit) -> the controller; for a spec without problems.
         check: (spec, robot) -> what this robot does not have, or what could not work.
+        loop: (spec) -> its control law, for preflight checks and `manipcli tune`.
+        hand: (spec) -> what limits it; for the role `hand` alone.
     """
 
     name: str
     spec: type[S]
     build: Callable[[str, S, Fit], Controller]
     check: Callable[[S, RobotModel], Iterable[Problem]]
+    loop: Callable[[S], ControlLoop]
+    hand: Callable[[S], HandSettings] | None = None

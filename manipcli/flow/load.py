@@ -15,7 +15,7 @@ from manipcli.flow.gathered import Gathered
 from manipcli.flow.robot_file import gather_robot
 from manipcli.flow.stand_ins import named_robot, named_scene
 from manipcli.flow.vary import bind
-from manipcli.flow.vocabulary import task_spec
+from manipcli.flow.vocabulary import controllers_spec, task_spec
 from manipcli.judge.drawn import Drawn
 from manipcli.model.build_scene import build_scene
 from manipcli.model.packages import Packages
@@ -122,10 +122,11 @@ def load_task(
     )
     robot_file, built = (robot_read.file, robot_read.robot) if robot_read else (None, None)
     controllers_file = controllers_path and gathered(
-        lambda: load.load_controllers(controllers_path, overrides=overrides)
+        lambda: load.load_controllers(controllers_path, model=controllers_spec(), overrides=overrides)
     )
     controllers_read = controllers_file or (
-        controllers_path and load.salvage_controllers_file(controllers_path, overrides=overrides)
+        controllers_path
+        and load.salvage_controllers_file(controllers_path, model=controllers_spec(), overrides=overrides)
     )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = None

@@ -17,7 +17,7 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.flow.embedding import embeddable
 from manipcli.flow.load import Task
 from manipcli.flow.plan import Plan
-from manipcli.flow.vocabulary import task_spec
+from manipcli.flow.vocabulary import controllers_spec, task_spec
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL, judge
 from manipcli.judge.steps import PLAN_FILE
@@ -209,7 +209,8 @@ def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
 
 def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:
     """The resolved controllers file of a log."""
-    return load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
+    name = f"{path.name}/{CONTROLLERS}"
+    return load_controllers_text(attached(recording, path, CONTROLLERS), name, model=controllers_spec())
 
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:

@@ -14,6 +14,7 @@ from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.factory import build_controllers, controller_findings
 from manipcli.control.manager import ControllerManager
 from manipcli.core.geometry import Array
+from manipcli.flow.vocabulary import controllers_spec
 from manipcli.model.build_robot import build_robot
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
@@ -43,7 +44,7 @@ def example(member: ControllerMember[ControllerSpec]) -> ControllersSpec:
     """The file in the docstring of the member's module."""
     text = sys.modules[member.build.__module__].__doc__ or ""
     lines = text[text.index("    controllers:") :].split("\n\n")[0].splitlines()
-    located = load_controllers_text("\n".join(line[4:] for line in lines), "example.yaml")
+    located = load_controllers_text("\n".join(line[4:] for line in lines), "example.yaml", model=controllers_spec())
     assert located.findings == ()
     return located.spec
 

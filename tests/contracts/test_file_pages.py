@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from manipcli.flow.vocabulary import task_spec
+from manipcli.flow.vocabulary import controllers_spec, task_spec
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import AnyController
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
@@ -70,7 +70,7 @@ def test_examples_of_the_robot_file_load(example: str) -> None:
 
 @pytest.mark.parametrize("example", examples("controllers.md"), ids=lambda e: e.split("type: ")[1].split()[0])
 def test_examples_of_the_controllers_file_load(example: str) -> None:
-    assert load_controllers_text(example, "c.yaml").spec.controllers
+    assert load_controllers_text(example, "c.yaml", model=controllers_spec()).spec.controllers
 
 
 def test_the_program_of_the_controllers_page_runs(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.flow.load import Task, load_task
@@ -18,7 +19,6 @@ from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.plan.steps import STEPS
-from manipcli.spec.controllers import GripperSpec
 
 ROOT = Path(__file__).parents[2]
 PICK = ("pick", {"object": "cup", "grasp": {"posture": "wrap", "height": "68 mm"}})

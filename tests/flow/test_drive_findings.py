@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
+from manipcli.preflight.preflight_findings import preflight_findings
 
 TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
 <joint name="hinge"><hardwareInterface>hardware_interface/EffortJointInterface</hardwareInterface></joint>
@@ -35,7 +35,7 @@ def found(pendulum: Callable[..., Path]) -> Found:
         (folder / "task.yaml").write_text(
             "task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{move: {to: up}}]\n"
         )
-        return gain_findings(load_task(folder / "task.yaml", overrides=overrides))
+        return preflight_findings(load_task(folder / "task.yaml", overrides=overrides))
 
     return of
 

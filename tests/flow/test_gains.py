@@ -10,16 +10,16 @@ import pytest
 
 from manipcli.core.errors import Finding
 from manipcli.flow.check import check_files
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.model.kinematics import Kinematics
+from manipcli.preflight.preflight_findings import preflight_findings
 
 ROOT = Path(__file__).parents[2]
 HOME = ROOT / "tasks" / "home.yaml"
 
 
 def findings(*overrides: str, task: Path = HOME) -> tuple[Finding, ...]:
-    return gain_findings(load_task(task, overrides=overrides))
+    return preflight_findings(load_task(task, overrides=overrides))
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
+from manipcli.preflight.preflight_findings import preflight_findings
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
@@ -48,7 +48,7 @@ def found(tmp_path: Path) -> Found:
             "task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: straight\n"
             f"steps: [{{move: {{to: {{elbow: {BENT}}}}}}}]\n"
         )
-        return gain_findings(load_task(tmp_path / "task.yaml"))
+        return preflight_findings(load_task(tmp_path / "task.yaml"))
 
     return of
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
+from manipcli.preflight.preflight_findings import preflight_findings
 
 ARM = """<link name="{0}_arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
 <inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -39,7 +39,7 @@ def found(tmp_path: Path) -> Found:
         (tmp_path / "task.yaml").write_text(
             f"task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{steps}]\n"
         )
-        return gain_findings(load_task(tmp_path / "task.yaml"))
+        return preflight_findings(load_task(tmp_path / "task.yaml"))
 
     return of
 

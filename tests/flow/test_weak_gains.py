@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.flow.gains import gain_findings
 from manipcli.flow.load import load_task
 from manipcli.pipeline import run_task
+from manipcli.preflight.preflight_findings import preflight_findings
 from manipcli.record.reading import read_recording
 
 POSES = "poses: {down: {all: [0]}, up: {all: [1.2]}, back: {all: [-1.2]}}"
@@ -35,7 +35,7 @@ def written(pendulum: Written) -> Written:
 
 
 def told(task: Path) -> list[Finding]:
-    return list(gain_findings(load_task(task)))
+    return list(preflight_findings(load_task(task)))
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.flow.load import Task, load_task
@@ -29,7 +30,6 @@ from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
-from manipcli.spec.controllers import GripperSpec
 
 ARM = tuple(f"joint_{k}" for k in range(1, 8))
 _LENGTHS = (0.16, 0.2, 0.22, 0.2, 0.2, 0.2, 0.1)  # from joint k to joint k + 1, along z

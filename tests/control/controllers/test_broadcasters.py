@@ -10,6 +10,7 @@ from manipcli.control.factory import build_controllers
 from manipcli.control.manager import ControllerManager
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
+from manipcli.flow.vocabulary import controllers_spec
 from manipcli.model.robot import Joint, JointLimits, Link, RobotModel
 from manipcli.model.state import WorldState
 from manipcli.spec.load import load_controllers_text
@@ -37,7 +38,9 @@ def test_joint_states_are_those_of_the_last_update():
 
 @pytest.mark.parametrize(("written", "joints"), [("", ("a", "b")), (", joints: [b]", ("b",))])
 def test_of_a_file_it_tells_the_joints_that_are_stated_else_all(written, joints):
-    spec = load_controllers_text(f"controllers: {{one: {{type: joint_state_broadcaster{written}}}}}", "c.yaml").spec
+    spec = load_controllers_text(
+        f"controllers: {{one: {{type: joint_state_broadcaster{written}}}}}", "c.yaml", model=controllers_spec()
+    ).spec
     links = tuple(Link(name, None, (), ()) for name in ("base", "a_link", "b_link"))
     hinges = tuple(
         Joint(name, "revolute", "base", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits())
