@@ -99,6 +99,21 @@ class ControllerOutput:
         return self.commands[0]
 
 
+@dataclass(frozen=True, slots=True)
+class SensorRequest:
+    """A sensor that a controller reads.
+
+    Attributes:
+        type: the member of the seam `simulate/sensors/`.
+        joint: between whose links it is.
+        frame: the link in whose frame it measures.
+    """
+
+    type: str
+    joint: str
+    frame: str
+
+
 class Controller(Protocol):
     """A controller claims `joints` on `interfaces`; `feed_forward` says what it wants added to its effort."""
 
@@ -106,6 +121,11 @@ class Controller(Protocol):
     joints: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     feed_forward: FeedForward
+
+    @property
+    def sensors(self) -> tuple[SensorRequest, ...]:
+        """What it reads beside its joints; with any it is a `roles.SensorReader`."""
+        ...
 
     @property
     def role(self) -> Role:

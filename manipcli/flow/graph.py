@@ -13,7 +13,6 @@ from typing import Final
 
 from manipcli.control.actuation import Actuation
 from manipcli.control.controller import Controller
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.flow.load import load_task
@@ -35,6 +34,7 @@ from manipcli.record.selection import PLOTTED, Selection, word
 from manipcli.record.topics import Topic, open_topics
 from manipcli.report.graph import Edge, Graph, Node
 from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.task import JUDGED, TaskSpec
 
@@ -50,7 +50,7 @@ PRODUCERS: Final[Mapping[str, str]] = {
     channels.ACTUATOR_STATES: "drives",
 }
 """Which node publishes a topic that is no controller's."""
-BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, "wrench")
+BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, *SENSORS.names)
 MOST_NAMES: Final = 4
 
 
@@ -218,12 +218,11 @@ class _Builder:
         found.join("engine", "contacts")
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
-            if isinstance(controller, ForceTorqueBroadcaster):
-                sensor = f"wrench {controller.name}"
-                found.add(Node(sensor, "sensor", f"wrench at {controller.joint}"))
+            for request in controller.sensors:
+                sensor = f"{request.type} {controller.name}"
+                found.add(Node(sensor, "sensor", f"{request.type} at {request.joint}"))
                 found.join("engine", sensor)
                 found.join(sensor, controller.name, idle=idle, back=True)
-                continue
             if controller.joints:
                 found.join("joints", controller.name, idle=idle, back=True)
             if is_hand(controller):

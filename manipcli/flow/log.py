@@ -10,7 +10,6 @@ from typing import Literal
 
 from manipcli import __version__
 from manipcli.control.controller import Controller
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Finding, InvalidInput
@@ -26,7 +25,7 @@ from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.scene_file import scene_from_json, scene_to_json
-from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.reading import open_recording
@@ -34,6 +33,7 @@ from manipcli.record.recorder import Recorder
 from manipcli.record.recording import EMBEDDED, Recording, Span
 from manipcli.record.selection import Selection
 from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.located import Located
@@ -122,11 +122,13 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
 
 def recorded(controller: Controller) -> Recorded:
     """What the log keeps of a controller."""
-    if isinstance(controller, ForceTorqueBroadcaster):
-        return WrenchChannel(controller.name, controller.link)
-    if not controller.interfaces:
+    if controller.interfaces:
+        return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+    if not controller.sensors:
         return None
-    return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+    (request,) = controller.sensors
+    sensor = SENSORS[request.type]
+    return SensorChannel(controller.name, sensor.name, sensor.message, request.frame)
 
 
 def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:

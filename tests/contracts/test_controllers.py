@@ -142,6 +142,6 @@ def test_the_manager_loads_lists_and_switches_it(member: ControllerMember[Contro
 @every_controller
 def test_a_joint_that_nobody_leads_is_told_which_types_do(member: ControllerMember[ControllerSpec]) -> None:
     """The hint of steps names every type that follows trajectories, and none that does not."""
-    (problem,) = unfollowed(Claims(()), ["joint_1"], ())
+    (problem,) = unfollowed(Claims.of(controllers_spec()(controllers={})), ["joint_1"], ())
     assert problem.hint is not None
     assert (f"`{member.name}`" in problem.hint) == (member.spec.role == "follower")

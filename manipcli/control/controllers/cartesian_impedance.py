@@ -131,6 +131,7 @@ class CartesianImpedanceController:
 
     role: Role = "follower"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ("effort",)
 
     def __init__(

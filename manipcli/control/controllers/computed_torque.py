@@ -86,6 +86,7 @@ class ComputedTorqueController:
 
     role: Role = "follower"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ("effort",)
     feed_forward: FeedForward = "inverse_dynamics"
 

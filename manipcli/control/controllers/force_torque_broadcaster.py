@@ -17,7 +17,7 @@ moment that a body carries by `spinning_friction` or `rolling_friction` (0 unles
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -25,7 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, SensorRequest
 from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.model.condition import Problem
@@ -75,14 +75,14 @@ class ForceTorqueBroadcaster:
     def __init__(self, *, name: str, link: str, joint: str) -> None:
         self.name = name
         self.link = link
-        self.joint = joint
+        self.sensors = (SensorRequest("wrench", joint, link),)
         self.output = ControllerOutput.published(6)
         self._source = np.zeros(6)
         self._time = 0.0
 
-    def attach(self, source: Array) -> None:
-        """From now on it publishes this (6): force and torque, which the engine keeps up to date."""
-        self._source = source
+    def attach(self, readings: Sequence[Array]) -> None:
+        """From now on it publishes the reading (6) of its sensor: force and torque."""
+        (self._source,) = readings
 
     @property
     def wrench(self) -> Wrench:

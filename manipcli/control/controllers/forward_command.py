@@ -63,6 +63,7 @@ class ForwardCommandController:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
 
     def __init__(
         self, *, name: str, joints: Sequence[str], interface: Interface, feed_forward: FeedForward = "none"

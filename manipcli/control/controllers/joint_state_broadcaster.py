@@ -70,6 +70,7 @@ class JointStateBroadcaster:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ()
     feed_forward: FeedForward = "none"
 

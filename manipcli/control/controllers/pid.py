@@ -101,6 +101,7 @@ class PidController:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
 
     def __init__(
         self,

@@ -32,8 +32,7 @@ SWINGING: Final = 0.1
 
 def findings(subject: Subject) -> Iterator[Finding]:
     """Loops that diverge, ring, or swing with little damping."""
-    for shift in subject.shifts:
-        yield from once(_of_shift(subject, shift))
+    yield from once(found for shift in subject.shifts for found in _of_shift(subject, shift))
 
 
 def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:

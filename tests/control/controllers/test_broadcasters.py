@@ -76,7 +76,7 @@ def test_only_what_is_measured_can_be_broadcast():
 def test_a_wrench_is_that_of_the_last_update():
     broadcaster = ForceTorqueBroadcaster(name="sensor", link="palm", joint="mount")
     source = np.arange(1.0, 7.0)
-    broadcaster.attach(source)
+    broadcaster.attach([source])
     nothing = JointState(np.zeros(0), np.zeros(0), np.zeros(0))
     assert not broadcaster.wrench.force.any()
     broadcaster.update(0.5, PERIOD, nothing)
