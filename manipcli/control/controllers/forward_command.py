@@ -6,6 +6,8 @@
         joints: [joint_1, joint_2]
         command_interface: velocity
 
+Steps cannot use it; a program in Python does:
+
     manager["arm_controller"].set_command([0.1, 0.0])   # rad/s, from the next update on
 
 Until the first command it holds: the measured position, no velocity, no effort.

@@ -8,6 +8,8 @@
         reference_and_state_interfaces: [position, velocity]
         gains: {joint_6: {p: 80, i: 20, d: 3, i_clamp: 5}, joint_7: {p: 30, d: 0.4, feedforward_gain: 0.1}}
 
+Steps cannot use it; a program in Python does:
+
     manager["wrist_controller"].set_reference([0.3, -0.2])
 
 u = ff r + PID(r - x, d/dt). With one interface, r is the reference of it, and the PID takes the derivative of the error
