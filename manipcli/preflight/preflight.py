@@ -68,23 +68,20 @@ class Shift:
     configurations: Postures
     load: Callable[[tuple[ControlledJoint, ...]], Load]
 
-    def joints_with(self, wanted: Callable[[ControlledJoint], bool]) -> tuple[ControlledJoint, ...]:
-        return tuple(joint for joint in self.joints if wanted(joint))
-
     @property
     def pid_efforts(self) -> tuple[ControlledJoint, ...]:
         """Those with a PID loop on efforts."""
-        return self.joints_with(lambda joint: joint.interfaces == ("effort",) and joint.gains is not None)
+        return tuple(one for one in self.joints if one.interfaces == ("effort",) and one.gains is not None)
 
     @property
     def servos(self) -> tuple[ControlledJoint, ...]:
         """Those that the engine's own motors move, by positions or velocities."""
-        return self.joints_with(lambda joint: "effort" not in joint.interfaces)
+        return tuple(one for one in self.joints if "effort" not in one.interfaces)
 
     @property
     def other_efforts(self) -> tuple[ControlledJoint, ...]:
         """Those on efforts without a PID loop."""
-        return self.joints_with(lambda joint: "effort" in joint.interfaces and joint.gains is None)
+        return tuple(one for one in self.joints if "effort" in one.interfaces and one.gains is None)
 
 
 @dataclass(frozen=True, slots=True)

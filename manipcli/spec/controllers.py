@@ -1,4 +1,4 @@
-"""What users write of controllers: what all have, and those of joint trajectories and of grippers."""
+"""What users write of controllers: what all have, and the blocks that several types share."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.control.control_loop import NoLoop, PidLoop
 from manipcli.control.controller import Controller, ControllerMember, Fit, JointState
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.factory import build_controllers, controller_findings
@@ -20,6 +21,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.plan.claims import Claims, unfollowed
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot
@@ -145,3 +147,28 @@ def test_a_joint_that_nobody_leads_is_told_which_types_do(member: ControllerMemb
     (problem,) = unfollowed(Claims.of(controllers_spec()(controllers={})), ["joint_1"], ())
     assert problem.hint is not None
     assert (f"`{member.name}`" in problem.hint) == (member.spec.role == "follower")
+
+
+@every_controller
+def test_it_says_what_limits_it_if_it_is_a_hand_and_only_then(member: ControllerMember[ControllerSpec]) -> None:
+    assert (member.hand is not None) == (member.spec.role == "hand")
+
+
+@every_controller
+def test_a_pid_loop_is_of_the_gains_in_its_file_on_one_interface(member: ControllerMember[ControllerSpec]) -> None:
+    """So that a finding about gains has a place, and the units of the gains are known."""
+    (spec,) = example(member).controllers.values()
+    loop = member.loop(spec)
+    if isinstance(loop, PidLoop):
+        assert len(spec.interfaces) == 1
+        assert set(loop.gains) == set(spec.joints)
+        assert "gains" in type(spec).model_fields
+    if isinstance(loop, NoLoop):
+        assert loop.reason
+
+
+@every_controller
+def test_it_asks_for_sensors_that_there_are_at_links_that_there_are(member: ControllerMember[ControllerSpec]) -> None:
+    for request in built(member).sensors:
+        assert request.type in SENSORS.names
+        assert robot().joint(request.joint).child == request.frame

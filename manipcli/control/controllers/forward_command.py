@@ -8,7 +8,7 @@
 
 Steps cannot use it; a program in Python does:
 
-    manager["arm_controller"].set_command([0.1, 0.0])   # rad/s, from the next update on
+    manager["arm_controller"].set_command([0.1, 0.0])  # rad/s, from the next update on
 
 Until the first command it holds: the measured position, no velocity, no effort.
 """
