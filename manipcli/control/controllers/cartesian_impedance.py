@@ -348,7 +348,7 @@ def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
 
 def loop(spec: CartesianImpedanceSpec) -> ControlLoop:
     """None to examine: its damping follows the inertia, and a stiffness is chosen for the contact."""
-    return NoLoop(f"gains of the type {spec.type} are not proposed")
+    return NoLoop("its damping follows the inertia, and its stiffness is chosen for the contact")
 
 
 MEMBER = ControllerMember(name="cartesian_impedance", spec=CartesianImpedanceSpec, build=build, check=check, loop=loop)

@@ -149,7 +149,7 @@ def check(spec: ForwardCommandSpec, robot: RobotModel) -> Iterator[Problem]:
 
 def loop(spec: ForwardCommandSpec) -> ControlLoop:
     """None: a program closes it."""
-    return NoLoop(f"gains of the type {spec.type} are not proposed")
+    return NoLoop("it passes commands on and has no gains")
 
 
 MEMBER = ControllerMember(name="forward_command", spec=ForwardCommandSpec, build=build, check=check, loop=loop)

@@ -265,7 +265,7 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
 def loop(spec: PidSpec) -> ControlLoop:
     """A PID loop where the velocity is led, too; else de/dt is a difference of errors, which is another law."""
     if spec.reference_and_state_interfaces != ("position", "velocity"):
-        return NoLoop(f"gains of the type {spec.type} are not proposed")
+        return NoLoop("its de/dt is a difference of errors, for which no gains are proposed")
     return PidLoop(spec.gains, spec.gravity_compensation, tunable=False)
 
 

@@ -37,9 +37,10 @@ def findings(subject: Subject) -> Iterator[Finding]:
 def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
     robot = subject.task.robot
     for joints in (shift.pid_efforts, shift.servos, shift.other_efforts):
-        load = shift.load(joints) if joints else None
-        for k, joint in enumerate(joints if load is not None else ()):
-            assert load is not None
+        if not joints:
+            continue
+        load = shift.load(joints)
+        for k, joint in enumerate(joints):
             velocity = shift.configurations.velocity[:, robot.joint_names.index(joint.name)]
             yield from ((joint.name, one) for one in _of_joint(robot, joint, load, k, velocity, subject.planned))
 
