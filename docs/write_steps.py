@@ -24,7 +24,6 @@ from manipcli.spec.base import Model, about
 from manipcli.spec.baseline import BaselineSpec
 from manipcli.spec.condition import ConditionSpec, ExpectationSpec, WatchSpec
 from manipcli.spec.controllers import ConstraintsSpec, GainsSpec
-from manipcli.spec.other_controllers import PidGainsSpec
 from manipcli.spec.quantity import Unit
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.robot import (
@@ -61,7 +60,6 @@ ELSEWHERE: dict[type, str] = {
     ActuatorSpec: "[actuators](robot.md#transmissions-and-actuators)",
     AttachSpec: "[mappings](robot.md#attach)",
     GainsSpec: "[gains](controllers.md#gains)",
-    PidGainsSpec: "[gains](controllers.md#gains), and the fields below",
     ConstraintsSpec: "a [mapping](controllers.md#constraints)",
 }
 """Blocks that are told in one place, and what stands for them everywhere else."""
@@ -139,6 +137,13 @@ def _rows(fields: Mapping[str, FieldInfo], before: str = "") -> Iterator[str]:
             yield from _rows(block.model_fields, f"{name}{within}.")
 
 
+def _elsewhere(kind: object) -> str:
+    """What stands for a block that has its own table; empty for others."""
+    if isinstance(kind, type) and issubclass(kind, GainsSpec) and kind is not GainsSpec:
+        return f"{ELSEWHERE[GainsSpec]}, and the fields below"
+    return ELSEWHERE.get(kind, "") if isinstance(kind, type) else ""
+
+
 def _parts(kind: object) -> tuple[object, ...]:
     """The types that a type is made of: of `Annotated` also what is said about it."""
     return () if get_origin(kind) is Literal else get_args(kind)
@@ -146,7 +151,7 @@ def _parts(kind: object) -> tuple[object, ...]:
 
 def _blocks(kind: object, within: str = "") -> Iterator[tuple[type[BaseModel], str]]:
     """The mappings with keys of their own in a type, but those that are told elsewhere."""
-    if isinstance(kind, type) and issubclass(kind, Model) and kind not in ELSEWHERE:
+    if isinstance(kind, type) and issubclass(kind, Model) and not _elsewhere(kind):
         yield kind, within
     inside = {tuple: "[]", dict: ".NAME"}.get(get_origin(kind), within)
     for part in _parts(kind):
@@ -195,7 +200,7 @@ def _type(kind: object) -> str:
         return f"mapping of: {_type(parts[1])}"
     if origin is tuple:
         return f"list of: {_type(parts[0])}" if Ellipsis in parts else _fixed(tuple(map(_type, parts)))
-    return ELSEWHERE.get(kind) or _WORDS.get(kind, "mapping")
+    return _elsewhere(kind) or _WORDS.get(kind, "mapping")
 
 
 def _fixed(items: tuple[str, ...]) -> str:

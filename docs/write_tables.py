@@ -1,7 +1,8 @@
-"""Writes the tables of docs/task.md, docs/robot.md and docs/controllers.md anew: the fields of the blocks of files.
+"""Writes what docs/task.md, docs/robot.md and docs/controllers.md have from the code: tables and controllers.
 
-A table stands below a line `<!-- fields of BLOCK -->`, or `<!-- fields of BLOCK beside OTHER -->` for those that the
-other does not have; the blocks are models in `manipcli/spec/`. What is written around the tables stays.
+A table of fields is below a line `<!-- fields of BLOCK -->`; the blocks are models in `manipcli/spec/`. The sections of
+controllers are between `<!-- begin of controllers -->` and `<!-- end of controllers -->`: each is the docstring of the
+member's module and the fields of its spec. The text around them stays.
 
 python docs/write_tables.py
 """
@@ -9,32 +10,61 @@ python docs/write_tables.py
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Iterator
+from inspect import cleandoc
 from pathlib import Path
-from typing import Final
+from textwrap import dedent
+from typing import Any, Final, get_args
 
 from pydantic import BaseModel
 from write_steps import table
 
-from manipcli.spec import baseline, controllers, other_controllers, reactions, robot, task, vary
+from manipcli.control.controller import ControllerMember
+from manipcli.control.controllers import CONTROLLERS
+from manipcli.spec import baseline, controllers, reactions, robot, task, vary
+from manipcli.spec.base import about
+from manipcli.spec.controllers import ControllerSpec, GainsSpec
 
 PAGES: Final = tuple(Path(__file__).with_name(name) for name in ("task.md", "robot.md", "controllers.md"))
-_MODULES: Final = (task, robot, controllers, other_controllers, reactions, vary, baseline)
-_TABLE: Final = re.compile(r"(<!-- fields of (\w+)(?: beside (\w+))? -->\n)(?:\|.*\n)*")
+_MODULES: Final = (task, robot, controllers, reactions, vary, baseline)
+_TABLE: Final = re.compile(r"(<!-- fields of (\w+) -->\n)(?:\|.*\n)*")
+_TYPES: Final = re.compile(r"(<!-- types of controllers -->\n)(?:\|.*\n)*")
+_SECTIONS: Final = re.compile(r"(<!-- begin of controllers -->\n).*(<!-- end of controllers -->)", re.DOTALL)
 
 
 def renewed(page: str) -> str:
-    """The text of a page with its tables as the models say."""
-
-    def filled(found: re.Match[str]) -> str:
-        mark, name, beside = found.groups()
-        return f"{mark}{table(_model(name), beside=_model(beside) if beside else None)}\n"
-
-    return _TABLE.sub(filled, page)
+    """The text of a page with its tables and sections as the code has them."""
+    page = _TABLE.sub(lambda found: f"{found[1]}{table(_model(found[2]))}\n", page)
+    page = _TYPES.sub(lambda found: f"{found[1]}{_types()}\n", page)
+    sections = "\n\n".join(part for member in CONTROLLERS for part in _section(member))
+    return _SECTIONS.sub(lambda found: f"{found[1]}\n{sections}\n\n{found[2]}", page)
 
 
 def _model(name: str) -> type[BaseModel]:
     found: type[BaseModel] = next(getattr(module, name) for module in _MODULES if hasattr(module, name))
     return found
+
+
+def _types() -> str:
+    rows = [f"| [`{member.name}`](#{member.name}) | {about(member.spec)} |" for member in CONTROLLERS]
+    return "\n".join(["| type | what it does |", "|---|---|", *rows])
+
+
+def _section(member: ControllerMember[Any]) -> Iterator[str]:
+    yield f"## {member.name}"
+    # Lines between empty lines; those that are indented are code.
+    for part in cleandoc(sys.modules[member.build.__module__].__doc__ or "").split("\n\n"):
+        code = dedent(part)
+        words = {"controllers:": "yaml", "manager[": "python"}
+        kind = next((word for start, word in words.items() if code.startswith(start)), "text")
+        yield part if code == part else f"```{kind}\n{code}\n```"
+    yield table(member.spec, beside=ControllerSpec)
+    for field in member.spec.model_fields.values():
+        for kind in get_args(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, GainsSpec) and kind is not GainsSpec:
+                yield "Its gains also have these fields:"
+                yield table(kind, beside=GainsSpec)
 
 
 if __name__ == "__main__":

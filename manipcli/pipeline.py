@@ -20,7 +20,7 @@ from manipcli.logs.judge_log import judge_log
 from manipcli.logs.recorded_task import recorded_task
 from manipcli.logs.verify import compared, refused_as_unlike
 from manipcli.preflight.check_files import check_files, kind_of, schema, words
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.record.read.reading import open_recording
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.verification import Verification
@@ -141,7 +141,7 @@ def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Finding
         plan = plan_task(task, doing=progress.doing)
     except NotPlannable as refusal:
         return refused(task, refusal), task.warnings
-    doubts = gain_findings(task, plan)
+    doubts = preflight_findings(task, plan)
     progress.warned(doubts)
     return plan, (*task.warnings, *doubts)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Generic, Literal, Protocol, TypeVar
 import numpy as np
 
 from manipcli.conditions.condition import Problem
+from manipcli.control.control_loop import ControlLoop, HandSettings
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.description.transmission import Compat
@@ -98,6 +99,21 @@ class ControllerOutput:
         return self.commands[0]
 
 
+@dataclass(frozen=True, slots=True)
+class SensorRequest:
+    """A sensor that a controller reads.
+
+    Attributes:
+        type: the member of the seam `simulate/sensors/`.
+        joint: between whose links it is.
+        frame: the link in whose frame it measures.
+    """
+
+    type: str
+    joint: str
+    frame: str
+
+
 class Controller(Protocol):
     """A controller claims `joints` on `interfaces`; `feed_forward` says what it wants added to its effort."""
 
@@ -105,6 +121,11 @@ class Controller(Protocol):
     joints: tuple[str, ...]
     interfaces: tuple[Interface, ...]
     feed_forward: FeedForward
+
+    @property
+    def sensors(self) -> tuple[SensorRequest, ...]:
+        """What it reads beside its joints; with any it is a `roles.SensorReader`."""
+        ...
 
     @property
     def role(self) -> Role:
@@ -158,9 +179,13 @@ class ControllerMember(Generic[S]):
         spec: what the user writes.
         build: (name of the controller, spec, fit) -> the controller; for a spec without problems.
         check: (spec, robot) -> what this robot does not have, or what could not work.
+        loop: (spec) -> its control law, for preflight checks and `manipcli tune`.
+        hand: (spec) -> what limits it; for the role `hand` alone.
     """
 
     name: str
     spec: type[S]
     build: Callable[[str, S, Fit], Controller]
     check: Callable[[S, RobotModel], Iterable[Problem]]
+    loop: Callable[[S], ControlLoop]
+    hand: Callable[[S], HandSettings] | None = None

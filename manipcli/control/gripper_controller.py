@@ -63,6 +63,7 @@ class GripperController:
     """
 
     role: Role = "hand"
+    sensors = ()
 
     def __init__(
         self,

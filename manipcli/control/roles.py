@@ -1,11 +1,13 @@
-"""What steps ask of controllers: to follow trajectories, and to close and open a hand."""
+"""What steps ask of controllers: to follow trajectories, and to close and open a hand; and who reads sensors."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, TypeGuard
 
 from manipcli.control.action import GoalHandle, GripperGoal
 from manipcli.control.controller import Controller
+from manipcli.core.geometry import Array
 from manipcli.plan.trajectory import JointTrajectory
 
 
@@ -33,6 +35,14 @@ class Hand(Controller, Protocol):
         ...
 
 
+class SensorReader(Controller, Protocol):
+    """Reads sensors."""
+
+    def attach(self, readings: Sequence[Array]) -> None:
+        """An array for each of its `sensors`, which is up to date at every update from now on."""
+        ...
+
+
 def is_follower(controller: Controller) -> TypeGuard[Follower]:
     """Whether `move` steps may use it."""
     return controller.role == "follower"
@@ -41,3 +51,8 @@ def is_follower(controller: Controller) -> TypeGuard[Follower]:
 def is_hand(controller: Controller) -> TypeGuard[Hand]:
     """Whether `grasp` and `release` steps may use it."""
     return controller.role == "hand"
+
+
+def reads_sensors(controller: Controller) -> TypeGuard[SensorReader]:
+    """Whether it asks for sensors."""
+    return bool(controller.sensors)

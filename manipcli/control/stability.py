@@ -31,6 +31,8 @@ MARGINAL: Final = 1e-9
 SLOW: Final = 1e-6
 """An integral that does less than this share of its stiffness in a tick, i h < SLOW p, has its pole at 1 but for
 rounding."""
+RINGING: Final = 0.5
+"""A pole that changes its sign every tick may be no larger."""
 MOST_GAIN: Final = 1e6
 """A margin that is larger is not looked for."""
 

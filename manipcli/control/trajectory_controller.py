@@ -91,6 +91,7 @@ class JointTrajectoryController:
 
     role: Role = "follower"
     senses_contact = False
+    sensors = ()
 
     def __init__(
         self,

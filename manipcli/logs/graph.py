@@ -12,7 +12,6 @@ from typing import Final
 
 from manipcli.control.actuation import Actuation
 from manipcli.control.controller import Controller
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.text import number_of
@@ -28,6 +27,7 @@ from manipcli.report.graph import Edge, Graph, Node
 from manipcli.run.run_log import action_of, recorded
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.task import JUDGED, TaskSpec
 from manipcli.task.load_task import load_task
@@ -44,7 +44,7 @@ PRODUCERS: Final[Mapping[str, str]] = {
     channels.ACTUATOR_STATES: "drives",
 }
 """Which node publishes a topic that is no controller's."""
-BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, "wrench")
+BY_THE_CLOCK: Final = (*JUDGED, *PLOTTED, *SENSORS.names)
 MOST_NAMES: Final = 4
 
 
@@ -204,12 +204,11 @@ class _Builder:
         self._join("engine", "contacts")
         for controller in self._controllers:
             idle = not self._file.controllers[controller.name].active
-            if isinstance(controller, ForceTorqueBroadcaster):
-                sensor = f"wrench {controller.name}"
-                self._add(Node(sensor, "sensor", f"wrench at {controller.joint}"))
+            for request in controller.sensors:
+                sensor = f"{request.type} {controller.name}"
+                self._add(Node(sensor, "sensor", f"{request.type} at {request.joint}"))
                 self._join("engine", sensor)
                 self._join(sensor, controller.name, idle=idle, back=True)
-                continue
             if controller.joints:
                 self._join("joints", controller.name, idle=idle, back=True)
             if is_hand(controller):

@@ -16,7 +16,7 @@ from manipcli.spec.load import load_controllers_text, load_robot_text, load_task
 from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 
 def recorded_task_file(recording: Recording, path: Path) -> Located[TaskSpec]:
@@ -31,7 +31,8 @@ def recorded_robot_file(recording: Recording, path: Path) -> Located[RobotSpec]:
 
 def recorded_controllers_file(recording: Recording, path: Path) -> Located[ControllersSpec]:
     """The resolved controllers file of a log."""
-    return load_controllers_text(attached(recording, path, CONTROLLERS), f"{path.name}/{CONTROLLERS}")
+    name = f"{path.name}/{CONTROLLERS}"
+    return load_controllers_text(attached(recording, path, CONTROLLERS), name, model=controllers_spec())
 
 
 def recorded_robot(recording: Recording, path: Path) -> RobotModel:

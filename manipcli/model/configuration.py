@@ -48,3 +48,8 @@ def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = 
         named = robot.pose(pose)
         q[robot.indices(named.joints)] = named.positions
     return with_mimics(robot, q)
+
+
+def named_postures(robot: RobotModel, start: Array) -> Array:
+    """(T, n): the start, and every named pose with the other joints as at the start."""
+    return np.array([start, *(posture(robot, pose.name, rest=start) for pose in robot.poses)])

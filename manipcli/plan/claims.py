@@ -18,7 +18,6 @@ from manipcli.spec.controllers_file import ControllersSpec
 
 _GRIPPER = "add a controller of type `gripper` for the hand's joints to the controllers file"
 _THIS_TYPE = "`type: gripper`"
-_FOLLOWERS = "`joint_trajectory`, `computed_torque` or `cartesian_impedance`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +41,10 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """All controllers of a robot, at some moment of a task."""
+    """All controllers of a robot, at some moment of a task; `following`: the types that follow trajectories."""
 
     controllers: tuple[Claim, ...]
+    following: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, spec: ControllersSpec, place: Callable[..., Place | None] = lambda *_: None) -> Claims:
@@ -55,17 +55,17 @@ class Claims:
                     name, one.role, one.joints, one.interfaces, one.active, one.type, place("controllers", name, "type")
                 )
                 for name, one in spec.controllers.items()
-            )
+            ),
+            following=tuple(name for name, one in type(spec).types.items() if one.role == "follower"),
         )
 
     def switched(self, activated: Sequence[str], deactivated: Sequence[str]) -> Claims:
         """The same after a switch; a name of both is active."""
-        return Claims(
-            tuple(
-                replace(one, active=one.name in activated or (one.active and one.name not in deactivated))
-                for one in self.controllers
-            )
+        controllers = tuple(
+            replace(one, active=one.name in activated or (one.active and one.name not in deactivated))
+            for one in self.controllers
         )
+        return replace(self, controllers=controllers)
 
     @property
     def followers(self) -> tuple[Claim, ...]:
@@ -179,11 +179,12 @@ def _sleeping(claims: Claims, role: Role, joint: str, loc: Loc) -> Problem:
         message = f"controller '{able[0]}', which {what} joint '{joint}', is not active here"
         return Problem(loc, message, f"add a step before it: `switch_controllers: {able[0]}`")
     message = f"no controller {what} joint '{joint}'"
-    hint = f"add the joint to a controller of a type that does, in the controllers file: {_FOLLOWERS}"
+    types = " or ".join(", ".join(f"`{name}`" for name in claims.following).rsplit(", ", 1))
+    hint = f"add the joint to a controller of a type that does, in the controllers file: {types}"
     owner = next((one for one in claims.controllers if one.interfaces and joint in one.joints), None)
     if owner is not None:
         message += f": it is one of controller {owner.described}, of type `{owner.type}`"
-        hint = f"give '{owner.name}' a type that does: {_FOLLOWERS}"
+        hint = f"give '{owner.name}' a type that does: {types}"
     return Problem(loc, message, hint)
 
 

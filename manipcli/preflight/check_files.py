@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from manipcli.conditions.members import CONDITIONS
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
 from manipcli.plan.steps import STEPS
-from manipcli.preflight.gains import gain_findings
-from manipcli.preflight.postures import posture_findings
+from manipcli.preflight.findings import preflight_findings
+from manipcli.preflight.named_poses import pose_findings
 from manipcli.scene.build_scene import SHAPES
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec import load
@@ -22,7 +23,7 @@ from manipcli.spec.source.tree import Plain
 from manipcli.task.load_task import load_task
 from manipcli.task.robot_file import read_robot
 from manipcli.task.task import Task
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 
 def check_files(
@@ -61,11 +62,11 @@ def _findings(
         kind = load.kind_of(path)
         if kind == "task":
             task = of_task(path)
-            return (*task.findings, *gain_findings(task))
+            return (*task.findings, *preflight_findings(task))
         if kind == "controllers":
-            return load.load_controllers(path).findings
+            return load.load_controllers(path, model=controllers_spec()).findings
         file, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
-        return (*findings, *posture_findings(file, robot))
+        return (*findings, *pose_findings(file, robot))
     except InvalidInput as invalid:
         return invalid.findings
 
@@ -73,7 +74,7 @@ def _findings(
 def kind_of(path: Path) -> load.FileKind | None:
     """Which of the three files this is; None if it is none, or cannot be read."""
     try:
-        return load.kind_of(path, sure=True)
+        return load.kind_of(path, types=CONTROLLERS.names)
     except InvalidInput:
         return None
 
@@ -93,10 +94,10 @@ def words(kind: str) -> tuple[str, ...]:
 
 def schema(kind: load.FileKind) -> Mapping[str, Plain]:
     """The JSON Schema of a kind of file."""
-    texts = {
+    texts: dict[load.FileKind, Callable[[], str]] = {
         "task": lambda: task_schema(task_spec()),
         "robot": robot_schema,
-        "controllers": controllers_schema,
+        "controllers": lambda: controllers_schema(controllers_spec()),
     }
     parsed: Mapping[str, Plain] = json.loads(texts[kind]())
     return parsed

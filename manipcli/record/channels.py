@@ -71,18 +71,27 @@ class ControllerChannel:
 
 
 @dataclass(frozen=True, slots=True)
-class WrenchChannel:
-    """A broadcaster of wrenches, which are recorded in the frame of `link`."""
+class SensorChannel:
+    """A broadcaster of a sensor.
+
+    Attributes:
+        name: of the controller.
+        sensor: its name, the last word of the topic.
+        message: ROS type of the messages, one of `rows.SENSOR_TEMPLATES`.
+        frame: the link in whose frame they are.
+    """
 
     name: str
-    link: str
+    sensor: str
+    message: str
+    frame: str
 
     @property
     def topic(self) -> str:
-        return f"/{self.name}/wrench"
+        return f"/{self.name}/{self.sensor}"
 
 
-Recorded = ControllerChannel | WrenchChannel | None
+Recorded = ControllerChannel | SensorChannel | None
 """What is recorded of a loaded controller; None: nothing."""
 
 
@@ -110,8 +119,8 @@ def channel_table(controllers: Sequence[Recorded]) -> tuple[Channel, ...]:
         (ACTUATOR_STATES, schemas.JOINT_STATE, False),
     ]
     for controller in controllers:
-        if isinstance(controller, WrenchChannel):
-            rows.append((controller.topic, schemas.WRENCH, False))
+        if isinstance(controller, SensorChannel):
+            rows.append((controller.topic, controller.message, False))
         if not isinstance(controller, ControllerChannel):
             continue
         rows += [

@@ -103,6 +103,7 @@ def _run_steps(
                 engine=engine,
                 manager=manager,
                 period=simulation.control_period,
+                rng=np.random.default_rng((simulation.seed, 1)),
             )
             _settle(task, session)
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)

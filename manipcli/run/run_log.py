@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 from manipcli.control.controller import Controller
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.errors import Finding, InvalidInput
@@ -19,7 +18,7 @@ from manipcli.judge.judge import STORED, UNTIL
 from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
-from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
 from manipcli.record.faults import RecordingFailed, RecordingRefused
 from manipcli.record.messages import portable_name
 from manipcli.record.recording import EMBEDDED
@@ -29,6 +28,7 @@ from manipcli.run.embedding import embeddable
 from manipcli.scene.scene_file import scene_to_json
 from manipcli.shapes.primitives import Mesh
 from manipcli.simulate.engines import ENGINES
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.resolved import resolved
 from manipcli.spec.retry import expressions
 from manipcli.spec.robot import RobotSpec
@@ -129,11 +129,13 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
 
 def recorded(controller: Controller) -> Recorded:
     """What the log keeps of a controller."""
-    if isinstance(controller, ForceTorqueBroadcaster):
-        return WrenchChannel(controller.name, controller.link)
-    if not controller.interfaces:
+    if controller.interfaces:
+        return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+    if not controller.sensors:
         return None
-    return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
+    (request,) = controller.sensors
+    sensor = SENSORS[request.type]
+    return SensorChannel(controller.name, sensor.name, sensor.message, request.frame)
 
 
 def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:

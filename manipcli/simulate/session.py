@@ -1,7 +1,7 @@
 """The stepping: one control tick at a time, in one order and no other.
 
-read engine -> controllers -> joint limits -> actuators -> write -> observe -> physics. Whoever wants to see a tick (the
-recorder, the progress line) is an observer; nothing else happens in the loop.
+read engine -> sensors -> controllers -> joint limits -> actuators -> write -> observe -> physics. Whoever wants to see
+a tick (the recorder, the progress line) is an observer; nothing else happens in the loop.
 
 Nothing in a tick lets go of the interpreter lock, as `np.dot`, `take` and `norm` do for a vector of any size: it wakes
 the recorder's thread, which costs more than ten microseconds, and takes the lock from it before it could begin.
@@ -19,18 +19,19 @@ import numpy as np
 from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
-from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.cut import EFFORT
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
 from manipcli.control.motors import MotorLimits
-from manipcli.control.roles import is_hand
+from manipcli.control.roles import is_hand, reads_sensors
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import Engine
+from manipcli.simulate.sensor import Sensor
+from manipcli.simulate.sensors import SENSORS
 
 SLOW: Final = 10
 """Control ticks between two looks at what need not be seen at every one: the velocities of bodies (at the last tick
@@ -67,7 +68,7 @@ class Silent:
 
 
 class Session:
-    """Owns the clock of a run: control tick k begins at k * period."""
+    """Owns the clock of a run: control tick k begins at k * period. `rng`: of the sensors [default: seeded with 0]."""
 
     def __init__(
         self,
@@ -77,6 +78,7 @@ class Session:
         engine: Engine,
         manager: ControllerManager,
         period: float,
+        rng: np.random.Generator | None = None,
     ) -> None:
         self.robot = robot
         self.scene = scene
@@ -94,9 +96,13 @@ class Session:
         self._obeyed = -1
         if engine.ideal:
             manager.keep_references()
+        self._rng = np.random.default_rng(0) if rng is None else rng
+        self._sensors: list[Sensor] = []
         for controller in manager.controllers:
-            if isinstance(controller, ForceTorqueBroadcaster):
-                controller.attach(engine.sense_wrench(controller.joint))
+            if reads_sensors(controller):
+                opened = [SENSORS[request.type].open(engine, request) for request in controller.sensors]
+                controller.attach([sensor.reading for sensor in opened])
+                self._sensors += opened
         n = len(robot.joint_names)
         self._contact_force = np.zeros(n)
         self._joint_of_part, self._followers = _joint_of_part(robot)
@@ -146,6 +152,8 @@ class Session:
         state = self.state = self.engine.read(velocities=self.ticks % SLOW == SLOW - 1)
         time = self.ticks * self.period
         state.time[...] = time
+        for sensor in self._sensors:
+            sensor.sense(state, self._rng)
         self._touch(state)
         if self._motors.watches:
             limiter = self._limiter

@@ -1,4 +1,4 @@
-"""What users write of controllers: what all have, and those of joint trajectories and of grippers."""
+"""What users write of controllers: what all have, and the blocks that several types share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
     Frequency,
     JointAcceleration,
-    JointEffort,
     JointTolerance,
     JointValue,
     JointVelocity,
@@ -149,105 +148,3 @@ class ConstraintsSpec(Model):
         "Default true.",
     )
     joints: dict[str, JointConstraintSpec] = Field({}, description="Tolerances by joint.")
-
-
-class SpeedScalingSpec(Model):
-    """How fast the clock of trajectories runs."""
-
-    initial_scaling_factor: Annotated[float, Field(ge=0)] = Field(
-        1.0, description="Seconds of the trajectory a second, 0 or more: 0 pauses. Default 1."
-    )
-
-
-class UpsamplingSpec(Model):
-    """Velocities for goals that give positions alone."""
-
-    enable: bool = Field(False, description="Follow the cubic spline through the positions. Default false.")
-
-
-class JointTrajectorySpec(ControllerSpec):
-    """Follows joint trajectories: PID with feed-forward (effort, velocity), or passes the reference on (position)."""
-
-    role: ClassVar[Role] = "follower"
-
-    type: Literal["joint_trajectory"] = Field(description="`joint_trajectory`.")
-    joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interfaces: tuple[Interface, ...] = Field(
-        (),
-        description="What it commands: [position], [position, velocity], [position, velocity, acceleration], "
-        "[velocity], [effort] or [position, effort]. Default [effort].",
-    )
-    command_interface: Interface | None = Field(None, description="Short for a list of one of them.")
-    state_interfaces: tuple[str, ...] = Field(
-        ("position", "velocity"),
-        description="What it may read: position, also velocity, also acceleration. Default [position, velocity].",
-    )
-    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
-    gravity_compensation: bool = Field(False, description="Add the effort that holds against gravity. Default false.")
-    inverse_dynamics: bool = Field(False, description="Add the effort that the reference needs. Default false.")
-    constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
-    allow_partial_joints_goal: bool = Field(False, description="Goals may leave joints out. Default false.")
-    allow_nonzero_velocity_at_trajectory_end: bool = Field(
-        False, description="Goals may end in motion; the last position is held then. Default false."
-    )
-    allow_integration_in_goal_trajectories: bool = Field(
-        False, description="Goals may give velocities or accelerations without positions. Default false."
-    )
-    allow_trajectory_replacement: bool = Field(
-        True, description="A new goal goes on from the old path; else the old one ends at once. Default true."
-    )
-    interpolation_method: Literal["splines", "none"] = Field(
-        "splines", description="Between points: `splines`, or `none` to step to the next point. Default splines."
-    )
-    interpolate_from_desired_state: bool = Field(
-        True, description="Goals start from the reference; else from what is measured. Default true."
-    )
-    cmd_timeout: Annotated[Time, Field(ge=0)] = Field(
-        0.0, description="After the end of a trajectory a goal that is not reached is given up; above goal_time, or 0: "
-        "never. Default 0."
-    )  # fmt: skip
-    stop_trajectory_duration: Annotated[Time, Field(ge=0)] = Field(
-        0.0, description="After a cancel stop in this time, instead of by deceleration. Default 0: not."
-    )
-    speed_scaling: SpeedScalingSpec = Field(SpeedScalingSpec(), description="How fast trajectories run at first.")
-    positions_upsampling: UpsamplingSpec = Field(UpsamplingSpec(), description="For goals of positions alone.")
-
-    @property
-    def interfaces(self) -> tuple[Interface, ...]:
-        """What it commands of each of its joints."""
-        if self.command_interfaces:
-            return self.command_interfaces
-        return ("effort",) if self.command_interface is None else (self.command_interface,)
-
-
-class GripperSpec(ControllerSpec):
-    """Closes or opens a hand: each joint's reference moves at `speed`; a finger stops on contact or stall."""
-
-    role: ClassVar[Role] = "hand"
-
-    type: Literal["gripper"] = Field(description="`gripper`.")
-    joints: tuple[str, ...] = Field(description="The joints that it claims.")
-    command_interface: Literal["position", "effort"] = Field("effort", description="What it commands. Default effort.")
-    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
-    gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
-    speed: Annotated[JointVelocity, Field(gt=0)] | None = Field(
-        None, description="Of the reference, above 0. Default 1 rad/s or m/s, or the least limit of its joints."
-    )
-    max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
-        None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
-    )
-    stall_velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
-        None, description="Slower counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
-    )
-    stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
-    allow_stalling: bool = Field(
-        True, description="Whether a stalled finger has grasped; otherwise its goal is aborted. Default true."
-    )
-    goal_tolerance: JointTolerance | None = Field(
-        None, description="Distance that counts as arrived, above 0 to pi. Default 0.05 rad or 2 mm."
-    )
-
-    @property
-    def interfaces(self) -> tuple[Interface, ...]:
-        """What it commands of each of its joints."""
-        return (self.command_interface,)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.spec.ros.nodes import MANAGER
-from manipcli.spec.ros.table import models
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _DESCRIPTIONS = (".urdf", ".xacro")
@@ -31,19 +32,19 @@ def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
         raise _refusal(name, f"a {found} file", wanted)
 
 
-def names_controllers(node: Node) -> bool:
-    """Whether there is a controller, or ROS's manager of them, at or below this."""
+def names_controllers(node: Node, types: Collection[str]) -> bool:
+    """Whether there is a controller, of ROS or of one of our types, or ROS's manager of them, at or below this."""
     return isinstance(node, MappingNode) and any(
         key == MANAGER
-        or (key.rpartition(".")[2] == "type" and _is_controller(entry.node))
-        or names_controllers(entry.node)
+        or (key.rpartition(".")[2] == "type" and _is_controller(entry.node, types))
+        or names_controllers(entry.node, types)
         for key, entry in node.entries.items()
     )
 
 
-def _is_controller(kind: Node) -> bool:
+def _is_controller(kind: Node, types: Collection[str]) -> bool:
     word = kind.value if isinstance(kind, ScalarNode) else None
-    return isinstance(word, str) and ("/" in word or word in models())
+    return isinstance(word, str) and ("/" in word or word in types)
 
 
 def _certain_kind(root: MappingNode) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -63,18 +63,19 @@ def sibling(path: Path) -> str | None:
     return f"did you mean {any_of(close)}?" if close else f"beside it: {listed(names)}" if names else None
 
 
-def kind_of(path: Path, *, sure: bool = False) -> FileKind:
+def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
     """Which of the three files this is, by its top-level keys; a controllers file of ROS has none of its own.
 
     Args:
         path: the file.
-        sure: nobody said that it is one of the three, so a controllers file has to name a controller.
+        types: of our controllers, where the file may be none of the three: a controllers file has to name a
+            controller then, of one of these types or of ROS.
 
     Raises:
-        InvalidInput: it cannot be read, is no YAML mapping, or with `sure` none of the three.
+        InvalidInput: it cannot be read, is no YAML mapping, or with `types` none of the three.
     """
     told: list[Finding] = []
-    root = parse(read_bytes(path), str(path), infinite=True, told=None if sure else told)
+    root = parse(read_bytes(path), str(path), infinite=True, told=told if types is None else None)
     if not isinstance(root, MappingNode) and told:
         raise InvalidInput(told)
     if not isinstance(root, MappingNode):
@@ -85,7 +86,8 @@ def kind_of(path: Path, *, sure: bool = False) -> FileKind:
     named = "robot" in root.entries and not isinstance(root.get("robot"), MappingNode)
     if named or "description" in root.entries:
         return "robot"
-    if sure and not isinstance(root.get("controllers"), MappingNode) and not names_controllers(root):
+    wrapped = isinstance(root.get("controllers"), MappingNode)
+    if types is not None and not wrapped and not names_controllers(root, types):
         raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
     return "controllers"
 
@@ -198,31 +200,45 @@ def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[Robot
     return salvage_robot(source)
 
 
-def load_controllers(path: Path, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
-    """A controllers file in our form or one of ROS's; of the overrides those that begin with `controllers.`."""
-    return load_controllers_text(read_bytes(path), str(path), overrides=overrides)
+def load_controllers(
+    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str] = ()
+) -> Located[ControllersSpec]:
+    """A controllers file in our form or one of ROS's.
+
+    Args:
+        path: the file.
+        model: of `unions.controllers_model`: which types of controllers there are.
+        overrides: of `--set`; those that begin with `controllers.` are used.
+    """
+    return load_controllers_text(read_bytes(path), str(path), model=model, overrides=overrides)
 
 
-def load_controllers_text(text: str | bytes, name: str, *, overrides: Sequence[str] = ()) -> Located[ControllersSpec]:
+def load_controllers_text(
+    text: str | bytes, name: str, *, model: type[ControllersSpec], overrides: Sequence[str] = ()
+) -> Located[ControllersSpec]:
     """As `load_controllers`, from text; places call it `name`."""
-    source, findings = _controllers_source(text, name, overrides)
-    return validate(source, ControllersSpec, findings=[*findings, *open_substitutions(source.root)])
+    source, findings = _controllers_source(text, name, model, overrides)
+    return validate(source, model, findings=[*findings, *open_substitutions(source.root)])
 
 
-def _controllers_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Finding]]:
+def _controllers_source(
+    text: str | bytes, name: str, model: type[ControllersSpec], overrides: Sequence[str]
+) -> tuple[Source, list[Finding]]:
     written, told = _source(text, name, "CTRL", "controllers")
-    root, more = rewrite(written.root)
-    source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), ControllersSpec)
+    root, more = rewrite(written.root, model.types)
+    source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), model)
     return source, [*told, *more, *findings]
 
 
-def salvage_controllers_file(path: Path, *, overrides: Sequence[str]) -> Located[ControllersSpec] | None:
+def salvage_controllers_file(
+    path: Path, *, model: type[ControllersSpec], overrides: Sequence[str]
+) -> Located[ControllersSpec] | None:
     """What remains of a controllers file that `load_controllers` refused; None where too little does."""
     try:
-        source, _ = _controllers_source(read_bytes(path), str(path), overrides)
+        source, _ = _controllers_source(read_bytes(path), str(path), model, overrides)
     except InvalidInput:
         return None
-    return salvage_controllers(source)
+    return salvage_controllers(source, model)
 
 
 def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Finding]]:

@@ -28,9 +28,9 @@ def robot_schema() -> str:
     return _dump(_schema(RobotSpec, "manipcli robot"))
 
 
-def controllers_schema() -> str:
-    """Of a controllers file in our form."""
-    return _dump(_schema(ControllersSpec, "manipcli controllers"))
+def controllers_schema(model: type[ControllersSpec]) -> str:
+    """Of a controllers file in our form (`unions.controllers_model`)."""
+    return _dump(_schema(model, "manipcli controllers"))
 
 
 def _schema(model: type[BaseModel], title: str) -> dict[str, Plain]:

@@ -1,8 +1,10 @@
-"""The unions of a task: one model a verb and one a condition, made from the members of the seams.
+"""The unions of a task and of a controllers file, made from the members of the seams: one model for each verb, each
+condition and each type of controller.
 
 A step is a mapping with exactly one verb key beside the common keys `id`, `until` and `timeout`; a condition is a
 mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with one under
-it, beside the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`.
+it, beside the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`. A controller is a mapping
+whose key `type` names the member.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache, reduce
 from operator import or_
+from types import MappingProxyType
 from typing import Annotated, ForwardRef, Optional, Protocol, TypeVar, cast
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
@@ -27,6 +30,8 @@ from manipcli.spec.condition import (
     KeyedSpec,
     WatchSpec,
 )
+from manipcli.spec.controllers import ControllerSpec
+from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.task import StepSpec, TaskSpec
 
 
@@ -40,8 +45,19 @@ class SpecMember(Protocol):
     def spec(self) -> type[Model]: ...
 
 
+class ControllerSpecMember(Protocol):
+    """What the union of controllers asks of a member: the word under `type`, and the whole block."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def spec(self) -> type[ControllerSpec]: ...
+
+
 S = TypeVar("S", bound=SpecMember)
 C = TypeVar("C", bound=SpecMember)
+L = TypeVar("L", bound=ControllerSpecMember)
 
 _STEP = tuple(name for name in StepSpec.model_fields if name != "verb")
 _EXPECTATION = tuple(ExpectationSpec.model_fields)
@@ -76,6 +92,28 @@ def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
         watch=(tuple[_watches([name for name, _ in conditions], condition), ...], TaskSpec.model_fields["watch"]),  # type: ignore[arg-type, misc]
     )
     return cast(type[TaskSpec], model)
+
+
+def controllers_model(controllers: Seam[L]) -> type[ControllersSpec]:
+    """`ControllersSpec` whose entries are of the members' types; the same class for the same members."""
+    return _controllers_model(tuple((member.name, member.spec) for member in controllers))
+
+
+@lru_cache(maxsize=8)
+def _controllers_model(members: tuple[tuple[str, type[ControllerSpec]], ...]) -> type[ControllersSpec]:
+    specs = [spec for _, spec in members]
+    any_of: object = reduce(or_, specs[1:], specs[0])
+    if len(specs) > 1:
+        any_of = Annotated[any_of, Field(discriminator="type")]
+    # This type is made at run time, which annotations cannot follow.
+    model = create_model(
+        "ControllersSpec",
+        __base__=ControllersSpec,
+        __doc__=ControllersSpec.__doc__,
+        controllers=(dict[str, any_of], ControllersSpec.model_fields["controllers"]),  # type: ignore[valid-type]
+    )
+    model.types = MappingProxyType(dict(members))
+    return cast(type[ControllersSpec], model)
 
 
 def _conditions(members: Members) -> object:

@@ -19,7 +19,7 @@ from manipcli.task.sample import draw_sample
 from manipcli.task.second_chances import every_finding
 from manipcli.task.task import Task
 from manipcli.task.vary import Varied
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 
 class FileOptions(TypedDict, total=False):
@@ -101,7 +101,7 @@ def _as_written(
         allow_outside=allow_outside,
         source=robot_file.source,
     )
-    controllers_file = load_controllers(controllers_path, overrides=overrides)
+    controllers_file = load_controllers(controllers_path, model=controllers_spec(), overrides=overrides)
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     scene = build_scene(file.spec, place=lambda loc: file.place(*loc), packages=packages)
     warnings = consistent(file, controllers_file, robot, scene)

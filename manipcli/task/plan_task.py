@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import labels
@@ -20,7 +21,6 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.controllers import GripperSpec
 from manipcli.spec.task import StepSpec
 from manipcli.task.task import Task
 
@@ -176,8 +176,11 @@ def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tup
 
 
 def _planner(task: Task) -> Planner:
-    hands = [spec for spec in task.controllers.controllers.values() if isinstance(spec, GripperSpec)]
-    speeds = (closing_speed(task.robot, hand.joints, hand.speed) for hand in hands)
+    speeds = [
+        closing_speed(task.robot, spec.joints, member.hand(spec).speed)
+        for spec in task.controllers.controllers.values()
+        if (member := CONTROLLERS[spec.type]).hand is not None
+    ]
     return Planner(
         task.robot,
         task.scene,

@@ -28,7 +28,7 @@ from manipcli.task.consistency import disagreements, not_there
 from manipcli.task.named_file import named_file
 from manipcli.task.placeholders import named_robot, named_scene
 from manipcli.task.vary import bind
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 T = TypeVar("T")
 
@@ -165,5 +165,5 @@ def _controllers(
     """The controllers file, and what is left of it where it is refused."""
     if path is None:
         return None, None
-    file = errors.of(lambda: load.load_controllers(path, overrides=overrides))
-    return file, file or load.salvage_controllers_file(path, overrides=overrides)
+    file = errors.of(lambda: load.load_controllers(path, model=controllers_spec(), overrides=overrides))
+    return file, file or load.salvage_controllers_file(path, model=controllers_spec(), overrides=overrides)

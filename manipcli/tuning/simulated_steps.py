@@ -92,6 +92,7 @@ class _Holder:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
 
     def __init__(self, name: str, tuned: list[Tuned], spec: ControllersSpec, robot: RobotModel, start: Array) -> None:
         own = spec.controllers[name]

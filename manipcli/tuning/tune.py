@@ -10,22 +10,23 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from manipcli.control.control_loop import InverseDynamicsLoop, NoLoop, PidLoop
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.reflected import Load, Postures, load_of
 from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, listed, told_apart
-from manipcli.model.configuration import posture, with_mimics
+from manipcli.model.configuration import named_postures, posture, with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
-from manipcli.preflight.gains import named_postures
 from manipcli.spec import load
-from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
+from manipcli.spec.controllers import ControllerSpec, GainsSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.located import Located
-from manipcli.spec.other_controllers import ComputedTorqueSpec
 from manipcli.spec.resolved import as_written
 from manipcli.task.robot_file import read_robot
+from manipcli.task.vocabulary import controllers_spec
 from manipcli.tuning.extremes import climbed
 from manipcli.tuning.simulated_steps import simulated_answers
 
@@ -78,7 +79,7 @@ def tune(
         InvalidInput: a file cannot be used, a joint has no loop, nothing has gains, or none are stable.
     """
     _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
-    file = load.load_controllers(controllers_path)
+    file = load.load_controllers(controllers_path, model=controllers_spec())
     tuner = _Tuner(robot, file, wish, step)
     everything = tuner.proposals()
     there = [one.joint for one in everything]
@@ -144,20 +145,20 @@ class _Tuner:
             if name in elsewhere:
                 told = f"{name}: its gains stay, because joints of it are those of {elsewhere[name]}"
                 self.notes += (f"{told}; `active` says which one is tuned",)
-            elif isinstance(spec, JointTrajectorySpec | GripperSpec):
-                carried = spec.gravity_compensation or (isinstance(spec, JointTrajectorySpec) and spec.inverse_dynamics)
-                if spec.interfaces == ("effort",):
-                    efforts += [(name, joint, carried) for joint in spec.joints]
-                elif spec.interfaces == ("velocity",):
-                    velocities += [(name, joint) for joint in spec.joints]
-                else:
-                    self.notes += (f"{name}: its interface is {', '.join(spec.interfaces)}, which needs no gains",)
-            elif isinstance(spec, ComputedTorqueSpec):
-                self.notes += (
-                    f"{name}: the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` give them",
-                )
-            elif spec.interfaces:
-                self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
+                continue
+            match CONTROLLERS[spec.type].loop(spec):
+                case PidLoop(tunable=True, carries_weight=carried):
+                    if spec.interfaces == ("effort",):
+                        efforts += [(name, joint, carried) for joint in spec.joints]
+                    else:
+                        velocities += [(name, joint) for joint in spec.joints]
+                case PidLoop():
+                    self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
+                case InverseDynamicsLoop():
+                    told = f"the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` give them"
+                    self.notes += (f"{name}: {told}",)
+                case NoLoop(reason) if spec.interfaces:
+                    self.notes += (f"{name}: {reason}",)
         if not efforts and not velocities:
             message = "no controller has a loop to propose gains for"
             hint = "; ".join(self.notes) or None
@@ -169,7 +170,7 @@ class _Tuner:
         owners: dict[str, str] = {}
         found: dict[str, str] = {}
         for name, spec in sorted(self._file.spec.controllers.items(), key=lambda one: not one[1].active):
-            if isinstance(spec, JointTrajectorySpec | GripperSpec) and spec.interfaces in (("effort",), ("velocity",)):
+            if _tunable(spec) is not None:
                 first = next((owners[joint] for joint in spec.joints if joint in owners), None)
                 if first is None:
                     owners |= dict.fromkeys(spec.joints, name)
@@ -271,9 +272,10 @@ class _Tuner:
     def _pressing(self, controller: str, joint: str) -> float:
         """p with which the joint of a hand gives its effort over its travel; 0 of others, and where one is unknown."""
         spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
-        if not isinstance(spec, GripperSpec):
+        hand = CONTROLLERS[spec.type].hand
+        if hand is None:
             return 0.0
-        effort = min((each for each in (limits.effort, spec.max_effort) if each), default=0.0)
+        effort = min((each for each in (limits.effort, hand(spec).max_effort) if each), default=0.0)
         lower, upper = limits.range
         return effort / (upper - lower) if 0.0 < upper - lower < np.inf else 0.0
 
@@ -294,6 +296,12 @@ class _Tuner:
         return np.where(np.isneginf(lower), start - WIDE, lower), np.where(np.isposinf(upper), start + WIDE, upper)
 
 
+def _tunable(spec: ControllerSpec) -> PidLoop | None:
+    """Its loop, where gains are proposed for it."""
+    loop = CONTROLLERS[spec.type].loop(spec)
+    return loop if isinstance(loop, PidLoop) and loop.tunable else None
+
+
 def _inertia(k: int, load: Load) -> Array:
     """(T,) of a joint whose others stand."""
     return load.held_inertia[:, k]
@@ -308,13 +316,14 @@ def _with_gains(spec: ControllersSpec, tuned: Sequence[Tuned]) -> ControllersSpe
     changed = dict(spec.controllers)
     for one in tuned:
         own = changed[one.controller]
-        assert isinstance(own, JointTrajectorySpec | GripperSpec)
-        old = own.gains.get(one.joint, GainsSpec())
+        loop = _tunable(own)
+        assert loop is not None
+        old = loop.gains.get(one.joint, GainsSpec())
         update: dict[str, float | None] = {"p": one.p, "d": one.d}
         if one.i or old.i:
             update |= {"i": one.i, "i_clamp": one.i_clamp}
         if one.interface == "velocity":
             update["ff_velocity_scale"] = 1.0
-        gains = {**own.gains, one.joint: old.model_copy(update=update)}
+        gains = {**loop.gains, one.joint: old.model_copy(update=update)}
         changed[one.controller] = own.model_copy(update={"gains": gains})
     return spec.model_copy(update={"controllers": changed})

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipcli.control.control_loop import NoLoop, PidLoop
 from manipcli.control.controller import Controller, ControllerMember, Fit, JointState
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.factory import build_controllers, controller_findings
@@ -19,9 +20,11 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.plan.claims import Claims, unfollowed
+from manipcli.simulate.sensors import SENSORS
 from manipcli.spec.controllers import ControllerSpec
 from manipcli.spec.controllers_file import ControllersSpec
 from manipcli.spec.load import load_controllers_text, load_robot
+from manipcli.task.vocabulary import controllers_spec
 
 PERIOD = 1e-3
 ROBOT = Path(__file__).parents[2] / "robots" / "arm7_hand3" / "robot.yaml"
@@ -43,7 +46,7 @@ def example(member: ControllerMember[ControllerSpec]) -> ControllersSpec:
     """The file in the docstring of the member's module."""
     text = sys.modules[member.build.__module__].__doc__ or ""
     lines = text[text.index("    controllers:") :].split("\n\n")[0].splitlines()
-    located = load_controllers_text("\n".join(line[4:] for line in lines), "example.yaml")
+    located = load_controllers_text("\n".join(line[4:] for line in lines), "example.yaml", model=controllers_spec())
     assert located.findings == ()
     return located.spec
 
@@ -141,6 +144,31 @@ def test_the_manager_loads_lists_and_switches_it(member: ControllerMember[Contro
 @every_controller
 def test_a_joint_that_nobody_leads_is_told_which_types_do(member: ControllerMember[ControllerSpec]) -> None:
     """The hint of steps names every type that follows trajectories, and none that does not."""
-    (problem,) = unfollowed(Claims(()), ["joint_1"], ())
+    (problem,) = unfollowed(Claims.of(controllers_spec()(controllers={})), ["joint_1"], ())
     assert problem.hint is not None
     assert (f"`{member.name}`" in problem.hint) == (member.spec.role == "follower")
+
+
+@every_controller
+def test_it_says_what_limits_it_if_it_is_a_hand_and_only_then(member: ControllerMember[ControllerSpec]) -> None:
+    assert (member.hand is not None) == (member.spec.role == "hand")
+
+
+@every_controller
+def test_a_pid_loop_is_of_the_gains_in_its_file_on_one_interface(member: ControllerMember[ControllerSpec]) -> None:
+    """So that a finding about gains has a place, and the units of the gains are known."""
+    (spec,) = example(member).controllers.values()
+    loop = member.loop(spec)
+    if isinstance(loop, PidLoop):
+        assert len(spec.interfaces) == 1
+        assert set(loop.gains) == set(spec.joints)
+        assert "gains" in type(spec).model_fields
+    if isinstance(loop, NoLoop):
+        assert loop.reason
+
+
+@every_controller
+def test_it_asks_for_sensors_that_there_are_at_links_that_there_are(member: ControllerMember[ControllerSpec]) -> None:
+    for request in built(member).sensors:
+        assert request.type in SENSORS.names
+        assert robot().joint(request.joint).child == request.frame

@@ -6,15 +6,17 @@ import ast
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import BaseModel
 
+from manipcli.control.controller import ControllerMember
+from manipcli.control.controllers import CONTROLLERS
 from manipcli.spec.controllers import ControllerSpec
-from manipcli.spec.controllers_file import AnyController
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.task import TaskSpec
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ("task.md", "robot.md", "controllers.md")
@@ -43,12 +45,11 @@ def test_every_link_leads_to_a_heading(page: str) -> None:
         assert not anchor or anchor in {heading.lower().replace(" ", "-") for heading in headings}, (target, anchor)
 
 
-def test_every_type_of_controllers_has_a_section() -> None:
-    specs: tuple[type[ControllerSpec], ...] = AnyController.__origin__.__args__  # type: ignore[attr-defined]
-    for spec in specs:
-        (word,) = spec.model_fields["type"].annotation.__args__  # type: ignore[union-attr]
-        section = text("controllers.md").partition(f"\n## {word}\n")[2].partition("\n## ")[0]
-        assert f"<!-- fields of {spec.__name__} beside ControllerSpec -->" in section
+@pytest.mark.parametrize("member", CONTROLLERS.members, ids=CONTROLLERS.names)
+def test_every_type_of_controllers_has_a_section_with_its_fields(member: ControllerMember[Any]) -> None:
+    section = text("controllers.md").partition(f"\n## {member.name}\n")[2].partition("\n## ")[0]
+    own = [name for name in member.spec.model_fields if name not in ControllerSpec.model_fields]
+    assert own == [name for name in own if f"| `{name}` |" in section]
 
 
 def test_every_word_of_the_task_file_is_told() -> None:
@@ -70,7 +71,7 @@ def test_examples_of_the_robot_file_load(example: str) -> None:
 
 @pytest.mark.parametrize("example", examples("controllers.md"), ids=lambda e: e.split("type: ")[1].split()[0])
 def test_examples_of_the_controllers_file_load(example: str) -> None:
-    assert load_controllers_text(example, "c.yaml").spec.controllers
+    assert load_controllers_text(example, "c.yaml", model=controllers_spec()).spec.controllers
 
 
 def test_the_program_of_the_controllers_page_runs(
@@ -91,7 +92,7 @@ def test_the_program_of_the_controllers_page_runs(
     (example,) = (one for one in examples("controllers.md") if "forward_command" in one)
     (tmp_path / "c.yaml").write_text(example)
     (tmp_path / "task.yaml").write_text("task: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: [wait: 1 s]\n")
-    (program,) = re.findall(r"```python\n(.*?)```", text("controllers.md"), re.DOTALL)
+    (program,) = re.findall(r"```python\n(from .*?)```", text("controllers.md"), re.DOTALL)
     monkeypatch.chdir(tmp_path)
     exec(compile(program, "controllers.md", "exec"), {})
     angles = ast.literal_eval(capsys.readouterr().out)

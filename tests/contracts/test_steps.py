@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.plan.steps import STEPS
-from manipcli.spec.controllers import GripperSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
 from manipcli.task.task import Task

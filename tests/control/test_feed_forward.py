@@ -35,7 +35,7 @@ def weight(q):
 class Counts:
     """Commands how often it was updated; its reference accelerates at 2 rad/s2."""
 
-    name, joints, senses_contact = "counts", ("a",), False
+    name, joints, senses_contact, sensors = "counts", ("a",), False, ()
 
     def __init__(self, feed_forward="gravity"):
         self.feed_forward, self.interfaces = feed_forward, ("effort",)

@@ -22,6 +22,7 @@ class Spring:
     """Commands a number on one interface of its joints, and notes when; raises what it is told to."""
 
     senses_contact = False
+    sensors = ()
 
     def __init__(self, name, joints=JOINTS, *interfaces, value=1.0, feed_forward="none"):
         self.name, self.joints, self.interfaces = name, tuple(joints), interfaces or ("effort",)

@@ -17,7 +17,7 @@ from manipcli.description.elements import Joint, JointLimits, Link, Mimic
 from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import GainsSpec
-from manipcli.spec.controllers_file import ControllersSpec
+from manipcli.task.vocabulary import controllers_spec
 
 
 def joint(name, parent, child, kind="revolute", mimic=None, effort=10.0):
@@ -71,7 +71,7 @@ def spec(**controllers):
     default = {"arm": arm, "hand": hand}
     for name, changes in controllers.items():
         default[name] = default.get(name, {}) | changes
-    return ControllersSpec.model_validate({"controllers": default})
+    return controllers_spec().model_validate({"controllers": default})
 
 
 class World:
@@ -201,7 +201,7 @@ def test_two_that_follow_with_one_joint_are_a_warning_and_a_feed_forward_is_none
     add = {"type": "forward_command", "joints": both, "command_interface": "effort"}
 
     def warned(**controllers):
-        found = controller_findings(ControllersSpec.model_validate({"controllers": controllers}), robot(), 0.001)
+        found = controller_findings(controllers_spec().model_validate({"controllers": controllers}), robot(), 0.001)
         return [f.message for f in found if f.code == "CTRL149"]
 
     (text,) = warned(arm=arm, push=push)
@@ -221,7 +221,7 @@ def test_positions_in_steps_that_the_limits_of_accelerations_cut_are_a_warning(i
     both = ["shoulder", "elbow"]
     arm = {"type": "joint_trajectory", "joints": both, "command_interface": interface, "update_rate": rate}
     arm |= {} if interface == "position" else {"gains": gains(both)}
-    written = ControllersSpec.model_validate({"controllers": {"arm": arm}})
+    written = controllers_spec().model_validate({"controllers": {"arm": arm}})
     for joints, expected in ((quick, told), (model.joints, False)):
         found = controller_findings(written, replace(model, joints=joints), 0.001)
         texts = [f.message for f in found if (f.code, f.severity) == ("CTRL170", "warning")]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
@@ -19,7 +20,6 @@ from manipcli.plan.planner import Planner
 from manipcli.plan.step import Motion, Situation, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Shape
-from manipcli.spec.controllers import GripperSpec
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
 from manipcli.task.task import Task

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
@@ -27,7 +27,7 @@ def _told(tmp_path: Path, timeout: float, wait: float) -> list[tuple[str, int | 
     file = tmp_path / "late.yaml"
     file.write_text(TASK.format(root=ROOT, timeout=timeout, wait=wait))
     task = load_task(file)
-    findings = [found for found in gain_findings(task, plan_task(task)) if found.code == "TASK243"]
+    findings = [found for found in preflight_findings(task, plan_task(task)) if found.code == "TASK243"]
     assert all(found.severity == "warning" for found in findings)
     return [(found.message, found.place.line if found.place else None) for found in findings]
 

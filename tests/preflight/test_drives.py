@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
 TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
@@ -35,7 +35,7 @@ def found(pendulum: Callable[..., Path]) -> Found:
         (folder / "task.yaml").write_text(
             "task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{move: {to: up}}]\n"
         )
-        return gain_findings(load_task(folder / "task.yaml", overrides=overrides))
+        return preflight_findings(load_task(folder / "task.yaml", overrides=overrides))
 
     return of
 

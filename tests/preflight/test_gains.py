@@ -11,7 +11,7 @@ import pytest
 from manipcli.core.errors import Finding
 from manipcli.model.kinematics import Kinematics
 from manipcli.preflight.check_files import check_files
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -19,7 +19,7 @@ HOME = ROOT / "tasks" / "home.yaml"
 
 
 def findings(*overrides: str, task: Path = HOME) -> tuple[Finding, ...]:
-    return gain_findings(load_task(task, overrides=overrides))
+    return preflight_findings(load_task(task, overrides=overrides))
 
 
 @pytest.mark.parametrize(

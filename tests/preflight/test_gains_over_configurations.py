@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
@@ -48,7 +48,7 @@ def found(tmp_path: Path) -> Found:
             "task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: straight\n"
             f"steps: [{{move: {{to: {{elbow: {BENT}}}}}}}]\n"
         )
-        return gain_findings(load_task(tmp_path / "task.yaml"))
+        return preflight_findings(load_task(tmp_path / "task.yaml"))
 
     return of
 

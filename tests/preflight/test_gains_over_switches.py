@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.core.errors import Finding
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
 ARM = """<link name="{0}_arm"><inertial><origin xyz="0 0 -0.25"/><mass value="1"/>
@@ -39,7 +39,7 @@ def found(tmp_path: Path) -> Found:
         (tmp_path / "task.yaml").write_text(
             f"task: t\nrobot: robot.yaml\ncontrollers: c.yaml\nstart: zero\nsteps: [{steps}]\n"
         )
-        return gain_findings(load_task(tmp_path / "task.yaml"))
+        return preflight_findings(load_task(tmp_path / "task.yaml"))
 
     return of
 
@@ -82,3 +82,26 @@ def test_motors_of_a_controller_that_a_step_switches_on_are_looked_at(found: Fou
     assert found(fast, calm, steps=f"{{{UP}}}") == ()
     (one,) = found(fast, calm, steps=f"{{{UP}}}, {{{TO_A}}}, {{{DOWN}}}")
     assert (one.code, one.severity) == ("CTRL157", "warning")
+
+
+def test_a_pid_controller_is_examined_where_its_derivative_is_that_of_measured_velocities(found: Found) -> None:
+    pid = (
+        "  a: {type: pid, joints: [hinge], gravity_compensation: true, GAINS, reference_and_state_interfaces: [LED]}\n"
+    )
+    wild = pid.replace("GAINS", "gains: {hinge: {p: 10, d: 200}}")
+    (one,) = found(wild.replace("LED", "position, velocity"), steps="{wait: 1 s}")
+    assert (one.code, one.message.partition(":")[0]) == ("CTRL150", "hinge")
+    assert found(wild.replace("LED", "position"), steps="{wait: 1 s}") == ()
+    calm = pid.replace("GAINS", "gains: {hinge: {p: 10, d: 2}}")
+    assert found(calm.replace("LED", "position, velocity"), steps="{wait: 1 s}") == ()
+
+
+def test_the_effort_limit_is_examined_whatever_the_type_of_the_controller_is(found: Found, tmp_path: Path) -> None:
+    passed_on = "  a: {type: forward_command, joints: [hinge], command_interface: effort}\n"
+    assert found(passed_on, steps="{wait: 1 s}") == ()
+    weak = ROBOT.replace("hinge: {acceleration: 10}", "hinge: {acceleration: 10, effort: 1}")
+    (tmp_path / "weak.yaml").write_text(weak)
+    task = load_task(tmp_path / "task.yaml", overrides=["robot=weak.yaml", "start=up"])
+    (one,) = preflight_findings(task)
+    assert (one.code, one.severity) == ("CTRL155", "warning")
+    assert one.message.startswith("hinge: holding against gravity takes up to 2.29 N m, its limit is 1 N m")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.pipeline import run_task
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import plan_task
 
@@ -54,8 +54,8 @@ def test_a_hand_is_as_fast_as_it_is_told_and_by_itself_as_its_joints_may(
 
 def test_a_hand_that_is_told_to_be_faster_than_a_joint_may_be_is_doubted(small: Path) -> None:
     for speed in ("0.2", "null"):
-        assert gain_findings(load_task(small, overrides=[f"{SPEED}={speed}"])) == ()
-    (found,) = gain_findings(load_task(small, overrides=[f"{SPEED}=0.25"]))
+        assert preflight_findings(load_task(small, overrides=[f"{SPEED}={speed}"])) == ()
+    (found,) = preflight_findings(load_task(small, overrides=[f"{SPEED}=0.25"]))
     assert (found.code, found.severity) == ("CTRL167", "warning")
     assert found.message == ("panda_finger_joint1: its references move at 0.25 m/s, its velocity limit is 0.2 m/s")
 
@@ -75,7 +75,7 @@ def pick(tmp_path: Path) -> Path:
 def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) -> None:
     """p 500 x 20 mm are 10 N for two fingers: 5 N each, and so the run feels."""
     gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
-    (found,) = gain_findings(load_task(pick, overrides=[f"{gain}=500"]))
+    (found,) = preflight_findings(load_task(pick, overrides=[f"{gain}=500"]))
     assert (found.code, found.severity) == ("CTRL168", "warning")
     assert found.message == "panda_finger_joint1: step 'pick_1' grasps with 7 N; p 500 gives about 5 N"
     assert found.hint == "p 840 gives a fifth more than that"
@@ -90,10 +90,10 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
     assert felt is not None
     assert float(felt[1]) == pytest.approx(5.0, rel=0.1)
     assert "felt" not in told_of([f"{gain}=840"])
-    assert gain_findings(load_task(pick, overrides=[f"{gain}=840"])) == ()
+    assert preflight_findings(load_task(pick, overrides=[f"{gain}=840"])) == ()
     winds_up = [f"{gain}=500", f"{gain[:-1]}i=100", f"{gain[:-1]}i_clamp=10"]
-    assert gain_findings(load_task(pick, overrides=winds_up)) == (), "its integral gives what lacks"
-    assert gain_findings(load_task(pick, overrides=[f"{gain}=5", "simulation.engine=kinematic"])) == ()
+    assert preflight_findings(load_task(pick, overrides=winds_up)) == (), "its integral gives what lacks"
+    assert preflight_findings(load_task(pick, overrides=[f"{gain}=5", "simulation.engine=kinematic"])) == ()
 
 
 @pytest.mark.slow
@@ -101,8 +101,8 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
 def test_an_object_of_next_to_no_mass_beside_the_grip_is_doubted(pick: Path, gravity: str) -> None:
     """7 N on 10 g are 700 N/kg, on 5 g 1400; an error of the contact solver moves it so, be it heavy or not."""
     there = f"simulation.gravity={gravity}"
-    assert gain_findings(load_task(pick, overrides=[there, "scene.block.mass=10 g"])) == ()
-    (found,) = gain_findings(load_task(pick, overrides=[there, "scene.block.mass=5 g"]))
+    assert preflight_findings(load_task(pick, overrides=[there, "scene.block.mass=10 g"])) == ()
+    (found,) = preflight_findings(load_task(pick, overrides=[there, "scene.block.mass=5 g"]))
     assert (found.code, found.severity) == ("TASK239", "warning")
     assert found.message == ("step 'pick_1': 7 N are much for 'block' of 5 g: it may creep in the hand by millimetres")
     assert (found.hint or "").startswith("a force below 3.7 N, or more mass")
@@ -113,9 +113,9 @@ def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
     """Of 500 N, 3.7 are left on 5 g, and 50 where two fingers share 100 N; p is asked for these, and not for 500."""
     gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
     asked, limit = "steps.0.pick.grasp.force=500 N", "robot.limits.panda_finger_joint1.effort=100 N"
-    light = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=5 g"]))
+    light = preflight_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=5 g"]))
     assert [found.code for found in light] == ["TASK239"]
-    soft = gain_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=1 kg", f"{gain}=500"]))
+    soft = preflight_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=1 kg", f"{gain}=500"]))
     assert {found.code: found.hint for found in soft} == {
         "TASK238": "lower `force`, or raise what limits it: the joint's effort, or `max_effort`",
         "CTRL168": "p 6000 gives a fifth more than 50 N",
@@ -132,29 +132,29 @@ def test_a_hand_on_the_position_interface_is_told_that_no_force_is_its_own(pick:
     (tmp_path / "c.yaml").write_text(arm + hand)
     pick.write_text(re.sub("controllers: .*", "controllers: c.yaml", pick.read_text()))
     force, limit = "steps.0.pick.grasp.force", "robot.limits.panda_finger_joint1.effort"
-    (found,) = gain_findings(load_task(pick, overrides=[f"{force}=1 N"]))
+    (found,) = preflight_findings(load_task(pick, overrides=[f"{force}=1 N"]))
     assert (found.code, found.severity) == ("CTRL171", "warning")
     assert found.message == (
         "panda_finger_joint1: step 'pick_1' grasps with 1 N; commanded by position it presses with 10 N, its effort "
         "limit: `force` only says at which contact force it stops"
     )
     assert found.hint == ("command it by effort, or limit that (robot file, limits.panda_finger_joint1.effort: 2.1)")
-    assert gain_findings(load_task(pick, overrides=[f"{force}=1 N", f"{limit}=2.1"])) == ()
-    assert gain_findings(load_task(pick, overrides=[f"{force}=10 N"])) == ()
+    assert preflight_findings(load_task(pick, overrides=[f"{force}=1 N", f"{limit}=2.1"])) == ()
+    assert preflight_findings(load_task(pick, overrides=[f"{force}=10 N"])) == ()
 
 
 @pytest.mark.slow
 def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     """Two fingers with 7 N and 0.9 carry 12.6 N: 1.28 kg, or 0.642 kg with as much again to accelerate it."""
     mass = "scene.block.mass"
-    assert gain_findings(load_task(pick, overrides=[f"{mass}=5 kg"])) == (), "it is not lifted"
+    assert preflight_findings(load_task(pick, overrides=[f"{mass}=5 kg"])) == (), "it is not lifted"
     pick.write_text(pick.read_text(encoding="utf-8") + "  - lift: {object: block, by: 10 cm}\n", encoding="utf-8")
-    assert gain_findings(load_task(pick, overrides=[f"{mass}=0.64 kg"])) == ()
-    (found,) = gain_findings(load_task(pick, overrides=[f"{mass}=1 kg"]))
+    assert preflight_findings(load_task(pick, overrides=[f"{mass}=0.64 kg"])) == ()
+    (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1 kg"]))
     assert found.hint == "it may slip while it is accelerated, or turn: 10.9 N a finger carry it twice"
     run = run_task(pick, overrides=[f"{mass}=1 kg"], log=pick.with_suffix(".mcap"), force=True)
     assert "it slipped" in str(run.verdict)
-    (found,) = gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
+    (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
     assert (found.code, found.severity) == ("TASK241", "warning")
     assert found.message == (
         "step 'pick_1': two fingers with 7 N each and a friction of 0.9 carry 12.6 N; 'block' of 1.9 kg weighs 18.6 N"
@@ -162,5 +162,5 @@ def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     assert found.hint == "it will slip, it takes more than 10.4 N a finger or more friction"
     run = run_task(pick, overrides=[f"{mass}=1.9 kg"], log=pick.with_suffix(".mcap"), force=True)
     assert "it slipped" in str(run.verdict)
-    assert gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "scene.block.friction=2.7"])) == ()
-    assert gain_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "simulation.gravity=[0, 0, -1.62]"])) == ()
+    assert preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "scene.block.friction=2.7"])) == ()
+    assert preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "simulation.gravity=[0, 0, -1.62]"])) == ()

@@ -11,7 +11,7 @@ import pytest
 
 from manipcli.core.errors import Finding
 from manipcli.pipeline import run_task
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.record.read.reading import read_recording
 from manipcli.task.load_task import load_task
 
@@ -35,7 +35,7 @@ def written(pendulum: Written) -> Written:
 
 
 def told(task: Path) -> list[Finding]:
-    return list(gain_findings(load_task(task)))
+    return list(preflight_findings(load_task(task)))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.pipeline import run_task
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ steps:
   - pick: {{object: $what, approach: {{from: top}}}}
   - lift: {{object: $what}}
 expect:
-  - slip: {{object: peg, within: 3 mm, rotation: 3 deg}}
+  - slip: {{object: peg, within: 3 mm, turn: 3 deg}}
 """
 
 
@@ -32,11 +32,11 @@ expect:
 def test_a_cylinder_between_two_fingers_turns_as_it_was_told(tmp_path: Path) -> None:
     file = tmp_path / "turn.yaml"
     file.write_text(TASK)
-    (found,) = gain_findings(load_task(file))
+    (found,) = preflight_findings(load_task(file))
     assert (found.code, found.severity, found.place and found.place.line) == ("TASK240", "warning", 10)
     assert "'peg', a cylinder, by a point each" in found.message
     spins = "scene.peg.spinning_friction=0.01"
-    assert gain_findings(load_task(file, overrides=[spins])) == ()
-    assert gain_findings(load_task(file, overrides=["params.what=cube"])) == ()
+    assert preflight_findings(load_task(file, overrides=[spins])) == ()
+    assert preflight_findings(load_task(file, overrides=["params.what=cube"])) == ()
     verdicts = [run_task(file, overrides=more, log=tmp_path / "t.mcap", force=True).verdict for more in ([], [spins])]
     assert [verdict.expectations[0].outcome for verdict in verdicts] == ["failed", "passed"]

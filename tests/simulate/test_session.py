@@ -125,7 +125,7 @@ def test_a_slow_controller_drives_geared_joints_alike_at_every_tick(session_of: 
 
     class Pushes:
         name, joints, interfaces, role = "push", ("slide",), ("effort",), None
-        feed_forward, senses_contact = "none", False
+        feed_forward, senses_contact, sensors = "none", False, ()
         output = ControllerOutput.of(1, 1)
 
         def update(self, time: float, period: float, measured: Any, *, contact_force: Any = None) -> Any:

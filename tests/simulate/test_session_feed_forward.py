@@ -40,7 +40,7 @@ def robot():
 class Echo:
     """Commands nothing itself; its reference moves at RATE."""
 
-    name, joints, interfaces, role = "echo", ("a", "b"), ("effort",), None
+    name, joints, interfaces, role, sensors = "echo", ("a", "b"), ("effort",), None, ()
 
     def __init__(self, feed_forward):
         self.feed_forward = feed_forward

@@ -12,7 +12,7 @@ from manipcli.plan.steps import STEPS
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
 from manipcli.spec.source.yaml import parse
-from manipcli.task.vocabulary import task_spec
+from manipcli.task.vocabulary import controllers_spec, task_spec
 
 ROBOT = "robot: r\ndescription: r.urdf\n"
 
@@ -57,7 +57,11 @@ def test_what_is_not_finite_is_not_said_to_be_a_text() -> None:
 def test_a_tolerance_of_zero_is_told_what_leaving_it_out_means() -> None:
     constraints = "constraints: {joints: {a: {goal: 0, trajectory: 0.1}}}"
     with pytest.raises(InvalidInput) as error:
-        load_controllers_text(f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}", "c.yaml")
+        load_controllers_text(
+            f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}",
+            "c.yaml",
+            model=controllers_spec(),
+        )
     (finding,) = error.value.findings
     assert (finding.code, finding.hint) == (
         "CTRL204",
@@ -68,7 +72,11 @@ def test_a_tolerance_of_zero_is_told_what_leaving_it_out_means() -> None:
 def test_a_tolerance_in_degrees_is_told_to_say_so() -> None:
     constraints = "constraints: {joints: {a: {trajectory: 15, goal: 2}}}"
     with pytest.raises(InvalidInput) as error:
-        load_controllers_text(f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}", "c.yaml")
+        load_controllers_text(
+            f"controllers: {{c: {{type: joint_trajectory, joints: [a], {constraints}}}}}",
+            "c.yaml",
+            model=controllers_spec(),
+        )
     (finding,) = error.value.findings
     assert finding.message == "controllers.c.constraints.joints.a.trajectory: must be at most 3.1416 rad or m, not 15"
     assert finding.hint == "in degrees? write '15 deg'; in millimetres? write '15 mm'"
@@ -211,10 +219,10 @@ def test_a_renamed_key_leads_to_one_that_there_is(spec: type[Model]) -> None:
 
 def test_of_a_controller_of_any_type_only_the_type_is_asked_for() -> None:
     with pytest.raises(InvalidInput) as error:
-        load_controllers_text(CONTROLLERS % "[]", "c.yaml")
+        load_controllers_text(CONTROLLERS % "[]", "c.yaml", model=controllers_spec())
     (finding,) = error.value.findings
     assert finding.hint == "write {type: ...}"
-    load_controllers_text(CONTROLLERS % "{type: joint_state_broadcaster}", "c.yaml")
+    load_controllers_text(CONTROLLERS % "{type: joint_state_broadcaster}", "c.yaml", model=controllers_spec())
 
 
 def test_a_list_of_one_length_is_asked_for_with_that_length() -> None:
@@ -232,7 +240,9 @@ def test_where_a_plain_number_is_wanted_no_unit_is_proposed() -> None:
 
 def test_a_joint_that_stands_twice_is_told_without_a_robot() -> None:
     with pytest.raises(InvalidInput) as error:
-        load_controllers_text(CONTROLLERS % "{type: joint_state_broadcaster, joints: [a, b, a]}", "c.yaml")
+        load_controllers_text(
+            CONTROLLERS % "{type: joint_state_broadcaster, joints: [a, b, a]}", "c.yaml", model=controllers_spec()
+        )
     (finding,) = error.value.findings
     assert (finding.code, str(finding.place)) == ("CTRL210", "c.yaml:2:54")
     assert finding.message == "controllers.js.joints[2]: joint 'a' stands twice"

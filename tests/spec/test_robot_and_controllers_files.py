@@ -6,11 +6,12 @@ import json
 
 import pytest
 
+from manipcli.control.controllers.joint_trajectory import JointTrajectorySpec
 from manipcli.core.errors import Finding, InvalidInput
-from manipcli.spec.controllers import JointTrajectorySpec
 from manipcli.spec.load import load_controllers_text, load_robot_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.schema import controllers_schema, robot_schema
+from manipcli.task.vocabulary import controllers_spec
 
 PAPER = """\
 arm_controller:
@@ -51,12 +52,12 @@ def lines(findings: tuple[Finding, ...]) -> list[str]:
 
 def refused(text: str, *overrides: str) -> list[str]:
     with pytest.raises(InvalidInput) as caught:
-        load_controllers_text(text, "c.yaml", overrides=overrides)
+        load_controllers_text(text, "c.yaml", overrides=overrides, model=controllers_spec())
     return lines(caught.value.findings)
 
 
 def test_the_listing_of_ros_1_loads_as_it_is() -> None:
-    located = load_controllers_text(PAPER, "c.yaml")
+    located = load_controllers_text(PAPER, "c.yaml", model=controllers_spec())
     arm = located.spec.controllers["arm_controller"]
     assert isinstance(arm, JointTrajectorySpec)
     assert (arm.joints, arm.interfaces) == (("joint1",), ("effort",))
@@ -68,7 +69,7 @@ def test_the_listing_of_ros_1_loads_as_it_is() -> None:
 
 
 def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
-    located = load_controllers_text(ROS2, "c.yaml")
+    located = load_controllers_text(ROS2, "c.yaml", model=controllers_spec())
     arm = located.spec.controllers["arm"]
     assert isinstance(arm, JointTrajectorySpec)
     assert (arm.joints, arm.interfaces) == (("a", "b"), ("effort",))
@@ -133,7 +134,9 @@ def test_a_mistake_in_a_controllers_file_is_told_at_its_place(text: str, expecte
 def test_overrides_reach_the_controllers_in_any_form_of_the_file() -> None:
     override = "controllers.arm.gains.a.p=7"
     for text in (OWN, ROS2):
-        located = load_controllers_text(text, "c.yaml", overrides=[override, "scene.cup.mass=1"])
+        located = load_controllers_text(
+            text, "c.yaml", overrides=[override, "scene.cup.mass=1"], model=controllers_spec()
+        )
         assert located.spec.controllers["arm"].gains["a"].p == 7.0
     (line,) = refused(OWN, "controllers.amr.gains.a.p=7")
     assert line == "--set controllers.amr.gains.a.p=7: error[CTRL212]: there is no 'amr' in 'controllers'"
@@ -141,8 +144,8 @@ def test_overrides_reach_the_controllers_in_any_form_of_the_file() -> None:
 
 @pytest.mark.parametrize("text", [PAPER, ROS2, OWN])
 def test_resolved_controllers_come_back_equal(text: str) -> None:
-    spec = load_controllers_text(text, "c.yaml").spec
-    assert load_controllers_text(resolved(spec), "resolved").spec == spec
+    spec = load_controllers_text(text, "c.yaml", model=controllers_spec()).spec
+    assert load_controllers_text(resolved(spec), "resolved", model=controllers_spec()).spec == spec
 
 
 ROBOT = """\
@@ -209,13 +212,13 @@ def test_a_quaternion_is_of_length_one_within_a_thousandth() -> None:
 
 def test_schemas_are_deterministic_and_say_limits_in_json_schema() -> None:
     assert robot_schema() == robot_schema()
-    schema = json.loads(controllers_schema())
+    schema = json.loads(controllers_schema(controllers_spec()))
     speed = schema["$defs"]["GripperSpec"]["properties"]["speed"]
     speed = speed["anyOf"][0]  # or null
     assert speed["exclusiveMinimum"] == 0
     assert speed["type"] == ["number", "string"]
     one_of = schema["properties"]["controllers"]["additionalProperties"]["oneOf"]
     assert {f"#/$defs/{name}Spec" for name in ("JointTrajectory", "Gripper", "Pid")} < {one["$ref"] for one in one_of}
-    for words in (robot_schema(), controllers_schema()):
+    for words in (robot_schema(), controllers_schema(controllers_spec())):
         assert '"gt"' not in words
         assert '"ge"' not in words

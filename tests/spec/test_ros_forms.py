@@ -10,21 +10,22 @@ import pytest
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.spec.load import kind_of, load_controllers_text
 from manipcli.spec.resolved import resolved
-from manipcli.spec.ros.table import Block, Table, models
+from manipcli.spec.ros.table import Block, Table
 from manipcli.spec.ros.tables import TABLES, UNSERVED_TYPES
+from manipcli.task.vocabulary import controllers_spec
 
 
 def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
     """What was said of each controller, and what was told."""
-    located = load_controllers_text(text, "c.yaml")
+    located = load_controllers_text(text, "c.yaml", model=controllers_spec())
     spec = located.spec
-    assert load_controllers_text(resolved(spec), "resolved").spec == spec
+    assert load_controllers_text(resolved(spec), "resolved", model=controllers_spec()).spec == spec
     return {name: one.model_dump(exclude_unset=True) for name, one in spec.controllers.items()}, located.findings
 
 
 def refused(text: str) -> list[str]:
     with pytest.raises(InvalidInput) as caught:
-        load_controllers_text(text, "c.yaml")
+        load_controllers_text(text, "c.yaml", model=controllers_spec())
     return [f"{finding} | {finding.hint}" for finding in caught.value.findings if finding.severity == "error"]
 
 
@@ -350,7 +351,7 @@ def _text(table: Table) -> str:
 def test_what_ros_knows_and_manipcli_does_not_serve_is_named_and_left_out(table: Table) -> None:
     word = next(reversed(table.types))
     plain, before = loaded(f"x: {{type: {word}, {_text(table)}}}")
-    for name in _unserved(table.parameters, set(models()[table.own].model_fields)):
+    for name in _unserved(table.parameters, set(controllers_spec().types[table.own].model_fields)):
         controllers, findings = loaded(f"x: {{type: {word}, {_text(table)}, {name}: 17}}")
         assert controllers == plain, name
         (finding,) = [one for one in findings if one not in before and f"'{name}'" in one.message]
@@ -586,7 +587,7 @@ io: {{type: ur_controllers/GPIOController, tf_prefix: "$(var tf_prefix)"}}
 "$(var tf_prefix)x": {{{JTC}, joints: [{joint}], constraints: {{{joint}: {{goal: 0.1}}}}}}
 """
     with pytest.raises(InvalidInput) as caught:
-        load_controllers_text(text, "c.yaml")
+        load_controllers_text(text, "c.yaml", model=controllers_spec())
     assert [(f.code, f.severity) for f in caught.value.findings] == [("CTRL214", "warning"), ("CTRL217", "error")]
     (line,) = refused(text)
     assert line.startswith("c.yaml:2:") and "'$(var tf_prefix)' is for a launch file to fill in" in line

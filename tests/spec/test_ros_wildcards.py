@@ -9,6 +9,7 @@ import pytest
 
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.spec.load import kind_of, load_controllers_text
+from manipcli.task.vocabulary import controllers_spec
 
 JTC = "type: joint_trajectory_controller/JointTrajectoryController"
 STATES = "type: joint_state_broadcaster/JointStateBroadcaster"
@@ -16,7 +17,7 @@ POSITION = {"type": "joint_trajectory", "command_interfaces": ("position",)}
 
 
 def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
-    located = load_controllers_text(text, "c.yaml")
+    located = load_controllers_text(text, "c.yaml", model=controllers_spec())
     return {name: one.model_dump(exclude_unset=True) for name, one in located.spec.controllers.items()}, (
         located.findings
     )
@@ -24,7 +25,7 @@ def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
 
 def refused(text: str) -> list[str]:
     with pytest.raises(InvalidInput) as caught:
-        load_controllers_text(text, "c.yaml")
+        load_controllers_text(text, "c.yaml", model=controllers_spec())
     return [f"{finding} | {finding.hint}" for finding in caught.value.findings if finding.severity == "error"]
 
 
@@ -42,7 +43,7 @@ def test_controllers_named_by_their_own_blocks_have_type_and_interfaces_from_all
     text = all_and(shared, node("one", "joints: [a]"), node("/ns/two", "joints: [b]"), wildcard=wildcard)
     assert loaded(text) == ({"one": POSITION | {"joints": ("a",)}, "two": POSITION | {"joints": ("b",)}}, ())
     (tmp_path / "c.yaml").write_text(text)
-    assert kind_of(tmp_path / "c.yaml", sure=True) == "controllers"
+    assert kind_of(tmp_path / "c.yaml", types=controllers_spec().types) == "controllers"
 
 
 def test_what_a_controller_says_itself_wins_to_the_depth_of_blocks() -> None:

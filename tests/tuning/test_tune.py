@@ -14,13 +14,14 @@ from manipcli.control.tuning import MARGIN, Tuned, Wish
 from manipcli.core.errors import InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.pipeline import run_task
-from manipcli.preflight.gains import gain_findings
+from manipcli.preflight.findings import preflight_findings
 from manipcli.record.read.reading import open_recording
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.task.load_task import load_task
+from manipcli.task.vocabulary import controllers_spec
 from manipcli.tuning.tune import Tuning, chart_of, tune, written
 
 ROOT = Path(__file__).parents[2]
@@ -214,7 +215,10 @@ def arm() -> Tuning:
 def test_the_file_that_is_written_is_the_old_one_with_other_gains(arm: Tuning, tmp_path: Path) -> None:
     source = ROOT / "controllers" / "arm7_hand3.yaml"
     (tmp_path / "tuned.yaml").write_text(written(arm, source))
-    before, after = load_controllers(source).spec, load_controllers(tmp_path / "tuned.yaml").spec
+    before, after = (
+        load_controllers(source, model=controllers_spec()).spec,
+        load_controllers(tmp_path / "tuned.yaml", model=controllers_spec()).spec,
+    )
     for name, spec in after.controllers.items():
         gains = {one.joint: (one.p, one.d) for one in arm.joints if one.controller == name}
         assert {joint: (g.p, g.d) for joint, g in spec.gains.items()} == gains  # type: ignore[union-attr]
@@ -228,7 +232,7 @@ def test_gains_of_an_arm_have_their_margin_and_give_no_doubt(arm: Tuning, tmp_pa
     (tmp_path / "tuned.yaml").write_text(written(arm, Path("x.yaml")))
     text = (ROOT / "tasks" / "home.yaml").read_text().replace("../robots", str(ROOT / "robots"))
     (tmp_path / "home.yaml").write_text(text.replace("../controllers/arm7_hand3.yaml", "tuned.yaml"))
-    assert gain_findings(load_task(tmp_path / "home.yaml")) == ()
+    assert preflight_findings(load_task(tmp_path / "home.yaml")) == ()
 
 
 def test_the_chart_has_a_panel_a_controller(arm: Tuning) -> None:

@@ -19,9 +19,9 @@ CONTROLLERS: Seam[ControllerMember[Any]] = Seam(
     kind="controller",
     members=(
         joint_trajectory.MEMBER,
+        gripper.MEMBER,
         computed_torque.MEMBER,
         cartesian_impedance.MEMBER,
-        gripper.MEMBER,
         forward_command.MEMBER,
         pid.MEMBER,
         joint_state_broadcaster.MEMBER,

@@ -27,13 +27,15 @@ Cartesian Impedance Control of Redundant and Flexible-Joint Robots (2008), chapt
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
+from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
@@ -47,8 +49,8 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.controllers import ConstraintsSpec, Interface, Role
-from manipcli.spec.other_controllers import CartesianImpedanceSpec, TaskSpaceSpec
+from manipcli.spec.base import Model
+from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, Interface, Role
 
 SINGULAR: Final = 1e-3
 """s: directions of the tool that the joints move by less than this [m or rad per rad] are left to the posture."""
@@ -56,6 +58,55 @@ LIGHTEST: Final = 1e-9
 """[1/kg] or [1/(kg m2)]: mobilities below this count as this."""
 WEIGHED: Final = 10
 """Updates between two looks at the masses, which only scale the damping and change slowly."""
+
+
+NotNegative = Annotated[float, Field(ge=0)]
+Axes3 = tuple[NotNegative, NotNegative, NotNegative]
+
+
+class TaskSpaceSpec(Model):
+    """Along and about three axes: one number for all three, or a list of x, y, z."""
+
+    translation: NotNegative | Axes3 = Field(description="Stiffness [N/m] or damping [N s/m], 0 or more.")
+    rotation: NotNegative | Axes3 = Field(description="Stiffness [N m/rad] or damping [N m s/rad], 0 or more.")
+
+
+class PostureSpec(Model):
+    """What draws the joints to those of the reference where that does not move the tool."""
+
+    stiffness: NotNegative = Field(10.0, description="Of each joint [N m/rad or N/m], 0 or more. Default 10.")
+    damping_ratio: NotNegative = Field(
+        1.0, description="Damping 2 ratio sqrt(stiffness x inertia) of each joint, 0 or more. Default 1."
+    )
+
+
+class CartesianImpedanceSpec(ControllerSpec):
+    """Holds the tool on its reference as a spring and a damper would; for work in contact."""
+
+    role: ClassVar[Role] = "follower"
+
+    type: Literal["cartesian_impedance"] = Field(description="`cartesian_impedance`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims: all between the base and the tool.")
+    link: str | None = Field(None, description="The link whose frame is led. Default: the robot's tool frame.")
+    stiffness: TaskSpaceSpec = Field(description="Of the spring [N/m, N m/rad].")
+    damping_ratio: NotNegative = Field(
+        1.0, description="Damping 2 ratio sqrt(stiffness x effective mass), 0 or more. Default 1."
+    )
+    damping: TaskSpaceSpec | None = Field(None, description="Instead of the ratio [N s/m, N m s/rad]. Default: none.")
+    axes: Literal["world", "tool"] = Field("world", description="Whose axes stiffness and damping mean. Default world.")
+    posture: PostureSpec = Field(PostureSpec(), description="Of the joints that the tool leaves free.")
+    inverse_dynamics: bool = Field(
+        False, description="Add the effort that the reference's acceleration needs, to gravity. Default false."
+    )
+    constraints: ConstraintsSpec = Field(
+        ConstraintsSpec(),
+        description="Tolerances of the joints and goal time; a contact brings a joint off its reference.",
+    )
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return ("effort",)
 
 
 class CartesianImpedanceController:
@@ -81,6 +132,7 @@ class CartesianImpedanceController:
 
     role: Role = "follower"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ("effort",)
 
     def __init__(
@@ -295,4 +347,9 @@ def check(spec: CartesianImpedanceSpec, robot: RobotModel) -> Iterator[Problem]:
             yield Problem(("joints", k), message, f"joints that do: {listed(movers)}", "CTRL186")
 
 
-MEMBER = ControllerMember(name="cartesian_impedance", spec=CartesianImpedanceSpec, build=build, check=check)
+def loop(spec: CartesianImpedanceSpec) -> ControlLoop:
+    """None to examine: its damping follows the inertia, and a stiffness is chosen for the contact."""
+    return NoLoop("its damping follows the inertia, and its stiffness is chosen for the contact")
+
+
+MEMBER = ControllerMember(name="cartesian_impedance", spec=CartesianImpedanceSpec, build=build, check=check, loop=loop)

@@ -18,14 +18,15 @@ The manager's feed-forward multiplies by the inertia and adds the rest (see `Mod
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Final
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
+from manipcli.control.control_loop import ControlLoop, InverseDynamicsLoop, error_gains
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
@@ -35,11 +36,35 @@ from manipcli.description.elements import JointLimits, JointType
 from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
 from manipcli.plan.trajectory import JointTrajectory
-from manipcli.spec.controllers import ConstraintsSpec, GainsSpec, Interface, Role
-from manipcli.spec.other_controllers import ComputedTorqueSpec
+from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, GainsSpec, Interface, Role
+from manipcli.spec.quantity import Frequency
 
 DEFAULT_BANDWIDTH: Final = 15.0
 """[Hz]"""
+
+
+class ComputedTorqueSpec(ControllerSpec):
+    """Follows joint trajectories by inverse dynamics: every joint's error obeys e'' + d e' + p e = 0."""
+
+    role: ClassVar[Role] = "follower"
+
+    type: Literal["computed_torque"] = Field(description="`computed_torque`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    bandwidth: Annotated[Frequency, Field(gt=0)] = Field(
+        15.0, description="Natural frequency of the error [Hz], above 0: p = (2 pi f)^2. Default 15 Hz."
+    )
+    damping_ratio: Annotated[float, Field(gt=0)] = Field(
+        1.0, description="Of the error, above 0: d = 4 pi f ratio. Default 1."
+    )
+    gains: dict[str, GainsSpec] = Field(
+        {}, description="By joint, instead of the two: p [1/s2], i [1/s3], d [1/s]. They act on accelerations."
+    )
+    constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return ("effort",)
 
 
 class ComputedTorqueController:
@@ -62,6 +87,7 @@ class ComputedTorqueController:
 
     role: Role = "follower"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ("effort",)
     feed_forward: FeedForward = "inverse_dynamics"
 
@@ -124,12 +150,6 @@ class ComputedTorqueController:
         return self.output
 
 
-def error_gains(bandwidth: float, damping_ratio: float) -> GainsSpec:
-    """p = (2 pi f)^2 [1/s2] and d = 4 pi f ratio [1/s] of a bandwidth f [Hz]."""
-    pulse = math.tau * bandwidth
-    return GainsSpec(p=pulse * pulse, d=2.0 * damping_ratio * pulse)
-
-
 def build(name: str, spec: ComputedTorqueSpec, fit: Fit) -> ComputedTorqueController:
     """The controller of a spec."""
     joints = [fit.robot.joint(joint) for joint in spec.joints]
@@ -159,4 +179,9 @@ def check(spec: ComputedTorqueSpec, robot: RobotModel) -> Iterator[Problem]:
             yield Problem(("gains", joint), message, hint, "CTRL103")
 
 
-MEMBER = ControllerMember(name="computed_torque", spec=ComputedTorqueSpec, build=build, check=check)
+def loop(spec: ComputedTorqueSpec) -> ControlLoop:
+    """Inverse dynamics with a prescribed error."""
+    return InverseDynamicsLoop(spec.bandwidth, spec.damping_ratio, spec.gains)
+
+
+MEMBER = ControllerMember(name="computed_torque", spec=ComputedTorqueSpec, build=build, check=check, loop=loop)

@@ -17,18 +17,27 @@ moment that a body carries by `spinning_friction` or `rolling_friction` (0 unles
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.control_loop import ControlLoop, NoLoop
+from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, SensorRequest
 from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import Interface, Role
-from manipcli.spec.other_controllers import ForceTorqueBroadcasterSpec
+from manipcli.spec.controllers import ControllerSpec, Interface, Role
+
+
+class ForceTorqueBroadcasterSpec(ControllerSpec):
+    """Claims nothing; measures the wrench that a link puts on its parent; the log has it in `/NAME/wrench`."""
+
+    type: Literal["force_torque_broadcaster"] = Field(description="`force_torque_broadcaster`.")
+    link: str = Field(description="Measured where this link meets its parent, in this link's frame [N, N m].")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,14 +75,14 @@ class ForceTorqueBroadcaster:
     def __init__(self, *, name: str, link: str, joint: str) -> None:
         self.name = name
         self.link = link
-        self.joint = joint
+        self.sensors = (SensorRequest("wrench", joint, link),)
         self.output = ControllerOutput.published(6)
         self._source = np.zeros(6)
         self._time = 0.0
 
-    def attach(self, source: Array) -> None:
-        """From now on it publishes this (6): force and torque, which the engine keeps up to date."""
-        self._source = source
+    def attach(self, readings: Sequence[Array]) -> None:
+        """From now on it publishes the reading (6) of its sensor: force and torque."""
+        (self._source,) = readings
 
     @property
     def wrench(self) -> Wrench:
@@ -111,4 +120,11 @@ def check(spec: ForceTorqueBroadcasterSpec, robot: RobotModel) -> Iterator[Probl
         yield Problem(("link",), f"link '{spec.link}' {message}", hint, "CTRL184")
 
 
-MEMBER = ControllerMember(name="force_torque_broadcaster", spec=ForceTorqueBroadcasterSpec, build=build, check=check)
+def loop(spec: ForceTorqueBroadcasterSpec) -> ControlLoop:
+    """None: it commands nothing."""
+    return NoLoop("it commands nothing")
+
+
+MEMBER = ControllerMember(
+    name="force_torque_broadcaster", spec=ForceTorqueBroadcasterSpec, build=build, check=check, loop=loop
+)

@@ -6,7 +6,9 @@
         joints: [joint_1, joint_2]
         command_interface: velocity
 
-    manager["arm_controller"].set_command([0.1, 0.0])   # rad/s, from the next update on
+Steps cannot use it; a program in Python does:
+
+    manager["arm_controller"].set_command([0.1, 0.0])  # rad/s, from the next update on
 
 Until the first command it holds: the measured position, no velocity, no effort.
 """
@@ -14,17 +16,35 @@ Until the first command it holds: the measured position, no velocity, no effort.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, distinct
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import Interface, Role
-from manipcli.spec.other_controllers import ForwardCommandSpec
+from manipcli.spec.controllers import ControllerSpec, Interface, Role
+
+
+class ForwardCommandSpec(ControllerSpec):
+    """Passes on what it is told with `set_command`; until then it holds: the position, no velocity, no effort."""
+
+    type: Literal["forward_command"] = Field(description="`forward_command`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interface: Literal["position", "velocity", "effort"] = Field(description="What it commands.")
+    gravity_compensation: bool = Field(
+        False, description="Add the effort that holds against gravity, to efforts. Default false."
+    )
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return (self.command_interface,)
 
 
 class ForwardCommandController:
@@ -45,6 +65,7 @@ class ForwardCommandController:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
 
     def __init__(
         self, *, name: str, joints: Sequence[str], interface: Interface, feed_forward: FeedForward = "none"
@@ -126,4 +147,9 @@ def check(spec: ForwardCommandSpec, robot: RobotModel) -> Iterator[Problem]:
         yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
 
 
-MEMBER = ControllerMember(name="forward_command", spec=ForwardCommandSpec, build=build, check=check)
+def loop(spec: ForwardCommandSpec) -> ControlLoop:
+    """None: a program closes it."""
+    return NoLoop("it passes commands on and has no gains")
+
+
+MEMBER = ControllerMember(name="forward_command", spec=ForwardCommandSpec, build=build, check=check, loop=loop)

@@ -23,12 +23,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GripperGoal
+from manipcli.control.control_loop import ControlLoop, HandSettings, NoLoop, PidLoop
 from manipcli.control.controller import ControllerMember, Fit
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.gripper_controller import GripperController
@@ -36,7 +38,8 @@ from manipcli.core.geometry import Array
 from manipcli.description.elements import Joint
 from manipcli.model.robot import RobotModel
 from manipcli.plan.hand import closing_speed, fingers
-from manipcli.spec.controllers import GripperSpec
+from manipcli.spec.controllers import ControllerSpec, GainsSpec, Interface, Role
+from manipcli.spec.quantity import JointEffort, JointTolerance, JointVelocity, Time
 
 __all__ = ["MEMBER", "GripperController", "GripperGoal"]
 
@@ -46,6 +49,39 @@ STALL_SPEED: Final = 0.001
 GOAL_ANGLE: Final = 0.05
 GOAL_DISTANCE: Final = 0.002
 """A finger joint this near to its target has arrived, where nobody says [rad; m]: far less than a hand's stroke."""
+
+
+class GripperSpec(ControllerSpec):
+    """Closes or opens a hand: each joint's reference moves at `speed`; a finger stops on contact or stall."""
+
+    role: ClassVar[Role] = "hand"
+
+    type: Literal["gripper"] = Field(description="`gripper`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interface: Literal["position", "effort"] = Field("effort", description="What it commands. Default effort.")
+    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
+    gravity_compensation: bool = Field(True, description="Add the effort that holds against gravity. Default true.")
+    speed: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Of the reference, above 0. Default 1 rad/s or m/s, or the least limit of its joints."
+    )
+    max_effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
+        None, description="Greatest effort a joint [N m or N], above 0. Default: the joint's limit."
+    )
+    stall_velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Slower counts as stalled, above 0. Default 0.02 rad/s or 1 mm/s."
+    )
+    stall_time: Annotated[Time, Field(gt=0, description="Stalled so long is stopped, above 0. Default 0.2 s.")] = 0.2
+    allow_stalling: bool = Field(
+        True, description="Whether a stalled finger has grasped; otherwise its goal is aborted. Default true."
+    )
+    goal_tolerance: JointTolerance | None = Field(
+        None, description="Distance that counts as arrived, above 0 to pi. Default 0.05 rad or 2 mm."
+    )
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return (self.command_interface,)
 
 
 def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
@@ -87,4 +123,16 @@ def check(spec: GripperSpec, robot: RobotModel) -> Iterator[Problem]:
         yield Problem(("max_effort",), "positions know no maximum effort", hint, "CTRL147")
 
 
-MEMBER = ControllerMember(name="gripper", spec=GripperSpec, build=build, check=check)
+def loop(spec: GripperSpec) -> ControlLoop:
+    """A PID loop on efforts; positions are followed by the engine's motors."""
+    if spec.command_interface == "position":
+        return NoLoop("its interface is position, which needs no gains")
+    return PidLoop(spec.gains, spec.gravity_compensation)
+
+
+def hand(spec: GripperSpec) -> HandSettings:
+    """Its speed and its effort, as in the file."""
+    return HandSettings(spec.command_interface, spec.speed, spec.max_effort)
+
+
+MEMBER = ControllerMember(name="gripper", spec=GripperSpec, build=build, check=check, loop=loop, hand=hand)

@@ -14,16 +14,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.control.control_loop import ControlLoop, NoLoop
 from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import Interface, Role
-from manipcli.spec.other_controllers import JointStateBroadcasterSpec
+from manipcli.spec.controllers import ControllerSpec, Interface, Role
+
+
+class JointStateBroadcasterSpec(ControllerSpec):
+    """Claims nothing; offers measured joints to Python. The log has all joints in /joint_states, with or without it."""
+
+    type: Literal["joint_state_broadcaster"] = Field(description="`joint_state_broadcaster`.")
+    joints: tuple[str, ...] = Field((), description="The joints that it reads. Default: all that move.")
+    state_interfaces: Annotated[
+        tuple[Literal["position", "velocity", "effort"], ...],
+        Field(min_length=1, description="What of them. Default [position, velocity, effort]."),
+    ] = ("position", "velocity", "effort")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +70,7 @@ class JointStateBroadcaster:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
     interfaces: tuple[Interface, ...] = ()
     feed_forward: FeedForward = "none"
 
@@ -107,4 +121,11 @@ def check(spec: JointStateBroadcasterSpec, robot: RobotModel) -> Iterator[Proble
     return iter(())
 
 
-MEMBER = ControllerMember(name="joint_state_broadcaster", spec=JointStateBroadcasterSpec, build=build, check=check)
+def loop(spec: JointStateBroadcasterSpec) -> ControlLoop:
+    """None: it commands nothing."""
+    return NoLoop("it commands nothing")
+
+
+MEMBER = ControllerMember(
+    name="joint_state_broadcaster", spec=JointStateBroadcasterSpec, build=build, check=check, loop=loop
+)

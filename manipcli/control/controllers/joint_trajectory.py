@@ -23,16 +23,91 @@ is what the joint shall have when the next tick measures it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.control.control_loop import ControlLoop, NoLoop, PidLoop
 from manipcli.control.controller import ControllerMember, FeedForward, Fit
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.control.trajectory_interfaces import controlled_by_error, refused
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import JointTrajectorySpec
+from manipcli.spec.base import Model
+from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, GainsSpec, Interface, Role
+from manipcli.spec.quantity import Time
 
 __all__ = ["MEMBER", "JointTrajectoryController"]
+
+
+class SpeedScalingSpec(Model):
+    """How fast the clock of trajectories runs."""
+
+    initial_scaling_factor: Annotated[float, Field(ge=0)] = Field(
+        1.0, description="Seconds of the trajectory a second, 0 or more: 0 pauses. Default 1."
+    )
+
+
+class UpsamplingSpec(Model):
+    """Velocities for goals that give positions alone."""
+
+    enable: bool = Field(False, description="Follow the cubic spline through the positions. Default false.")
+
+
+class JointTrajectorySpec(ControllerSpec):
+    """Follows joint trajectories: PID with feed-forward (effort, velocity), or passes the reference on (position)."""
+
+    role: ClassVar[Role] = "follower"
+
+    type: Literal["joint_trajectory"] = Field(description="`joint_trajectory`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interfaces: tuple[Interface, ...] = Field(
+        (),
+        description="What it commands: [position], [position, velocity], [position, velocity, acceleration], "
+        "[velocity], [effort] or [position, effort]. Default [effort].",
+    )
+    command_interface: Interface | None = Field(None, description="Short for a list of one of them.")
+    state_interfaces: tuple[str, ...] = Field(
+        ("position", "velocity"),
+        description="What it may read: position, also velocity, also acceleration. Default [position, velocity].",
+    )
+    gains: dict[str, GainsSpec] = Field({}, description="PID gains by joint.")
+    gravity_compensation: bool = Field(False, description="Add the effort that holds against gravity. Default false.")
+    inverse_dynamics: bool = Field(False, description="Add the effort that the reference needs. Default false.")
+    constraints: ConstraintsSpec = Field(ConstraintsSpec(), description="Tolerances and goal time.")
+    allow_partial_joints_goal: bool = Field(False, description="Goals may leave joints out. Default false.")
+    allow_nonzero_velocity_at_trajectory_end: bool = Field(
+        False, description="Goals may end in motion; the last position is held then. Default false."
+    )
+    allow_integration_in_goal_trajectories: bool = Field(
+        False, description="Goals may give velocities or accelerations without positions. Default false."
+    )
+    allow_trajectory_replacement: bool = Field(
+        True, description="A new goal goes on from the old path; else the old one ends at once. Default true."
+    )
+    interpolation_method: Literal["splines", "none"] = Field(
+        "splines", description="Between points: `splines`, or `none` to step to the next point. Default splines."
+    )
+    interpolate_from_desired_state: bool = Field(
+        True, description="Goals start from the reference; else from what is measured. Default true."
+    )
+    cmd_timeout: Annotated[Time, Field(ge=0)] = Field(
+        0.0, description="After the end of a trajectory a goal that is not reached is given up; above goal_time, or 0: "
+        "never. Default 0."
+    )  # fmt: skip
+    stop_trajectory_duration: Annotated[Time, Field(ge=0)] = Field(
+        0.0, description="After a cancel stop in this time, instead of by deceleration. Default 0: not."
+    )
+    speed_scaling: SpeedScalingSpec = Field(SpeedScalingSpec(), description="How fast trajectories run at first.")
+    positions_upsampling: UpsamplingSpec = Field(UpsamplingSpec(), description="For goals of positions alone.")
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        if self.command_interfaces:
+            return self.command_interfaces
+        return ("effort",) if self.command_interface is None else (self.command_interface,)
 
 
 def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryController:
@@ -87,4 +162,16 @@ def check(spec: JointTrajectorySpec, robot: RobotModel) -> Iterator[Problem]:
                 yield Problem((word,), message, "use command_interface: effort, or leave it out", "CTRL147")
 
 
-MEMBER = ControllerMember(name="joint_trajectory", spec=JointTrajectorySpec, build=build, check=check)
+def loop(spec: JointTrajectorySpec) -> ControlLoop:
+    """A PID loop on efforts or on velocities; positions are followed by the engine's motors."""
+    if not controlled_by_error(spec.interfaces):
+        return NoLoop(f"its interface is {', '.join(spec.interfaces)}, which needs no gains")
+    tolerances = {
+        joint: tolerance
+        for joint, own in spec.constraints.joints.items()
+        if (tolerance := own.goal if own.goal is not None else own.trajectory) is not None
+    }
+    return PidLoop(spec.gains, spec.gravity_compensation or spec.inverse_dynamics, tolerances)
+
+
+MEMBER = ControllerMember(name="joint_trajectory", spec=JointTrajectorySpec, build=build, check=check, loop=loop)

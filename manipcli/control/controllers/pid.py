@@ -8,6 +8,8 @@
         reference_and_state_interfaces: [position, velocity]
         gains: {joint_6: {p: 80, i: 20, d: 3, i_clamp: 5}, joint_7: {p: 30, d: 0.4, feedforward_gain: 0.1}}
 
+Steps cannot use it; a program in Python does:
+
     manager["wrist_controller"].set_reference([0.3, -0.2])
 
 u = ff r + PID(r - x, d/dt). With one interface, r is the reference of it, and the PID takes the derivative of the error
@@ -19,11 +21,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from manipcli.conditions.condition import Problem
+from manipcli.control.control_loop import ControlLoop, NoLoop, PidLoop
 from manipcli.control.controller import (
     ControllerMember,
     ControllerOutput,
@@ -40,8 +45,43 @@ from manipcli.core.geometry import Array
 from manipcli.description.elements import JointType
 from manipcli.description.transmission import Compat
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import Interface, Role
-from manipcli.spec.other_controllers import PidGainsSpec, PidSpec
+from manipcli.spec.controllers import ControllerSpec, GainsSpec, Interface, Role
+
+
+class PidGainsSpec(GainsSpec):
+    """PID gains of one joint of a `pid` controller."""
+
+    feedforward_gain: float = Field(
+        0.0, description="Factor on the reference (on its derivative, where there are two), added. Default 0."
+    )
+    angle_wraparound: bool | None = Field(
+        None, description="The error of a position is the shortest angle. Default: where the joint is continuous."
+    )
+    save_i_term: bool = Field(True, description="Keep the integral term while it is not active. Default true.")
+
+
+class PidSpec(ControllerSpec):
+    """Leads each joint to a reference with a PID of its own; `set_reference` says which."""
+
+    type: Literal["pid"] = Field(description="`pid`.")
+    joints: tuple[str, ...] = Field(description="The joints that it claims.")
+    command_interface: Literal["velocity", "effort"] = Field("effort", description="What it commands. Default effort.")
+    reference_and_state_interfaces: Annotated[
+        tuple[Literal["position", "velocity"], ...],
+        Field(min_length=1, max_length=2, description="What is led: [position], [position, velocity], or [velocity]."),
+    ] = ("position",)
+    gains: dict[str, PidGainsSpec] = Field(description="PID gains by joint.")
+    gravity_compensation: bool = Field(
+        False, description="Add the effort that holds against gravity, to efforts. Default false."
+    )
+    set_current_state_as_first_setpoint: bool = Field(
+        True, description="Hold what is measured until a reference is set; otherwise command 0. Default true."
+    )
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """What it commands of each of its joints."""
+        return (self.command_interface,)
 
 
 class PidController:
@@ -64,6 +104,7 @@ class PidController:
 
     role: Role = "other"
     senses_contact = False
+    sensors = ()
 
     def __init__(
         self,
@@ -222,4 +263,11 @@ def check(spec: PidSpec, robot: RobotModel) -> Iterator[Problem]:
         yield Problem(("gravity_compensation",), message, "use command_interface: effort, or leave it out", "CTRL147")
 
 
-MEMBER = ControllerMember(name="pid", spec=PidSpec, build=build, check=check)
+def loop(spec: PidSpec) -> ControlLoop:
+    """A PID loop where the velocity is led, too; else de/dt is a difference of errors, which is another law."""
+    if spec.reference_and_state_interfaces != ("position", "velocity"):
+        return NoLoop("its de/dt is a difference of errors, for which no gains are proposed")
+    return PidLoop(spec.gains, spec.gravity_compensation, tunable=False)
+
+
+MEMBER = ControllerMember(name="pid", spec=PidSpec, build=build, check=check, loop=loop)

@@ -18,17 +18,17 @@ from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.record import channels as topics
-from manipcli.record.channels import Channel, ControllerChannel, Recorded, WrenchChannel
+from manipcli.record.channels import Channel, ControllerChannel, Recorded, SensorChannel
 from manipcli.record.messages import WORLD
 from manipcli.record.selection import Selection
 from manipcli.record.write.rows import (
+    SENSOR_TEMPLATES,
     RowBlock,
     Template,
     Times,
     controller_state_template,
     joint_state_template,
     tf_template,
-    wrench_template,
 )
 from manipcli.scene.scene import Scene
 from manipcli.spec.controllers import Interface
@@ -154,7 +154,7 @@ class Block:
         frames += [(WORLD, body.name) for body in scene.movable]
         ids = self._ids
         states: list[_Source] = []
-        wrenches: list[_Source] = []
+        readings: list[_Source] = []
         plots: list[_Source] = []
         for c in controllers:
             if isinstance(c, ControllerChannel):
@@ -170,11 +170,12 @@ class Block:
                 for topic, values in curves:
                     if topic in ids:
                         plots.append((topic, joint_state_template(ids[topic], c.joints, effort=False), values))
-            elif isinstance(c, WrenchChannel):
-                room = np.zeros((self.capacity, 1, 6))
+            elif isinstance(c, SensorChannel):
+                template = SENSOR_TEMPLATES[c.message](ids.get(c.topic, 0), c.frame)
+                room = np.zeros((self.capacity, 1, template.runs[0][1]))
                 self._rows.append(room)
                 if c.topic in ids:
-                    wrenches.append((c.topic, wrench_template(ids[c.topic], c.link), partial(_wrench, room)))
+                    readings.append((c.topic, template, partial(_reading, room)))
             else:
                 self._rows.append(None)
         found: list[_Source] = []
@@ -183,7 +184,7 @@ class Block:
             found.append((topics.JOINT_STATES, template, self._measured))
         if topics.TF in ids:
             found.append((topics.TF, tf_template(ids[topics.TF], frames), self._frames))
-        found += [*states, *wrenches, *plots]
+        found += [*states, *readings, *plots]
         if self._actuators.names and topics.ACTUATOR_STATES in ids:
             template = joint_state_template(ids[topics.ACTUATOR_STATES], self._actuators.names, effort=True)
             found.append((topics.ACTUATOR_STATES, template, lambda at: self._actuators.state(*self._measured(at))))
@@ -262,7 +263,7 @@ class Block:
         return ChunkContent(data, int(stamps.min()), int(stamps.max()), indexes)
 
 
-def _wrench(room: Array, at: Ticks) -> list[Array]:
+def _reading(room: Array, at: Ticks) -> list[Array]:
     return [room[at, 0]]
 
 

@@ -10,14 +10,16 @@ all T rows at a time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array
+from manipcli.record import schemas
 from manipcli.record.cdr import NS_PER_S, CdrWriter
 from manipcli.record.records import MESSAGE, MESSAGE_HEAD
 from manipcli.spec.controllers import Interface
@@ -99,6 +101,10 @@ def wrench_template(channel: int, frame: str) -> Template:
     stamp = writer.header(0, frame)
     offset = writer.f64s([0.0] * 6)
     return Template(channel=channel, data=writer.data, stamps=(stamp,), runs=((offset, 6),))
+
+
+SENSOR_TEMPLATES: Final[Mapping[str, Callable[[int, str], Template]]] = {schemas.WRENCH: wrench_template}
+"""By type of message: (channel, frame) -> its template, whose first run is the reading."""
 
 
 class RowBlock:

@@ -20,7 +20,7 @@ _ROUNDS = 5
 """A value, the block that it leaves short, the controller, what pydantic looks at late."""
 
 
-def salvage_controllers(source: Source) -> Located[ControllersSpec] | None:
+def salvage_controllers(source: Source, model: type[ControllersSpec]) -> Located[ControllersSpec] | None:
     """The controllers without the values that are wrong; None where names are for a launch file to complete, or
     nothing coherent remains."""
     root = source.root
@@ -31,7 +31,7 @@ def salvage_controllers(source: Source) -> Located[ControllersSpec] | None:
             return None
         left = replace(source, root=root, whole=source.root)
         try:
-            return Located(ControllersSpec.model_validate(left.plain()), left)
+            return Located(model.model_validate(left.plain()), left)
         except ValidationError as error:
             for fault in error.errors(include_url=False):
                 loc = fault["loc"]

@@ -5,14 +5,15 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from collections.abc import Mapping
 
 from pydantic import BaseModel
 
 from manipcli.core.errors import Finding, Place, Severity
 from manipcli.core.text import did_you_mean
-from manipcli.spec.controllers import Role
+from manipcli.spec.controllers import ControllerSpec, Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
-from manipcli.spec.ros.table import Block, Table, model_below, models, value
+from manipcli.spec.ros.table import Block, Table, model_below, value
 from manipcli.spec.ros.tables import BY_TYPE, ELSEWHERE, INTERFACES, OTHER_NODES, PACKAGES, UNSERVED_TYPES
 from manipcli.spec.ros.tables import MANAGER as MANAGER_BLOCK
 from manipcli.spec.ros.wildcards import Wildcards
@@ -21,9 +22,12 @@ from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
 
-def rewrite(root: Node) -> tuple[Node, list[Finding]]:
-    """The tree in our form (`controllers: {NAME: ...}`) and findings; a tree in our form comes back as it is."""
-    work = _Rewriting()
+def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node, list[Finding]]:
+    """The tree in our form (`controllers: {NAME: ...}`) and findings; a tree in our form comes back as it is.
+
+    `types`: the specs of our controllers, by the word under `type`.
+    """
+    work = _Rewriting(types)
     if not isinstance(root, MappingNode) or not root.entries:
         return root, []
     version = {key: entry for key, entry in root.entries.items() if key == "version"}
@@ -58,9 +62,9 @@ class _Rewriting:
     ROS 2, so that a type of ROS is meant as in ROS 1.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, types: Mapping[str, type[ControllerSpec]]) -> None:
         self.findings: list[Finding] = []
-        self.models = models()
+        self.models = types
         self.ros1 = False
         self.foreign: list[str] = []
 

@@ -8,8 +8,6 @@ from typing import Annotated, get_args, get_origin
 
 from pydantic import BaseModel
 
-from manipcli.spec.controllers import ControllerSpec
-from manipcli.spec.controllers_file import AnyController
 from manipcli.spec.source.tree import MappingNode, Plain, Scalar
 
 Words = Mapping[str, str]
@@ -74,12 +72,6 @@ class Table:
     idle: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     interface: str = ""
     needs: str = ""
-
-
-def models() -> dict[str, type[ControllerSpec]]:
-    """The specs of controllers, by the word under `type`."""
-    union = get_args(AnyController)[0]
-    return {get_args(model.model_fields["type"].annotation)[0]: model for model in get_args(union)}
 
 
 def model_below(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:

@@ -14,6 +14,7 @@ from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.spec.load import load_controllers_text
+from manipcli.task.vocabulary import controllers_spec
 
 PERIOD = 0.001
 
@@ -38,7 +39,9 @@ def test_joint_states_are_those_of_the_last_update():
 
 @pytest.mark.parametrize(("written", "joints"), [("", ("a", "b")), (", joints: [b]", ("b",))])
 def test_of_a_file_it_tells_the_joints_that_are_stated_else_all(written, joints):
-    spec = load_controllers_text(f"controllers: {{one: {{type: joint_state_broadcaster{written}}}}}", "c.yaml").spec
+    spec = load_controllers_text(
+        f"controllers: {{one: {{type: joint_state_broadcaster{written}}}}}", "c.yaml", model=controllers_spec()
+    ).spec
     links = tuple(Link(name, None, (), ()) for name in ("base", "a_link", "b_link"))
     hinges = tuple(
         Joint(name, "revolute", "base", f"{name}_link", Transform.identity(), frozen([0, 0, 1]), JointLimits())
@@ -74,7 +77,7 @@ def test_only_what_is_measured_can_be_broadcast():
 def test_a_wrench_is_that_of_the_last_update():
     broadcaster = ForceTorqueBroadcaster(name="sensor", link="palm", joint="mount")
     source = np.arange(1.0, 7.0)
-    broadcaster.attach(source)
+    broadcaster.attach([source])
     nothing = JointState(np.zeros(0), np.zeros(0), np.zeros(0))
     assert not broadcaster.wrench.force.any()
     broadcaster.update(0.5, PERIOD, nothing)

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from manipcli.control.controller import JointState
-from manipcli.control.controllers.cartesian_impedance import CartesianImpedanceController, check
+from manipcli.control.controllers.cartesian_impedance import (
+    CartesianImpedanceController,
+    CartesianImpedanceSpec,
+    PostureSpec,
+    TaskSpaceSpec,
+    check,
+)
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, matrix_from_axis_angle
@@ -16,7 +22,6 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.plan.inverse_kinematics import rotation_vector
 from manipcli.plan.trajectory import JointTrajectory, TrajectoryPoint
 from manipcli.spec.load import load_robot
-from manipcli.spec.other_controllers import CartesianImpedanceSpec, PostureSpec, TaskSpaceSpec
 
 ROBOT = Path(__file__).parents[3] / "robots" / "arm7_hand3" / "robot.yaml"
 JOINTS = tuple(f"joint_{k}" for k in range(1, 8))

@@ -16,6 +16,7 @@ from manipcli.control.factory import build_controllers, controller_findings
 from manipcli.core.errors import InvalidArgument, InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.spec.load import load_controllers_text, load_robot
+from manipcli.task.vocabulary import controllers_spec
 
 ROBOTS = Path(__file__).parents[3] / "robots"
 CASES = [
@@ -57,7 +58,7 @@ def robot(name):
 
 @pytest.mark.parametrize(("name", "text", "code", "told"), CASES, ids=[case[3] for case in CASES])
 def test_what_cannot_work_is_told_at_its_place_and_not_built(name, text, code, told):
-    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml")
+    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml", model=controllers_spec())
     findings = controller_findings(file.spec, robot(name), 1e-3, place=lambda loc: file.place(*loc))
     errors = [finding for finding in findings if finding.severity == "error"]
     assert [(f.code, told in f.message, f.place.line, bool(f.hint) or code == "CTRL184") for f in errors] == [
@@ -87,7 +88,7 @@ def test_wrong_gains_in_python_are_told_with_their_joint(kind, gains, named):
 def test_what_is_told_of_a_claimed_mimic_joint_agrees():
     """Its gains are those of the joint that it follows: that one is claimed, not the gains renamed."""
     text = "type: gripper, joints: [panda_finger_joint2], gains: {panda_finger_joint1: {p: 1000, d: 10}}"
-    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml")
+    file = load_controllers_text(f"controllers:\n  one: {{{text}}}\n", "c.yaml", model=controllers_spec())
     findings = controller_findings(file.spec, robot("panda"), 1e-3)
     assert {finding.code: finding.hint for finding in findings if finding.severity == "error"} == {
         "CTRL143": "claim 'panda_finger_joint1' instead",

@@ -5,12 +5,12 @@ import pytest
 
 from manipcli.control.action import ErrorCode
 from manipcli.control.controller import Fit, JointState
-from manipcli.control.controllers.gripper import GripperController, GripperGoal, build
+from manipcli.control.controllers.gripper import GripperController, GripperGoal, GripperSpec, build
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import RobotModel
-from manipcli.spec.controllers import GainsSpec, GripperSpec
+from manipcli.spec.controllers import GainsSpec
 
 JOINTS = ("thumb_1", "thumb_2", "finger_1", "finger_2")
 FINGERS = ((0, 1), (2, 3))

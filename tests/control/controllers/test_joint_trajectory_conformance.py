@@ -22,9 +22,8 @@ from manipcli.control import (
     TrajectoryGoal,
     TrajectoryPoint,
 )
-from manipcli.control.controllers.joint_trajectory import check
+from manipcli.control.controllers.joint_trajectory import JointTrajectorySpec, check
 from manipcli.core.errors import InvalidArgument
-from manipcli.spec.controllers import JointTrajectorySpec
 
 JOINTS = ("joint1", "joint2", "joint3")
 START = np.array([1.1, 2.1, 3.1])

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from manipcli.control.controller import JointState
-from manipcli.control.controllers.pid import PidController
+from manipcli.control.controllers.pid import PidController, PidGainsSpec
 from manipcli.core.errors import InvalidArgument
-from manipcli.spec.other_controllers import PidGainsSpec
 
 PERIOD = 0.01
 

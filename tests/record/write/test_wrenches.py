@@ -12,8 +12,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.control.controller import ControllerOutput
 from manipcli.model.state import WorldState
-from manipcli.record.channels import ControllerChannel, WrenchChannel
+from manipcli.record.channels import ControllerChannel, SensorChannel
 from manipcli.record.read.reading import read_recording
+from manipcli.record.schemas import WRENCH
 
 ARM = ControllerChannel("arm", ("shoulder", "slide"))
 HAND = ControllerChannel("hand", ("spin",), interfaces=("position",))
@@ -23,7 +24,7 @@ T = 605
 def test_wrenches_stand_among_the_controllers(tmp_path: Path, make_run: Callable[[int], Any]) -> None:
     run = make_run(T)
     path = tmp_path / "run.mcap"
-    recorder = run.recorder(path, controllers=(ARM, None, WrenchChannel("sensor", "wheel"), HAND))
+    recorder = run.recorder(path, controllers=(ARM, None, SensorChannel("sensor", "wrench", WRENCH, "wheel"), HAND))
     wrenches = np.random.default_rng(1).normal(size=(T, 6))
     s = run.states
     for k in range(T):

@@ -1,4 +1,4 @@
-"""Has each step of a task the time that it was planned to take?"""
+"""Timeouts of steps that end before the planned motions do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from manipcli.core.errors import Finding
 from manipcli.core.text import told_apart
 from manipcli.plan.step import Motion
-from manipcli.task.plan_task import Plan
-from manipcli.task.task import Task
+from manipcli.preflight.preflight import Check, Subject
 
 
-def too_short(task: Task, plan: Plan) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Finding]:
     """Steps whose `timeout` is over before their motions can be."""
+    task, plan = subject.task, subject.plan
     for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
         least = sum(_least(motion) for motion in planned.plan.motions)
         if step.timeout is not None and least > step.timeout:
@@ -29,3 +29,6 @@ def _least(motion: Motion) -> float:
     if motion.grip is not None:
         return 0.0 if motion.trajectory is None else motion.trajectory.duration
     return motion.duration
+
+
+CHECK = Check(name="deadlines", codes=("TASK243",), findings=findings, needs_plan=True, needs_physics=False)

@@ -1,4 +1,4 @@
-"""Does a robot touch itself in one of its named poses?"""
+"""Named poses of a robot in which links overlap."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 
 
-def posture_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:
-    """A warning for every pair of links that overlap in a named pose; other joints stand as at `home`, if there is one.
+def pose_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:
+    """A warning for every pair of links that overlap in a named pose; other joints are as at `home`, if there is one.
 
-    Not told: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
+    Left out: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
     """
     nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
     query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()

@@ -1,4 +1,4 @@
-"""Does what is round turn between two fingers?"""
+"""Round objects between two fingers, which may turn about the line through the two contacts."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from typing import Final
 
 from manipcli.core.errors import Finding
-from manipcli.task.plan_task import Plan
-from manipcli.task.task import Task
+from manipcli.preflight.preflight import Check, Subject
 
 ROUND: Final = ("cylinder", "cup")
 """Kinds that are round and not the same from all sides."""
 
 
-def hinged(task: Task, plan: Plan) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Finding]:
     """Round things that two links hold by a point each, about which they turn.
 
     Measured with two flat fingers and 8 N: upright cylinders of 60 g turn by 28 to 180 degrees while they are carried,
     by less than one with a `spinning_friction` of 0.01.
     """
+    task, plan = subject.task, subject.plan
     for k, step in enumerate(plan.steps):
         end = step.plan.end
         if end.carried is None or not any(motion.grip is not None for motion in step.plan.motions):
@@ -33,3 +33,6 @@ def hinged(task: Task, plan: Plan) -> Iterator[Finding]:
             )
             hint = f"`spinning_friction: 0.01` of '{body.name}' stands for the area of real fingertips"
             yield Finding("TASK240", message, task.file.place("steps", k), hint, "warning")
+
+
+CHECK = Check(name="rotation_slip", codes=("TASK240",), findings=findings, needs_plan=True)

@@ -1,0 +1,38 @@
+"""The preflight checks, in the order of their findings."""
+
+from manipcli.core.registry import Seam
+from manipcli.preflight.checks import (
+    closing_speed,
+    deadlines,
+    error_dynamics,
+    gain_stability,
+    grip_force_limit,
+    grip_friction,
+    grip_stiffness,
+    inert_actuators,
+    insufficient_effort,
+    light_objects,
+    position_grips,
+    rotation_slip,
+    velocity_gains,
+)
+from manipcli.preflight.preflight import Check
+
+PREFLIGHT_CHECKS: Seam[Check] = Seam(
+    kind="preflight check",
+    members=(
+        closing_speed.CHECK,
+        deadlines.CHECK,
+        grip_force_limit.CHECK,
+        light_objects.CHECK,
+        grip_friction.CHECK,
+        grip_stiffness.CHECK,
+        position_grips.CHECK,
+        rotation_slip.CHECK,
+        gain_stability.CHECK,
+        velocity_gains.CHECK,
+        error_dynamics.CHECK,
+        insufficient_effort.CHECK,
+        inert_actuators.CHECK,
+    ),
+)

@@ -1,0 +1,64 @@
+"""Stability of controllers of inverse dynamics: the error e'' = -p e - d e' - i z, z its sum, updated once per tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+from manipcli.control.control_loop import InverseDynamicsLoop, error_gains
+from manipcli.control.stability import Loop, boundary, is_stable
+from manipcli.core.errors import Finding
+from manipcli.core.text import digits
+from manipcli.preflight.preflight import Check, ControlledJoint, Subject
+from manipcli.spec.controllers import GainsSpec
+from manipcli.task.task import Task
+
+SLOWEST: Final = 1e-6
+"""[rad per tick] A natural frequency that is stable with any latency of a motor."""
+
+
+def findings(subject: Subject) -> Iterator[Finding]:
+    """Errors that do not come to rest: one finding for a bandwidth, which all joints of a controller share."""
+    reported = set()
+    for shift in subject.shifts:
+        joints = shift.other_efforts
+        if not joints:
+            continue
+        for joint, latency in zip(joints, shift.load(joints).latency, strict=True):
+            if isinstance(joint.loop, InverseDynamicsLoop):
+                finding = _unstable(subject.task, joint, joint.loop, late=latency)
+                if finding is not None and finding.place not in reported:
+                    reported.add(finding.place)
+                    yield finding
+
+
+def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, late: int) -> Finding | None:
+    """`late`: control ticks from a command to its effort."""
+    simulation = task.spec.simulation
+    period = joint.ticks * simulation.control_period
+
+    def loop(gains: GainsSpec) -> Loop:
+        return Loop.of_joint(
+            1.0, p=gains.p, i=gains.i, d=gains.d, period=period, substeps=round(period / simulation.step),
+            delay=math.ceil(late / joint.ticks),
+        )  # fmt: skip
+
+    own = law.gains.get(joint.name)
+    if is_stable(loop(error_gains(law.bandwidth, law.damping_ratio) if own is None else own)):
+        return None
+    slowest = SLOWEST / (math.tau * period)
+    most = slowest * boundary(lambda factor: loop(error_gains(factor * slowest, law.damping_ratio)))
+    at = f"unstable above {digits(most)} Hz" if own is None else "unstable"
+    at += f" at {1e3 * period:.3g} ms" + (f" and {late} ticks of latency" if late else "")
+    if own is None:
+        place = task.controllers_file.place("controllers", joint.controller, "bandwidth")
+        message = f"{joint.controller}: a bandwidth of {digits(law.bandwidth)} Hz is {at}"
+        return Finding("CTRL150", message, place, f"stay below half of that: {digits(0.5 * most)} Hz", "warning")
+    place = task.controllers_file.place("controllers", joint.controller, "gains", joint.name)
+    message = f"{joint.name}: p {digits(own.p)}, i {digits(own.i)} and d {digits(own.d)}, of accelerations, are {at}"
+    hint = f"leave them out: a `bandwidth` chooses them, {digits(0.5 * most)} Hz at most"
+    return Finding("CTRL150", message, place, hint, "warning")
+
+
+CHECK = Check(name="error_dynamics", codes=("CTRL150",), findings=findings)

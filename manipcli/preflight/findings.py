@@ -1,0 +1,38 @@
+"""All preflight checks asked about one task."""
+
+from __future__ import annotations
+
+from manipcli.core.errors import Finding, NotPlannable
+from manipcli.core.registry import Seam
+from manipcli.preflight.checks import PREFLIGHT_CHECKS
+from manipcli.preflight.preflight import Check, Subject
+from manipcli.simulate.engines import ENGINES
+from manipcli.task.plan_task import Plan, plan_task
+from manipcli.task.task import Task
+
+
+def preflight_findings(
+    task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS
+) -> tuple[Finding, ...]:
+    """Warnings about gains, efforts, grips and timeouts, with the number that would do, each at its place in its file.
+
+    On an engine without physics gains, efforts and forces are not examined.
+
+    Args:
+        task: what is run.
+        plan: its plan; None: it is planned here; where that fails, the refusal is among the findings, and gains are
+            examined at the named poses.
+        checks: the registry.
+    """
+    found: list[Finding] = []
+    if plan is None:
+        try:
+            plan = plan_task(task)
+        except NotPlannable as refusal:
+            found += refusal.findings
+    subject = Subject(task, plan)
+    physics = ENGINES[task.spec.simulation.engine].physics == "full"
+    for check in checks:
+        if (plan is not None or not check.needs_plan) and (physics or not check.needs_physics):
+            found += check.findings(subject)
+    return tuple(found)

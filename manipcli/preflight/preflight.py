@@ -1,0 +1,237 @@
+"""The contract of preflight checks: a task, and its plan where there is one, in; warnings out.
+
+A check that concerns a controller asks its member of the seam (`loop`, `hand`), never its class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from manipcli.control.control_loop import ControlLoop, HandSettings, PidLoop
+from manipcli.control.controllers import CONTROLLERS
+from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.core.errors import Finding, Place
+from manipcli.core.geometry import Array
+from manipcli.model.configuration import named_postures, with_mimics
+from manipcli.model.kinematics import Kinematics
+from manipcli.plan.claims import Claims
+from manipcli.spec.controllers import GainsSpec, Interface
+from manipcli.task.plan_task import Plan, start_position
+from manipcli.task.switches import active_in
+from manipcli.task.task import Task
+
+PER_MOTION: Final = 12
+"""Configurations that are examined of each planned motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlledJoint:
+    """A joint that a controller commands.
+
+    Attributes:
+        controller, name: of both.
+        interfaces: that the controller commands.
+        loop: its control law.
+        ticks: control ticks between two updates.
+        place: where its gains are written, or the joints of the controller.
+    """
+
+    controller: str
+    name: str
+    interfaces: tuple[Interface, ...]
+    loop: ControlLoop
+    ticks: int
+    place: Place
+
+    @property
+    def gains(self) -> GainsSpec | None:
+        """Of its PID; None where it has no PID loop."""
+        return self.loop.gains.get(self.name, GainsSpec()) if isinstance(self.loop, PidLoop) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shift:
+    """A part of a task in which the same controllers are active, and the configurations of the robot in it.
+
+    Attributes:
+        joints: those that are commanded, in the order of the controllers file.
+        configurations: of the planned motions; of the named poses where there is no plan.
+        load: (joints) -> what they meet over the configurations when no other is driven.
+    """
+
+    joints: tuple[ControlledJoint, ...]
+    configurations: Postures
+    load: Callable[[tuple[ControlledJoint, ...]], Load]
+
+    @property
+    def pid_efforts(self) -> tuple[ControlledJoint, ...]:
+        """Those with a PID loop on efforts."""
+        return tuple(one for one in self.joints if one.interfaces == ("effort",) and one.gains is not None)
+
+    @property
+    def servos(self) -> tuple[ControlledJoint, ...]:
+        """Those that the engine's own motors move, by positions or velocities."""
+        return tuple(one for one in self.joints if "effort" not in one.interfaces)
+
+    @property
+    def other_efforts(self) -> tuple[ControlledJoint, ...]:
+        """Those on efforts without a PID loop."""
+        return tuple(one for one in self.joints if "effort" in one.interfaces and one.gains is None)
+
+
+@dataclass(frozen=True, slots=True)
+class HandJoint:
+    """A joint of a hand: its controller, what limits that, and its gains (zero where it has no PID loop)."""
+
+    controller: str
+    settings: HandSettings
+    gains: GainsSpec
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is examined: a task, and its plan."""
+
+    task: Task
+    made: Plan | None
+    _loads: dict[tuple[int, tuple[str, ...]], Load] = field(default_factory=dict)
+
+    @property
+    def planned(self) -> bool:
+        return self.made is not None
+
+    @property
+    def plan(self) -> Plan:
+        """For checks that need one; they are not asked without."""
+        assert self.made is not None
+        return self.made
+
+    @property
+    def kind(self) -> str:
+        """What the configurations of its shifts are, in words."""
+        return f"{'planned' if self.planned else 'named'} postures"
+
+    @cached_property
+    def hand_joints(self) -> Mapping[str, HandJoint]:
+        """By joint, those of controllers of the role `hand`."""
+        found: dict[str, HandJoint] = {}
+        for name, spec in self.task.controllers.controllers.items():
+            member = CONTROLLERS[spec.type]
+            if member.hand is None:
+                continue
+            loop, settings = member.loop(spec), member.hand(spec)
+            gains = loop.gains if isinstance(loop, PidLoop) else {}
+            found |= {joint: HandJoint(name, settings, gains.get(joint, GainsSpec())) for joint in spec.joints}
+        return found
+
+    @cached_property
+    def shifts(self) -> tuple[Shift, ...]:
+        """One for each set of active controllers."""
+        robot = self.task.robot
+        in_steps = tuple(active_in(self.task.spec.steps, Claims.of(self.task.controllers), robot))
+        kinematics = Kinematics(robot, gravity=self.task.scene.gravity)
+        samples = None if self.made is None else _planned(self.task, self.made)
+        named = Postures.at_rest(named_postures(robot, start_position(self.task)))
+        found = []
+        for number, active in enumerate(dict.fromkeys(in_steps)):
+            configurations = named if samples is None else _while(samples, [there == active for there in in_steps])
+
+            def load(
+                joints: tuple[ControlledJoint, ...], number: int = number, there: Postures = configurations
+            ) -> Load:
+                names = tuple(joint.name for joint in joints)
+                if (number, names) not in self._loads:
+                    self._loads[number, names] = load_of(robot, kinematics, names, there)
+                return self._loads[number, names]
+
+            found.append(Shift(tuple(self._controlled(active)), configurations, load))
+        return tuple(found)
+
+    def _controlled(self, active: frozenset[str]) -> Iterator[ControlledJoint]:
+        period = self.task.spec.simulation.control_period
+        for name, spec in self.task.controllers.controllers.items():
+            if name not in active or not spec.interfaces:
+                continue
+            loop = CONTROLLERS[spec.type].loop(spec)
+            for joint in spec.joints:
+                key = ("gains", joint) if isinstance(loop, PidLoop) else ("joints",)
+                place = self.task.controllers_file.place("controllers", name, *key)
+                yield ControlledJoint(name, joint, spec.interfaces, loop, spec.ticks(period), place)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A member of the seam.
+
+    Attributes:
+        name: of the check, as its file.
+        codes: of its findings.
+        findings: (subject) -> warnings, each at its place in its file.
+        needs_plan: it is not asked where the task could not be planned.
+        needs_physics: it is not asked where the engine has no physics, so that references are met whatever the effort.
+    """
+
+    name: str
+    codes: tuple[str, ...]
+    findings: Callable[[Subject], Iterable[Finding]]
+    needs_plan: bool = False
+    needs_physics: bool = True
+
+
+def once(doubts: Iterable[tuple[str, Finding]]) -> Iterator[Finding]:
+    """The first finding of each code, place and joint: a controller that stays active is examined in each shift.
+
+    `doubts`: (joint, finding); "" as the joint where a finding is about several.
+    """
+    reported = set()
+    for joint, finding in doubts:
+        key = (finding.code, finding.place, joint)
+        if key not in reported:
+            reported.add(key)
+            yield finding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sample:
+    """All joints (n) in a motion of a step: 1 + its index, or 0 before the first of them."""
+
+    step: int
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
+    """Samples of all motions, the other joints as they are then."""
+    robot = task.robot
+    here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
+    samples = [_Sample(0, here, still, still)]
+    for k, step in enumerate(plan.steps, 1):
+        for motion in step.plan.motions:
+            if motion.trajectory is None:
+                continue
+            at = robot.indices(motion.trajectory.names)
+            times = np.linspace(0.0, float(motion.trajectory.times[-1]), PER_MOTION)
+            for q, v, a in zip(*motion.trajectory.sample(times), strict=True):
+                position, velocity, acceleration = here.copy(), still.copy(), still.copy()
+                position[at], velocity[at], acceleration[at] = q, v, a
+                samples.append(_Sample(k, with_mimics(robot, position), velocity, acceleration))
+            here = samples[-1].position
+        here = np.array(step.plan.end.position)
+        samples.append(_Sample(k, here, still, still))
+    return tuple(samples)
+
+
+def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Postures:
+    """Those of the steps in which they are `there`; as in the samples, the first is the time before all steps."""
+    chosen = [sample for sample in samples if there[sample.step]]
+    return Postures(
+        np.array([sample.position for sample in chosen]),
+        np.array([sample.velocity for sample in chosen]),
+        np.array([sample.acceleration for sample in chosen]),
+    )

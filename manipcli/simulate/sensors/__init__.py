@@ -1,0 +1,7 @@
+"""The sensors that come with manipcli."""
+
+from manipcli.core.registry import Seam
+from manipcli.simulate.sensor import SensorMember
+from manipcli.simulate.sensors import wrench
+
+SENSORS: Seam[SensorMember] = Seam(kind="sensor", members=(wrench.MEMBER,))
