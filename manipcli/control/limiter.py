@@ -16,8 +16,18 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
-from manipcli.control.cut import ACCELERATION, EFFORT, KINDS, POSITION, VELOCITY, Cut, Rows, Window, rows_of
 from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
+from manipcli.control.saturation import (
+    ACCELERATION,
+    EFFORT,
+    KINDS,
+    POSITION,
+    VELOCITY,
+    Rows,
+    Saturation,
+    Window,
+    rows_of,
+)
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.model.robot import JointLimits, SoftLimits
@@ -141,7 +151,7 @@ class _Efforts:
         command: JointCommand,
         position: Array,
         velocity: Array,
-        tally: Cut,
+        tally: Saturation,
     ) -> None:
         """After `inside` has said that something may have to be."""
         own = self._limits
@@ -183,7 +193,7 @@ class _Positions:
         self._by_velocity, self._by_acceleration = rows_of((VELOCITY,), where), rows_of((ACCELERATION,), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
         where, (wanted, step, growth) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -212,7 +222,7 @@ class _Positions:
                 tally.add(self._by_acceleration, cut, cut[np.newaxis])
                 command.acceleration[where] = limited
 
-    def _cut(self, command: JointCommand, wanted: Array, tally: Cut) -> None:
+    def _cut(self, command: JointCommand, wanted: Array, tally: Saturation) -> None:
         own, dt = self._own, self._dt
         limited = limit_position(
             wanted,
@@ -251,7 +261,7 @@ class _Velocities:
         self._kinds = rows_of((VELOCITY, ACCELERATION, POSITION), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
         where, (wanted, change, ahead) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -314,7 +324,7 @@ class JointLimiter:
         brake: Mode = "brake"
         self._efforts = _Efforts((brake,) * n, self._limits)
         self._others: list[_Positions | _Velocities] = []
-        self._cut = Cut(n)
+        self._cut = Saturation(n)
         self.saturations = np.zeros(n, dtype=np.int64)
         self.by_kind = np.zeros((len(KINDS), n), dtype=np.int64)
 

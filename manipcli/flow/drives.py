@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.reflected import Postures, load_of
+from manipcli.control.joint_space_load import Configurations, load_of
 from manipcli.control.stability import largest_velocity_gain, velocity_loop_poles
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
@@ -61,7 +61,7 @@ def driven_joints(task: Task, active: Collection[str]) -> tuple[Driven, ...]:
 
 
 def drive_doubts(
-    task: Task, drives: tuple[Driven, ...], kinematics: Kinematics, postures: Postures, *, planned: bool
+    task: Task, drives: tuple[Driven, ...], kinematics: Kinematics, postures: Configurations, *, planned: bool
 ) -> Iterator[Doubt]:
     """Warnings about joints that are commanded by position or velocity, over the postures in which they will be."""
     period = task.spec.simulation.control_period

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
 from manipcli.control.stability import (
     Loop,
     is_stable,
@@ -46,9 +46,9 @@ from manipcli.simulate.engines import ENGINES
 from manipcli.spec.controllers import GainsSpec, GripperSpec, JointTrajectorySpec
 
 PER_MOTION: Final = 12
-"""Postures that are looked at of each planned motion."""
+"""Configurations that are looked at of each planned motion."""
 TOGETHER: Final = 16
-"""Postures at which all loops are looked at together: those in which they are tightest."""
+"""Configurations at which all loops are looked at together: those in which they are tightest."""
 SWINGING: Final = 0.1
 """The least damping ratio that passes without a word: it overshoots by 73 %."""
 
@@ -88,7 +88,7 @@ def gain_findings(task: Task, plan: Plan | None = None) -> tuple[Finding, ...]:
         found += hinged(task, plan)
     kinematics = Kinematics(robot, gravity=task.scene.gravity)
     samples = None if plan is None else _planned(task, plan)
-    named = Postures.at_rest(named_postures(robot, start_position(task)))
+    named = Configurations.at_rest(named_postures(robot, start_position(task)))
     told: set[tuple[str, Place | None, str]] = set()
     for active, (loops, drives, modelled) in shifts.items():
         postures = named if samples is None else _while(samples, [there == active for there in in_steps])
@@ -142,10 +142,10 @@ def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
     return tuple(samples)
 
 
-def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Postures:
+def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Configurations:
     """Those of the steps in which they are `there`; as in the samples, the first is the time before all steps."""
     chosen = [one for one in samples if there[one.step]]
-    return Postures(
+    return Configurations(
         np.array([one.position for one in chosen]),
         np.array([one.velocity for one in chosen]),
         np.array([one.acceleration for one in chosen]),
@@ -173,7 +173,9 @@ def _loops(task: Task, active: Collection[str]) -> tuple[Held, ...]:
     return tuple(found)
 
 
-def _doubts(task: Task, loops: tuple[Held, ...], load: Load, postures: Postures, *, planned: bool) -> Iterator[Doubt]:
+def _doubts(
+    task: Task, loops: tuple[Held, ...], load: JointSpaceLoad, postures: Configurations, *, planned: bool
+) -> Iterator[Doubt]:
     where = f"{'planned' if planned else 'named'} postures"
     simulation = task.spec.simulation
     substeps = round(simulation.control_period / simulation.step)
@@ -258,7 +260,7 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     return "CTRL153", message, f"d {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
 
 
-def _together(task: Task, loops: tuple[Held, ...], load: Load, substeps: int) -> Iterator[Doubt]:
+def _together(task: Task, loops: tuple[Held, ...], load: JointSpaceLoad, substeps: int) -> Iterator[Doubt]:
     """Loops that are stable one by one and not together, at the postures in which they are tightest."""
     period = task.spec.simulation.control_period
     if any(loop.ticks != 1 for loop in loops):

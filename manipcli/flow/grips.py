@@ -19,7 +19,7 @@ from manipcli.flow.plan import Plan
 from manipcli.model.posture import with_mimics
 from manipcli.plan.hand import fingers, moved_links
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.spec.controllers import GainsSpec, GripperSpec, Interface
 
 ENOUGH: Final = 1.01
@@ -46,7 +46,7 @@ class _Grasp:
 
     index: int
     step: str
-    end: Situation
+    end: PlanningState
     force: float
     joints: tuple[str, ...]
     target: Array
@@ -105,7 +105,7 @@ def _shared(task: Task, name: str) -> float:
     return 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
 
 
-def _sensible(task: Task, end: Situation, force: float) -> float:
+def _sensible(task: Task, end: PlanningState, force: float) -> float:
     """[N] of a grasp, once it is as weak as `too_light` asks: what is told of one grasp points one way."""
     return force if end.carried is None else min(force, LIGHT * task.scene.body(end.carried.body).mass)
 
@@ -168,7 +168,7 @@ def _holds(task: Task, name: str, force: float) -> float:
     return most if name in _owners(task, "position") else min(force, most)
 
 
-def _between_two(planner: Planner, end: Situation, joints: tuple[str, ...], down: Array) -> bool:
+def _between_two(planner: Planner, end: PlanningState, joints: tuple[str, ...], down: Array) -> bool:
     """Whether two links that slide, level and against each other, touch what is carried, and nothing else does."""
     robot, kinematics = planner.robot, planner.kinematics
     if any(robot.joint(name).type != "prismatic" for name in joints):
@@ -258,14 +258,14 @@ def _owners(task: Task, interface: Interface) -> dict[str, tuple[str, GripperSpe
     }
 
 
-def _touched(planner: Planner, end: Situation) -> set[str]:
+def _touched(planner: Planner, end: PlanningState) -> set[str]:
     """The parts that touch what is carried, and itself; empty where nothing is."""
     if end.carried is None:
         return set()
     return {part for hit in planner.grasping(end, end.carried.body).every(end.position) for part in (hit.a, hit.b)}
 
 
-def _closing(planner: Planner, situation: Situation, name: str, touched: Collection[str]) -> float:
+def _closing(planner: Planner, situation: PlanningState, name: str, touched: Collection[str]) -> float:
     """How fast a joint, with those that mimic it, closes the gap between the parts that touch, at the tool's point.
 
     |dp_1/dq - dp_2/dq| of two sides, |dp/dq| of one that slides [m/rad or 1]; 0 where it is neither.

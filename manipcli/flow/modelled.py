@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.controllers.computed_torque import error_gains
-from manipcli.control.reflected import Postures, load_of
+from manipcli.control.joint_space_load import Configurations, load_of
 from manipcli.control.stability import Loop, boundary, is_stable
 from manipcli.core.errors import Finding, Place
 from manipcli.core.text import digits
@@ -54,7 +54,7 @@ def modelled_joints(task: Task, active: Collection[str]) -> tuple[Modelled, ...]
 
 
 def modelled_doubts(
-    task: Task, joints: tuple[Modelled, ...], kinematics: Kinematics, postures: Postures, *, planned: bool
+    task: Task, joints: tuple[Modelled, ...], kinematics: Kinematics, postures: Configurations, *, planned: bool
 ) -> Iterator[Doubt]:
     """Warnings about them, over the postures in which they will be."""
     load = load_of(task.robot, kinematics, [one.joint for one in joints], postures)

@@ -11,14 +11,14 @@ import numpy as np
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.flow.load import Task
-from manipcli.flow.regrasp import Regrasps
+from manipcli.flow.regrasp import GraspBacktracking
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.posture import posture
 from manipcli.plan.claims import Claims
 from manipcli.plan.hand import SPEED, closing_speed
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, Situation, StepPlan
+from manipcli.plan.step import Motion, PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import GripperSpec
@@ -54,7 +54,7 @@ class Plan:
     watches were written, for the log."""
 
     steps: tuple[PlannedStep, ...]
-    start: Situation
+    start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
 
@@ -94,7 +94,7 @@ def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> P
         NotPlannable: names the step and why; no later step was planned.
     """
     planner = _planner(task)
-    start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     return Plan(steps=_steps(task, planner, start, doing), start=start, planner=planner, judged=judged)
 
@@ -130,15 +130,15 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
     )
 
 
-def plan_step(planner: Planner, step: StepSpec, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
     """Plan one step, by none of `grasps`; whatever refuses it is told with its id."""
     member = STEPS[step.verb]
     try:
-        if situation.at_start:
-            planner.outside(situation)
+        if state.at_start:
+            planner.outside(state)
         if grasps and member.regrasp is not None:
-            return member.regrasp(step.body, planner, situation, grasps)
-        return member.plan(step.body, planner, situation)
+            return member.regrasp(step.body, planner, state, grasps)
+        return member.plan(step.body, planner, state)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
 
@@ -148,10 +148,10 @@ def start_position(task: Task) -> Array:
     return posture(task.robot, task.spec.start)
 
 
-def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
+def _steps(task: Task, planner: Planner, start: PlanningState, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
     """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
     done: list[PlannedStep] = []
-    regrasps = Regrasps(planner)
+    regrasps = GraspBacktracking(planner)
     while (k := len(done)) < len(task.spec.steps):
         grasps = regrasps.of(k)
         again = ", with another grasp" if grasps else ""
@@ -163,7 +163,7 @@ def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str]
     return tuple(done)
 
 
-def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tuple[Array, ...]) -> PlannedStep:
+def _planned(task: Task, planner: Planner, k: int, start: PlanningState, grasps: tuple[Array, ...]) -> PlannedStep:
     """Step `k` of the task, by none of `grasps`; a refusal tells where it is written."""
     step = task.spec.steps[k]
     try:

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.reflected import Load
+from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits
@@ -43,7 +43,9 @@ class Held:
     place: Place
 
 
-def weak(robot: RobotModel, loop: Held, load: Load, k: int, *, velocity: Array, planned: bool) -> Iterator[Doubt]:
+def weak(
+    robot: RobotModel, loop: Held, load: JointSpaceLoad, k: int, *, velocity: Array, planned: bool
+) -> Iterator[Doubt]:
     """Too little effort for gravity or for the plan; gains and clamps too weak to stand where it shall.
 
     Args:

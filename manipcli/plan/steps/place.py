@@ -22,12 +22,12 @@ from manipcli.model.landing import FORMED, landing
 from manipcli.model.robot import Cylinder, RobotModel
 from manipcli.model.scene import Body, Scene
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.steps.move import Speed
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.spec.base import Model
@@ -77,30 +77,30 @@ class PlaceSpec(Model):
     )
 
 
-def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
 
     Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
     latter alone where the open hand is too near to it anyhow, as around one that sits deep in it. Where the arm would
     come too near to something, the object is put down leaning a little, the arm higher: it stands up when let go.
     """
-    planner.held(situation, spec.object)
-    planner.free_start(situation)
-    X_WG = _goal(spec, planner, situation)
-    X_OT = planner.held_in_tool(situation).inverse()
-    lowered: dict[tuple[float, float], Draft | NotPlannable] = {}
+    planner.held(state, spec.object)
+    planner.free_start(state)
+    X_WG = _goal(spec, planner, state)
+    X_OT = planner.held_in_tool(state).inverse()
+    lowered: dict[tuple[float, float], MotionBuilder | NotPlannable] = {}
 
-    def lower(lean: float, clearance: float) -> Draft:
+    def lower(lean: float, clearance: float) -> MotionBuilder:
         """Down at the place; found once for all ways to withdraw."""
         X_WL = _leaning(planner.scene.body(spec.object), X_WG, X_OT, lean)
         X_WT = X_WL @ X_OT
-        draft = Draft(planner, situation)
+        builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
-        support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
+            builder.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.speed)
+        support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
         with _hinted(_LOWER):
-            draft.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
-        return draft
+            builder.straight("lower", X_WT, speed=spec.speed / 2, allowed=support)
+        return builder
 
     def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
         lean, grazing, clearance, retreat, slope = candidate
@@ -112,15 +112,15 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         down = lowered[lean, clearance]
         if isinstance(down, NotPlannable):
             raise NotPlannable(down.cause, hint=down.hint)
-        draft = down.copy()
+        builder = down.copy()
         with _hinted(_ROOMIER):
-            draft.open(spec.posture, must_arrive=True)
-        X_WT = planner.tool_pose(draft.now)
-        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
-        planned = draft.plan()
+            builder.open(spec.posture, must_arrive=True)
+        X_WT = planner.tool_pose(builder.now)
+        builder.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.speed, grazing=grazing)
+        planned = builder.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
-    near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
+    near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
     leans = LEANS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else LEANS[:1]
     candidates = itertools.product(leans, (True,) if near else (False, True), *ways)
@@ -161,13 +161,13 @@ def _leaning(body: Body, X_WG: Transform, X_OT: Transform, lean: float) -> Trans
     return about @ X_WG
 
 
-def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
+def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     """X_WG: where the object's frame is to stand."""
     body = planner.scene.body(spec.object)
     if spec.at == "start":
         return body.X_WO
     assert spec.on is not None  # `check` asks for it
-    X_WU = planner.body_pose(situation, spec.on)
+    X_WU = planner.body_pose(state, spec.on)
     under = planner.scene.body(spec.on)
     if X_WU.R[2, 2] < UPRIGHT:
         raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.on}', which is tilted", loc=("on",))
@@ -181,7 +181,7 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
             loc=("at",),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
-    x_axis = planner.body_pose(situation, spec.object).R[:, 0]
+    x_axis = planner.body_pose(state, spec.object).R[:, 0]
     yaw = float(np.arctan2(x_axis[1], x_axis[0])) if spec.yaw is None else spec.yaw
     X_WG = Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
     if under.kind not in FORMED:

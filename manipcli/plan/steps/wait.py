@@ -16,9 +16,9 @@ from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.model.scene import Scene
 from manipcli.plan.claims import Claims
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Pause, Time
 
@@ -39,11 +39,11 @@ class WaitSpec(Model):
         return or_short(schema, handler, TypeAdapter(Time).json_schema() | {"minimum": 0, "maximum": 3600})
 
 
-def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion that commands nothing."""
-    draft = Draft(planner, situation)
-    draft.dwell("wait", spec.duration)
-    return draft.plan()
+    builder = MotionBuilder(planner, state)
+    builder.dwell("wait", spec.duration)
+    return builder.plan()
 
 
 def check(spec: WaitSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

@@ -46,11 +46,11 @@ Rows = tuple[slice, slice] | tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
 def rows_of(kinds: Sequence[int], where: npt.NDArray[np.intp]) -> Rows:
-    """The `rows` of `Cut.add`: these kinds of limits, of the joints `where`."""
+    """The `rows` of `Saturation.add`: these kinds of limits, of the joints `where`."""
     return np.array(kinds)[:, np.newaxis], where
 
 
-class Cut:
+class Saturation:
     """Which joints are cut in a tick, and by what."""
 
     __slots__ = ("any", "joints", "kinds")
