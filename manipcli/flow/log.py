@@ -20,12 +20,12 @@ from manipcli.flow.plan import Plan
 from manipcli.flow.vocabulary import task_spec
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL, judge
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import Mesh, RobotModel
 from manipcli.model.scene import Scene
 from manipcli.model.scene_file import scene_from_json, scene_to_json
+from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.channels import ControllerChannel, Recorded, WrenchChannel
 from manipcli.record.faults import RecordingRefused
 from manipcli.record.messages import portable_name
@@ -81,7 +81,7 @@ def open_log(
         (CONTROLLERS, YAML, resolved(task.controllers).encode()),
         (URDF, XML, task.robot.urdf.encode()),
         (SCENE, JSON, scene_to_json(task.true.scene)),
-        (PLAN_FILE, JSON, plan.to_json()),
+        (PLAN_FILE, JSON, plan.outline.to_json()),
     ]
     return Recorder(
         path,

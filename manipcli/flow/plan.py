@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -17,8 +16,9 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.posture import posture
 from manipcli.plan.claims import Claims
 from manipcli.plan.hand import SPEED, closing_speed
+from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, PlanningState, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.controllers import GripperSpec
@@ -67,20 +67,13 @@ class Plan:
             for motion in step.plan.motions
         )
 
-    def to_json(self) -> bytes:
-        """What the log carries: ids, verbs, where steps and what is judged were written, durations, and each
-        trajectory's ends."""
-        steps = [
-            {
-                "id": step.id,
-                "verb": step.verb,
-                "place": step.place,
-                "planned_duration": step.plan.duration,
-                "motions": [_described(motion) for motion in step.plan.motions],
-            }
-            for step in self.steps
-        ]
-        return json.dumps({"steps": steps, "judged": list(self.judged)}, indent=1).encode()
+    @property
+    def outline(self) -> PlanOutline:
+        """What the log carries."""
+        return PlanOutline(
+            tuple(StepOutline(one.id, one.verb, one.place, one.plan.duration, one.plan.motions) for one in self.steps),
+            self.judged,
+        )
 
 
 def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> Plan:
@@ -186,19 +179,3 @@ def _planner(task: Task) -> Planner:
         gripper_joints=Claims.of(task.controllers).hand,
         gripper_speed=min(speeds, default=SPEED),
     )
-
-
-def _described(motion: Motion) -> dict[str, object]:
-    described: dict[str, object] = {"label": motion.label, "duration": motion.duration}
-    if motion.trajectory is not None:
-        described["joints"] = list(motion.trajectory.names)
-        described["from"] = motion.trajectory.positions[0].tolist()
-        described["to"] = motion.trajectory.positions[-1].tolist()
-    if motion.grip is not None:
-        described["hand"] = motion.grip.target.tolist()
-        described["force"] = motion.grip.force
-    if motion.switch is not None:
-        described["switch"] = {
-            key: list(names) for key in ("to", "activate", "deactivate") if (names := getattr(motion.switch, key))
-        }
-    return described

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from manipcli import __version__
 from manipcli.flow.load import Task
@@ -23,12 +21,12 @@ from manipcli.flow.log import (
 )
 from manipcli.flow.replay import open_playback
 from manipcli.flow.vocabulary import task_spec
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.conditions.at_pose import SLIDE, AtPoseSpec
 from manipcli.model.conditions.contact_force import ContactForceSpec
 from manipcli.model.conditions.moved import UnmovedSpec
 from manipcli.model.conditions.slip import SlipSpec
+from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.reading import open_recording
 from manipcli.record.recording import Recording
 from manipcli.replay.playback import RATE, Playback
@@ -178,13 +176,8 @@ def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
     """Where each step was written, `pour.yaml:21:5`, by its id, of those begun where the plan does not say; and where
     each expectation and watch, none where the plan does not say."""
     places = {event.step: event.place for event in recording.events if event.place}
-    try:
-        # Any: what a file holds is not known before it is looked at.
-        plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
-        steps = {str(step["id"]): str(step["place"]) for step in plan["steps"]}
-        return places | steps, [str(place) for place in plan.get("judged", ())]
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return places, []
+    plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
+    return places | {step.id: step.place for step in plan.steps if step.place}, list(plan.judged)
 
 
 def _rate(recording: Recording) -> float:

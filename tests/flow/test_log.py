@@ -15,8 +15,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import InvalidInput
 from manipcli.flow.log import CONTROLLERS, ROBOT, SCENE, TASK, URDF
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.pipeline import judge_log, run_task
+from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.reading import read_recording
 
 ROOT = Path(__file__).parents[2]
