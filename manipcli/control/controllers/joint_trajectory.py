@@ -27,7 +27,7 @@ from collections.abc import Iterator
 from manipcli.control.controller import ControllerMember, FeedForward, Fit
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.trajectory_controller import JointTrajectoryController
-from manipcli.control.trajectory_interfaces import controlled_by_error, refused
+from manipcli.control.trajectory_goal import controlled_by_error, refused
 from manipcli.model.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.spec.controllers import JointTrajectorySpec
