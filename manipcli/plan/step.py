@@ -113,14 +113,6 @@ class StepPlan:
         return sum(motion.duration for motion in self.motions)
 
 
-def _switches_nothing(_: object) -> None:
-    return None
-
-
-def _goes_on(_: object) -> bool:
-    return False
-
-
 @dataclass(frozen=True, slots=True)
 class StepMember(Generic[S]):
     """A member of the seam: the verb in YAML.
@@ -144,6 +136,6 @@ class StepMember(Generic[S]):
     plan: Callable[[S, Planner, PlanningState], StepPlan]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
-    request: Callable[[S], Switch | None] = _switches_nothing
-    guarded: Callable[[S], bool] = _goes_on
+    request: Callable[[S], Switch | None] = lambda _: None
+    guarded: Callable[[S], bool] = lambda _: False
     regrasp: Callable[[S, Planner, PlanningState, Sequence[Array]], StepPlan] | None = None

@@ -166,9 +166,6 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("pose",) if spec.pose is not None else ("point",))
 
 
-def guarded(spec: MoveSpec) -> bool:
-    """As it is written."""
-    return spec.guarded
-
-
-MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=guarded)
+MEMBER = StepMember(
+    name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=lambda spec: spec.guarded
+)

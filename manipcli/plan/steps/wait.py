@@ -12,10 +12,6 @@ from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.model.condition import Problem
-from manipcli.model.robot import RobotModel
-from manipcli.model.scene import Scene
-from manipcli.plan.claims import Claims
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import PlanningState, StepMember, StepPlan
@@ -46,14 +42,4 @@ def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     return builder.plan()
 
 
-def check(spec: WaitSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Nothing in it can be unknown."""
-    return ()
-
-
-def uncommanded(spec: WaitSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """It commands nothing."""
-    return ()
-
-
-MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=lambda *_: (), uncommanded=lambda *_: ())
