@@ -22,9 +22,8 @@ from manipcli.control.controller import ControllerOutput
 from manipcli.control.controllers.force_torque_broadcaster import ForceTorqueBroadcaster
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
-from manipcli.control.motors import MotorLimits
 from manipcli.control.roles import is_hand
-from manipcli.control.saturation import EFFORT
+from manipcli.control.saturation import EFFORT, MotorLimits
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
