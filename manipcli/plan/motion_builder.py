@@ -333,10 +333,9 @@ class MotionBuilder:
     def _straight(
         self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
-        def walk(solver: InverseKinematics) -> Array:
-            return linear_path(solver, self._now.position, X_WT)
-
-        return self._timed(walk, speed, insist=insist, leaving=leaving)
+        return self._timed(
+            lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist, leaving=leaving
+        )
 
     def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)
