@@ -9,15 +9,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from manipcli.control.command import JointCommand, Mode
-from manipcli.control.cut import ACCELERATION, EFFORT, KINDS, POSITION, VELOCITY, Cut, Rows, Window, rows_of
-from manipcli.control.limits import limit_acceleration, limit_effort, limit_position, limit_velocity, refuse_limits
+from manipcli.control.limits import (
+    limit_acceleration,
+    limit_array,
+    limit_effort,
+    limit_position,
+    limit_velocity,
+    refuse_limits,
+)
+from manipcli.control.saturation import (
+    ACCELERATION,
+    EFFORT,
+    KINDS,
+    POSITION,
+    VELOCITY,
+    Rows,
+    Saturation,
+    Window,
+    rows_of,
+)
 from manipcli.core.errors import ExitCode, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.description.elements import JointLimits, SoftLimits
@@ -55,18 +72,15 @@ class _Limits:
 
     @classmethod
     def of(cls, limits: Sequence[JointLimits]) -> _Limits:
-        def bound(values: Sequence[float | None], default: float) -> Array:
-            return np.array([default if value is None else value for value in values], dtype=np.float64)
-
         soft = [limit.soft or _NO_SOFT for limit in limits]
         found = cls(
-            lower=bound([limit.lower for limit in limits], -math.inf),
-            upper=bound([limit.upper for limit in limits], math.inf),
-            velocity=bound([limit.velocity for limit in limits], math.inf),
-            acceleration=bound([limit.acceleration for limit in limits], math.inf),
-            effort=bound([limit.effort for limit in limits], math.inf),
-            soft_lower=bound([one.lower for one in soft], -math.inf),
-            soft_upper=bound([one.upper for one in soft], math.inf),
+            lower=limit_array((limit.lower for limit in limits), -math.inf),
+            upper=limit_array(limit.upper for limit in limits),
+            velocity=limit_array(limit.velocity for limit in limits),
+            acceleration=limit_array(limit.acceleration for limit in limits),
+            effort=limit_array(limit.effort for limit in limits),
+            soft_lower=limit_array((one.lower for one in soft), -math.inf),
+            soft_upper=limit_array(one.upper for one in soft),
             k_position=np.array([one.k_position for one in soft]),
             k_velocity=np.array([one.k_velocity for one in soft]),
         )
@@ -78,10 +92,7 @@ class _Limits:
 
     def at(self, where: npt.NDArray[np.intp]) -> _Limits:
         """Of some joints."""
-        return _Limits(
-            self.lower[where], self.upper[where], self.velocity[where], self.acceleration[where], self.effort[where],
-            self.soft_lower[where], self.soft_upper[where], self.k_position[where], self.k_velocity[where],
-        )  # fmt: skip
+        return _Limits(*(getattr(self, field.name)[where] for field in fields(self)))
 
 
 class _Efforts:
@@ -141,7 +152,7 @@ class _Efforts:
         command: JointCommand,
         position: Array,
         velocity: Array,
-        tally: Cut,
+        tally: Saturation,
     ) -> None:
         """After `inside` has said that something may have to be."""
         own = self._limits
@@ -183,7 +194,7 @@ class _Positions:
         self._by_velocity, self._by_acceleration = rows_of((VELOCITY,), where), rows_of((ACCELERATION,), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
         where, (wanted, step, growth) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -197,22 +208,19 @@ class _Positions:
             self._cut(command, wanted, tally)
         else:
             self._before[:], self._step[:] = wanted, step
-        if command.velocity.any():
-            asked = command.velocity[where]
-            limited = limit_velocity(asked, velocity=self._velocity, dt=self._dt)
-            cut = limited != asked
-            if cut.any():
-                tally.add(self._by_velocity, cut, cut[np.newaxis])
-                command.velocity[where] = limited
-        if command.acceleration.any():
-            asked = command.acceleration[where]
-            limited = limit_acceleration(asked, acceleration=self._acceleration)
-            cut = limited != asked
-            if cut.any():
-                tally.add(self._by_acceleration, cut, cut[np.newaxis])
-                command.acceleration[where] = limited
+        for values, most, rows in (
+            (command.velocity, self._velocity, self._by_velocity),
+            (command.acceleration, self._acceleration, self._by_acceleration),
+        ):
+            if values.any():
+                asked = values[where]
+                limited = limit_acceleration(asked, acceleration=most)  # a velocity, too, is clamped to -+ most
+                cut = limited != asked
+                if cut.any():
+                    tally.add(rows, cut, cut[np.newaxis])
+                    values[where] = limited
 
-    def _cut(self, command: JointCommand, wanted: Array, tally: Cut) -> None:
+    def _cut(self, command: JointCommand, wanted: Array, tally: Saturation) -> None:
         own, dt = self._own, self._dt
         limited = limit_position(
             wanted,
@@ -251,7 +259,7 @@ class _Velocities:
         self._kinds = rows_of((VELOCITY, ACCELERATION, POSITION), where)
         self.fresh = True
 
-    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Cut) -> None:
+    def apply(self, command: JointCommand, position: Array, velocity: Array, tally: Saturation) -> None:
         where, (wanted, change, ahead) = self._where, self._window.rows
         if self.fresh:
             self.fresh = False
@@ -314,7 +322,7 @@ class JointLimiter:
         brake: Mode = "brake"
         self._efforts = _Efforts((brake,) * n, self._limits)
         self._others: list[_Positions | _Velocities] = []
-        self._cut = Cut(n)
+        self._cut = Saturation(n)
         self.saturations = np.zeros(n, dtype=np.int64)
         self.by_kind = np.zeros((len(KINDS), n), dtype=np.int64)
 

@@ -16,6 +16,7 @@ so that a joint slows down towards it, and beyond it is led back; an effort is t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Final, Literal
 
 import numpy as np
@@ -75,7 +76,7 @@ def limit_position(
     limited = _floats(command)
     before = previous if previous is not None else position
     if dt is None:
-        if not _are_idle(velocity, acceleration, k_position):
+        if not (np.isinf([*np.ravel(velocity), *np.ravel(acceleration)]).all() and np.all(_floats(k_position) <= 0.0)):
             raise InvalidArgument("CTRL193", "a velocity limit on positions needs `dt`")
         return np.asarray(np.minimum(np.maximum(limited, low), high))
     _refuse_time(dt)
@@ -225,10 +226,9 @@ def limit_acceleration(
     return np.asarray(np.minimum(np.maximum(wanted, -most), most))
 
 
-def _are_idle(velocity: npt.ArrayLike, acceleration: npt.ArrayLike, k_position: npt.ArrayLike) -> bool:
-    """Whether nothing limits how fast a position may change."""
-    endless = np.isinf(_floats(velocity)).all() and np.isinf(_floats(acceleration)).all()
-    return bool(endless and not np.any(_floats(k_position) > 0.0))
+def limit_array(values: Iterable[float | None], default: float = math.inf) -> Array:
+    """(n) stated limits, with `default` where there is none."""
+    return np.array([default if value is None else value for value in values], dtype=np.float64)
 
 
 def refuse_limits(

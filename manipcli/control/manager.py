@@ -23,16 +23,16 @@ import numpy as np
 from manipcli.control.claims import Claims, conflicts
 from manipcli.control.command import JointCommand, mode_of
 from manipcli.control.controller import Controller, ControllerOutput
-from manipcli.control.feed_forward import FeedForwardLaw, NoDynamics
+from manipcli.control.feed_forward import FeedForwardLaw, Index, NoDynamics
 from manipcli.control.lifecycle import (
     ControllerInfo,
+    Slot,
     SwitchResult,
     decided,
     names_of,
     strictness_of,
     ticks_between,
 )
-from manipcli.control.slot import Index, Slot
 from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean

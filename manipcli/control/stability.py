@@ -16,7 +16,7 @@ and kd < 2 I / h - kp h / 2.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -181,37 +181,28 @@ def gain_margin(loop: Loop) -> float:
 def largest_damping(loop: Loop) -> float:
     """The largest d of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
     unit = math.sqrt(float(loop.p[0]) * float(loop.mass[0, 0])) or float(loop.mass[0, 0]) / loop.period
-
-    def with_d(factor: float) -> Loop:
-        return replace(loop, d=np.array([unit * factor]))
-
     # From the stable middle upwards: with little damping a loop may be unstable, too.
-    for start in 10.0 ** np.arange(-3.0, 4.0, 0.25):
-        if is_stable(with_d(float(start))):
-            return unit * boundary(with_d, start=float(start))
-    return 0.0
+    return _largest(lambda d: replace(loop, d=d), unit, 10.0 ** np.arange(-3.0, 4.0, 0.25))
 
 
 def largest_stiffness(loop: Loop) -> float:
     """The largest p of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
-    unit = float(loop.mass[0, 0]) / loop.period**2
-
-    def with_p(factor: float) -> Loop:
-        return replace(loop, p=np.array([unit * factor]))
-
-    start = 1e-9
-    return unit * boundary(with_p, start=start) if is_stable(with_p(start)) else 0.0
+    return _largest(lambda p: replace(loop, p=p), float(loop.mass[0, 0]) / loop.period**2, [1e-9])
 
 
 def largest_integral(loop: Loop) -> float:
     """The largest i of a loop of one joint with which it is stable, the other gains as they are; 0: with none."""
-    unit = float(loop.p[0]) / loop.period
+    return _largest(lambda i: replace(loop, i=i), float(loop.p[0]) / loop.period, [1e-6])
 
-    def with_i(factor: float) -> Loop:
-        return replace(loop, i=np.array([unit * factor]))
 
-    start = 1e-6
-    return unit * boundary(with_i, start=start) if unit > 0.0 and is_stable(with_i(start)) else 0.0
+def _largest(loop_with: Callable[[Array], Loop], unit: float, starts: Iterable[float]) -> float:
+    """The largest stable gain above the first stable one of `starts`, in units of `unit`; 0 where there is none."""
+
+    def loop_at(factor: float) -> Loop:
+        return loop_with(np.array([unit * factor]))
+
+    start = next((float(one) for one in starts if unit > 0.0 and is_stable(loop_at(float(one)))), None)
+    return 0.0 if start is None else unit * boundary(loop_at, start=start)
 
 
 def boundary(loop_at: Callable[[float], Loop], *, start: float = 1.0) -> float:

@@ -11,21 +11,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from manipcli.control.action import ErrorCode, Feedback, GoalHandle
+from manipcli.control.active_goal import ActiveGoal, Then, Tolerances
+from manipcli.control.active_trajectory import POSITION, ActiveTrajectory, Reference
 from manipcli.control.controller import ControllerOutput, FeedForward, JointState, distinct
-from manipcli.control.course import POSITION, Course
-from manipcli.control.followed_goal import FollowedGoal, Then
 from manipcli.control.gains import build_pid, joint_gains
-from manipcli.control.reference import Feeds, Reference
-from manipcli.control.tolerances import Tolerances
 from manipcli.control.trajectory_goal import (
     Acceptance,
     JointFacts,
     TrajectoryGoal,
     check_goal,
+    controlled_by_error,
     outside_limits,
+    refused,
     shortest,
 )
-from manipcli.control.trajectory_interfaces import controlled_by_error, refused
 from manipcli.control.transitions import Transitions
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
@@ -158,7 +157,7 @@ class JointTrajectoryController:
         scale = np.array([each.ff_velocity_scale for each in chosen])
         self.output = ControllerOutput.of(n, len(self.interfaces))
         rows = self.output.rows
-        self._reference = Reference(rows[:3], Feeds(self.interfaces, velocity_scale=scale if by_error else None))
+        self._reference = Reference(rows[:3], self.interfaces, velocity_scale=scale if by_error else None)
         self._desired, self._desired_velocity = rows[0], rows[1]
         self._commands, self._command = rows[3:], rows[3]
         self._errors: Array = np.zeros((2, n))
@@ -172,8 +171,8 @@ class JointTrajectoryController:
         self._activated = False
         self._waiting = True
         self._time, self._period = time, 0.0
-        self._goal: FollowedGoal | None = None
-        self._next: FollowedGoal | None = None
+        self._goal: ActiveGoal | None = None
+        self._next: ActiveGoal | None = None
         self._stop = False
         self._bound = np.inf
         self._speed = self._initial_speed
@@ -231,7 +230,7 @@ class JointTrajectoryController:
                 old.preempt(self._time, as_canceled=self._compat == "ros1")
         self._goal = None
         handle = GoalHandle(cancel=self._cancel, feedback=self._feedback, notes=notes)
-        self._next = FollowedGoal(self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout)
+        self._next = ActiveGoal(self.name, self._facts, handle, ordered, tolerances, goal.start_time, self._timeout)
         self._waiting = True
         return handle
 
@@ -314,7 +313,7 @@ class JointTrajectoryController:
             return
         self._forget()
         if then == "hold measured" and self._compat != "ros1":
-            self._reference.hold(Course.hold(measured.position), time=time)
+            self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
             self._compare(measured)
 
     def _forget(self) -> None:
@@ -328,20 +327,20 @@ class JointTrajectoryController:
             self._activated = True
             if self._pid is not None:
                 self._pid.reset()
-            self._reference.hold(Course.hold(measured.position), time=time)
+            self._reference.hold(ActiveTrajectory.hold(measured.position), time=time)
         if self._next is not None:
             self._begin(self._next, time, period, measured)
         elif self._stop:
             self._come_to_rest(time, period)
         self._next, self._stop = None, False
 
-    def _begin(self, goal: FollowedGoal, time: float, period: float, measured: JointState) -> None:
+    def _begin(self, goal: ActiveGoal, time: float, period: float, measured: JointState) -> None:
         """The waiting goal becomes the active one: its references for every tick, once."""
         reference = self._reference
         later = goal.start_time - time if goal.start_time > 0.0 else 0.0
         at = (measured.position, measured.velocity)
-        course = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
-        samples = course.ticks(period)
+        active = self._transitions.to_goal(goal.trajectory, later, reference, time, self._speed, at)
+        samples = active.ticks(period)
         broken = outside_limits(samples[:, POSITION], self._facts, period)
         if broken is not None:
             goal.handle.end("aborted", ErrorCode.INVALID_GOAL, f"controller '{self.name}': {broken}", time)
@@ -350,16 +349,16 @@ class JointTrajectoryController:
         goal.begin = later
         self._goal = goal
         self._bound = goal.tolerances.bound
-        reference.follow(course, samples, time=time, period=period, speed=self._speed)
+        reference.follow(active, samples, time=time, period=period, speed=self._speed)
         reference.advance(time, period)
 
     def _come_to_rest(self, time: float, period: float) -> None:
-        course = self._transitions.to_rest(self._reference, time)
-        if course.parts:
-            self._reference.follow(course, course.ticks(period), time=time, period=period)
+        active = self._transitions.to_rest(self._reference, time)
+        if active.parts:
+            self._reference.follow(active, active.ticks(period), time=time, period=period)
             self._reference.advance(time, period)
         else:
-            self._reference.hold(course, time=time)
+            self._reference.hold(active, time=time)
 
     def _cancel(self, handle: GoalHandle) -> None:
         handle.end("canceled", ErrorCode.SUCCESSFUL, f"canceled at t = {self._time:.3f} s", self._time)

@@ -1,18 +1,21 @@
-"""Goals of joint trajectory controllers: what they are, what is refused, and how one is led into."""
+"""Goals of joint trajectory controllers, and their validation; the interfaces that such a controller may command."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final, get_args
 
 import numpy as np
 
 from manipcli.control.action import ErrorCode, GoalRejected
+from manipcli.control.limits import limit_array
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, told_apart
 from manipcli.description.elements import JointLimits, JointType
-from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import Interface
 
 REST = 1.2e-7
 """Velocities below this count as zero at the end of a trajectory; ROS's own threshold (single-precision epsilon)."""
@@ -42,17 +45,14 @@ class JointFacts:
         limits = [JointLimits()] * len(joints) if limits is None else limits
         types = ["revolute"] * len(joints) if types is None else types
 
-        def bound(values: list[float | None], default: float) -> Array:
-            return np.array([default if value is None else value for value in values], dtype=np.float64)
-
         continuous = np.array([kind == "continuous" for kind in types], dtype=np.float64)
         return JointFacts(
             joints=joints,
             units=tuple("m" if kind == "prismatic" else "rad" for kind in types),
-            lower=bound([limit.lower for limit in limits], -math.inf),
-            upper=bound([limit.upper for limit in limits], math.inf),
-            velocity=bound([limit.velocity for limit in limits], math.inf),
-            acceleration=bound([limit.acceleration for limit in limits], math.inf),
+            lower=limit_array((limit.lower for limit in limits), -math.inf),
+            upper=limit_array(limit.upper for limit in limits),
+            velocity=limit_array(limit.velocity for limit in limits),
+            acceleration=limit_array(limit.acceleration for limit in limits),
             continuous=continuous,
             wraps=bool(continuous.any()),
         )
@@ -65,13 +65,9 @@ class JointFacts:
         return JointFacts(
             joints=joints,
             units=tuple(self.units[i] for i in k),
-            lower=self.lower[k],
-            upper=self.upper[k],
-            velocity=self.velocity[k],
-            acceleration=self.acceleration[k],
-            continuous=self.continuous[k],
-            wraps=bool(self.continuous[k].any()),
-        )
+            lower=self.lower[k], upper=self.upper[k], velocity=self.velocity[k], acceleration=self.acceleration[k],
+            continuous=self.continuous[k], wraps=bool(self.continuous[k].any()),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,74 +241,35 @@ def shortest(error: Array, facts: JointFacts) -> None:
     error -= facts.continuous * math.tau * np.copysign(np.maximum(turns, 0.0), error)
 
 
-def lead_in(
-    trajectory: JointTrajectory,
-    start: Array,
-    facts: JointFacts,
-    *,
-    ago: float,
-    smooth: bool,
-    interpolation: Interpolation,
-) -> JointTrajectory:
-    """The trajectory from `start` on.
-
-    The start becomes a point at time 0 of what the trajectory's points give, unless the first point is at 0 itself.
-    Continuous joints of the trajectory are shifted by whole turns, so that its first point is the nearest.
-
-    Args:
-        trajectory: of the joints of `facts`.
-        start: (4, n) where it begins: position, velocity, acceleration, effort.
-        facts: of its joints.
-        ago: [s] its time 0 was so long ago (negative: will be); of its points those that are still to come are left.
-        smooth: whether points that give positions alone get the velocities of a spline.
-        interpolation: `none` also where the trajectory does not say so.
-    """
-    if trajectory.source is not None:
-        begin = TrajectoryPoint(start[0], 0.0, start[1], start[2], start[3])
-        trajectory = JointTrajectory(trajectory.names, trajectory.source, begin, interpolation=trajectory.interpolation)
-    if interpolation == "none":
-        trajectory = trajectory.with_interpolation("none")
-    if ago != 0.0:
-        trajectory = _remaining(trajectory, ago)
-    positions = trajectory.positions
-    if facts.wraps:
-        ahead = positions[0] - start[0]
-        near = ahead.copy()
-        shortest(near, facts)
-        if (near != ahead).any():
-            positions = positions + (near - ahead)
-    leads = trajectory.times[0] > 0.0
-    if not leads and positions is trajectory.positions:
-        whole = trajectory
-    else:
-
-        def after(row: Array, values: Array | None) -> Array | None:
-            return values if values is None or not leads else np.vstack([row, values])
-
-        whole = JointTrajectory.of_arrays(
-            trajectory.names, np.concatenate([[0.0], trajectory.times]) if leads else trajectory.times,
-            np.vstack([start[0], positions]) if leads else positions,
-            after(start[1], trajectory.velocities), after(start[2], trajectory.accelerations),
-            after(start[3], trajectory.efforts), interpolation=trajectory.interpolation,
-            led_in=leads or trajectory.led_in,
-        )  # fmt: skip
-    return whole.with_spline_velocities(start[1] if leads else None) if smooth else whole
+COMMANDED: Final[tuple[tuple[Interface, ...], ...]] = (
+    ("position",),
+    ("position", "velocity"),
+    ("position", "velocity", "acceleration"),
+    ("velocity",),
+    ("effort",),
+    ("position", "effort"),
+)
+READ: Final[tuple[tuple[Interface, ...], ...]] = COMMANDED[:3]
 
 
-def first_to_come(times: Array, ago: float) -> int:
-    """Which of the points at `times` (K) is the first that comes later than `ago`; the last where none does."""
-    return min(int(np.searchsorted(times, ago, side="right")), len(times) - 1)
+def controlled_by_error(command_interfaces: Sequence[str]) -> bool:
+    """Whether a PID makes the command: a velocity or an effort alone."""
+    return tuple(command_interfaces) in {("velocity",), ("effort",)}
 
 
-def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
-    """The points of a trajectory that come later than `ago` [s] of it, at the least the last, from then on."""
-    first = first_to_come(trajectory.times, ago)
-
-    def kept(values: Array | None) -> Array | None:
-        return None if values is None else values[first:]
-
-    return JointTrajectory.of_arrays(
-        trajectory.names, np.maximum(trajectory.times[first:] - ago, 0.0), trajectory.positions[first:],
-        kept(trajectory.velocities), kept(trajectory.accelerations), kept(trajectory.efforts),
-        interpolation=trajectory.interpolation,
-    )  # fmt: skip
+def refused(command_interfaces: Sequence[str], state_interfaces: Sequence[str]) -> tuple[str, str] | None:
+    """What is wrong with such interfaces, and a hint; None when nothing is."""
+    for what, given, legal in (("command", command_interfaces, COMMANDED), ("state", state_interfaces, READ)):
+        for one in given:
+            if one not in get_args(Interface):
+                known = get_args(Interface)
+                return f"unknown {what} interface '{one}'", did_you_mean(one, known, kind="interfaces") or ""
+        if len(set(given)) < len(given) or set(given) not in [set(one) for one in legal]:
+            sets = "; ".join(f"[{', '.join(one)}]" for one in legal)
+            return f"{what}_interfaces [{', '.join(given)}] are not a set that it serves", f"expected {sets}"
+    if "velocity" not in state_interfaces and (
+        controlled_by_error(command_interfaces) or "effort" in command_interfaces
+    ):
+        message = f"state_interfaces [{', '.join(state_interfaces)}] lack the velocity that commands of "
+        return message + f"[{', '.join(command_interfaces)}] need", "say state_interfaces: [position, velocity]"
+    return None

@@ -7,29 +7,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.control.course import (
+from manipcli.control.active_trajectory import (
     ACCELERATION,
     EFFORT,
     POSITION,
     VELOCITY,
+    ActiveTrajectory,
     Columns,
-    Course,
     Part,
+    Reference,
     decelerating,
     stopping_in,
 )
-from manipcli.control.reference import Reference
 from manipcli.control.trajectory_goal import (
     POSITION_SLACK,
     VELOCITY_SLACK,
     JointFacts,
-    first_to_come,
-    lead_in,
     shortest,
     too_fast,
 )
 from manipcli.core.geometry import Array
-from manipcli.plan.trajectory import Interpolation, JointTrajectory
+from manipcli.plan.trajectory import Interpolation, JointTrajectory, TrajectoryPoint
 from manipcli.spec.controllers import ConstraintsSpec
 
 
@@ -68,7 +66,7 @@ class Transitions:
         time: float,
         speed: float,
         measured: tuple[Array, Array],
-    ) -> Course:
+    ) -> ActiveTrajectory:
         """What is followed from `time` [s] on.
 
         Args:
@@ -76,18 +74,18 @@ class Transitions:
             later: [s] its time 0 is so much later; negative: its points up to now are left out.
             reference: what is followed now.
             time: now.
-            speed: of the new course.
+            speed: of the new trajectory.
             measured: position and velocity (n).
         """
         now = reference.row(time)
         if speed not in (0.0, 1.0):  # in seconds of the trajectory; where it is paused, nothing moves
             now[VELOCITY] /= speed
             now[ACCELERATION] /= speed**2
-        course = reference.now(time) if self.replaces else Course.hold(now[POSITION], now[EFFORT])
+        active = reference.now(time) if self.replaces else ActiveTrajectory.hold(now[POSITION], now[EFFORT])
         begin = max(later, 0.0) if self.replaces else 0.0
         start = now
         if begin > 0.0:
-            start = course.sample(np.array([begin]))[0]
+            start = active.sample(np.array([begin]))[0]
         elif not self.from_desired and not (self.replaces and reference.moving):
             start[POSITION], start[VELOCITY], start[ACCELERATION] = *measured, 0.0
         columns = self._columns(trajectory.names)
@@ -95,7 +93,7 @@ class Transitions:
             trajectory, start[:, columns], self.facts.some(trajectory.names), ago=begin - later, smooth=self.smooth,
             interpolation=self.interpolation,
         )  # fmt: skip
-        return course.with_part(Part(columns, whole, begin))
+        return active.with_part(Part(columns, whole, begin))
 
     def check_way(
         self,
@@ -145,7 +143,7 @@ class Transitions:
             j = int(excess.argmax())
             raise too_fast(facts, j, float(way[j]) / duration, f"on the way to point {k}")
 
-    def to_rest(self, reference: Reference, time: float) -> Course:
+    def to_rest(self, reference: Reference, time: float) -> ActiveTrajectory:
         """What is followed from `time` [s] on, until it rests; in seconds of real time.
 
         Where that would take a joint beyond a position limit, each joint stops by itself: within the time that it needs
@@ -154,15 +152,15 @@ class Transitions:
         now = reference.row(time)
         if self.stop_duration > 0.0:
             own = np.full(now.shape[1], self.stop_duration)
-            course = stopping_in(now, self.stop_duration)
+            active = stopping_in(now, self.stop_duration)
         else:
             own = np.abs(now[VELOCITY]) / self.deceleration
             common = np.where(np.isfinite(self.deceleration), own.max(), 0.0)
-            course = decelerating(now, common if self.together else own)
+            active = decelerating(now, common if self.together else own)
         room = self._room(now)
-        ways = np.abs(course.sample(np.array([course.end]))[0, POSITION] - now[POSITION])
+        ways = np.abs(active.sample(np.array([active.end]))[0, POSITION] - now[POSITION])
         if (ways <= room + POSITION_SLACK).all():
-            return course
+            return active
         rate = np.abs(now[VELOCITY])
         latest = np.divide(2.0 * room, rate, out=np.zeros_like(rate), where=rate > 0.0)
         return decelerating(now, np.minimum(own, latest))
@@ -175,3 +173,76 @@ class Transitions:
     def _columns(self, names: Sequence[str]) -> Columns:
         joints = self.facts.joints
         return slice(None) if names == joints else np.array([joints.index(name) for name in names], dtype=np.intp)
+
+
+def lead_in(
+    trajectory: JointTrajectory,
+    start: Array,
+    facts: JointFacts,
+    *,
+    ago: float,
+    smooth: bool,
+    interpolation: Interpolation,
+) -> JointTrajectory:
+    """The trajectory from `start` on.
+
+    The start becomes a point at time 0 of what the trajectory's points give, unless the first point is at 0 itself.
+    Continuous joints of the trajectory are shifted by whole turns, so that its first point is the nearest.
+
+    Args:
+        trajectory: of the joints of `facts`.
+        start: (4, n) where it begins: position, velocity, acceleration, effort.
+        facts: of its joints.
+        ago: [s] its time 0 was so long ago (negative: will be); of its points those that are still to come are left.
+        smooth: whether points that give positions alone get the velocities of a spline.
+        interpolation: `none` also where the trajectory does not say so.
+    """
+    if trajectory.source is not None:
+        begin = TrajectoryPoint(start[0], 0.0, start[1], start[2], start[3])
+        trajectory = JointTrajectory(trajectory.names, trajectory.source, begin, interpolation=trajectory.interpolation)
+    if interpolation == "none":
+        trajectory = trajectory.with_interpolation("none")
+    if ago != 0.0:
+        trajectory = _remaining(trajectory, ago)
+    positions = trajectory.positions
+    if facts.wraps:
+        ahead = positions[0] - start[0]
+        near = ahead.copy()
+        shortest(near, facts)
+        if (near != ahead).any():
+            positions = positions + (near - ahead)
+    leads = trajectory.times[0] > 0.0
+    if not leads and positions is trajectory.positions:
+        whole = trajectory
+    else:
+
+        def after(row: Array, values: Array | None) -> Array | None:
+            return values if values is None or not leads else np.vstack([row, values])
+
+        whole = JointTrajectory.of_arrays(
+            trajectory.names, np.concatenate([[0.0], trajectory.times]) if leads else trajectory.times,
+            np.vstack([start[0], positions]) if leads else positions,
+            after(start[1], trajectory.velocities), after(start[2], trajectory.accelerations),
+            after(start[3], trajectory.efforts), interpolation=trajectory.interpolation,
+            led_in=leads or trajectory.led_in,
+        )  # fmt: skip
+    return whole.with_spline_velocities(start[1] if leads else None) if smooth else whole
+
+
+def first_to_come(times: Array, ago: float) -> int:
+    """Which of the points at `times` (K) is the first that comes later than `ago`; the last where none does."""
+    return min(int(np.searchsorted(times, ago, side="right")), len(times) - 1)
+
+
+def _remaining(trajectory: JointTrajectory, ago: float) -> JointTrajectory:
+    """The points of a trajectory that come later than `ago` [s] of it, at the least the last, from then on."""
+    first = first_to_come(trajectory.times, ago)
+
+    def kept(values: Array | None) -> Array | None:
+        return None if values is None else values[first:]
+
+    return JointTrajectory.of_arrays(
+        trajectory.names, np.maximum(trajectory.times[first:] - ago, 0.0), trajectory.positions[first:],
+        kept(trajectory.velocities), kept(trajectory.accelerations), kept(trajectory.efforts),
+        interpolation=trajectory.interpolation,
+    )  # fmt: skip

@@ -25,7 +25,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.control.reflected import Load
+from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.control.stability import Loop, gain_margin, is_stable, poles, transition, unstable_share
 from manipcli.core.geometry import Array
 from manipcli.model.damping import implicit_damping
@@ -147,7 +147,13 @@ class _Draft:
 
 
 def tune_efforts(
-    controllers: Sequence[str], load: Load, wish: Wish, *, steps: Array, carried: npt.NDArray[np.bool_], pressing: Array
+    controllers: Sequence[str],
+    load: JointSpaceLoad,
+    wish: Wish,
+    *,
+    steps: Array,
+    carried: npt.NDArray[np.bool_],
+    pressing: Array,
 ) -> tuple[Tuned, ...]:
     """Gains of all joints (k) on the effort interface.
 
@@ -184,7 +190,7 @@ def _short(value: float) -> float:
     return float(f"{value:.3g}")
 
 
-def _loop(load: Load, k: int, inertia: float, gains: tuple[float, float, float], wish: Wish) -> Loop:
+def _loop(load: JointSpaceLoad, k: int, inertia: float, gains: tuple[float, float, float], wish: Wish) -> Loop:
     p, i, d = gains
     return Loop.of_joint(
         inertia,
@@ -205,7 +211,7 @@ def _softer(draft: _Draft, limit: Limit) -> _Draft:
     return replace(draft, w=0.95 * draft.w, limit=limit)
 
 
-def _calmed(load: Load, k: int, draft: _Draft, wish: Wish) -> _Draft:
+def _calmed(load: JointSpaceLoad, k: int, draft: _Draft, wish: Wish) -> _Draft:
     """With the margin at the least inertia."""
     least = float(load.own_inertia[:, k].min())
     while draft.w > LEAST_FREQUENCY and not is_stable(_loop(load, k, least, draft.gains, wish).scaled(MARGIN)):
@@ -213,7 +219,7 @@ def _calmed(load: Load, k: int, draft: _Draft, wish: Wish) -> _Draft:
     return draft
 
 
-def _calm_together(load: Load, drafts: list[_Draft], wish: Wish) -> None:
+def _calm_together(load: JointSpaceLoad, drafts: list[_Draft], wish: Wish) -> None:
     """With the margin of all loops together, in every posture; those that have the largest share give in."""
     for mass in load.mass:
         for _ in range(400):
@@ -226,7 +232,7 @@ def _calm_together(load: Load, drafts: list[_Draft], wish: Wish) -> None:
                 drafts[k] = _softer(drafts[k], "other joints")
 
 
-def tightness(load: Load, tuned: Sequence[Tuned], wish: Wish) -> Array:
+def tightness(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> Array:
     """(T,) how near these gains come to what the control step allows: the largest eigenvalue of M^-1 (2 D h + P h^2),
     which is 4 where they are unstable, in one step of Euler and for one joint exactly."""
     p, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "d"))
@@ -236,7 +242,7 @@ def tightness(load: Load, tuned: Sequence[Tuned], wish: Wish) -> Array:
     return np.asarray(np.linalg.eigvalsh(root[:, None] * np.linalg.inv(load.mass) * root)[:, -1])
 
 
-def least_margin(load: Load, tuned: Sequence[Tuned], wish: Wish) -> float:
+def least_margin(load: JointSpaceLoad, tuned: Sequence[Tuned], wish: Wish) -> float:
     """By what factor all of these gains may grow in every posture; 0 where they are unstable in one."""
     p, i, d = (np.array([getattr(one, key) for one in tuned]) for key in ("p", "i", "d"))
     late = np.array(load.latency)
@@ -244,7 +250,7 @@ def least_margin(load: Load, tuned: Sequence[Tuned], wish: Wish) -> float:
     return min(gain_margin(loop) for loop in loops)
 
 
-def _tuned(load: Load, k: int, controller: str, draft: _Draft, wish: Wish, step: float, left: float) -> Tuned:
+def _tuned(load: JointSpaceLoad, k: int, controller: str, draft: _Draft, wish: Wish, step: float, left: float) -> Tuned:
     least = float(load.own_inertia[:, k].min())
     p, i, d = draft.gains
     clamp = None

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
 from itertools import pairwise
-from typing import Any, get_args
+from typing import get_args
 
 from manipcli.judge.verdict import Attempt, StepOutcome, StepWord
+from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.channels import EVENTS
 from manipcli.record.recording import Recording, TaskEvent
-
-PLAN_FILE = "plan.json"
-"""The attachment with the planned steps: `{"steps": [{"id", "verb", "planned_duration"}, ...]}`."""
 
 
 class RunStatus(StrEnum):
@@ -35,7 +32,8 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
     A step that started and never ended was `interrupted` when the run was, else `failed`; one that never started is
     `not_run`. Of several attempts at one step the last counts.
     """
-    planned = _planned(recording)
+    plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
+    planned = [(step.id, step.verb, step.planned_duration) for step in plan.steps]
     known = {step_id for step_id, _, _ in planned}
     for event in recording.events:
         if event.kind == "step_started" and event.step not in known:
@@ -97,13 +95,3 @@ def _word(text: str) -> StepWord:
             known: StepWord = word
             return known
     return "failed"
-
-
-def _planned(recording: Recording) -> list[tuple[str, str, float]]:
-    """Id, verb and planned duration [s] of each step; empty when the log carries no readable plan."""
-    try:
-        # Any: what a file holds is not known before it is looked at.
-        plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
-        return [(str(s["id"]), str(s["verb"]), float(s["planned_duration"])) for s in plan.get("steps", [])]
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,6 @@ from manipcli.core.errors import Finding, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE, Drawn
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.logs.mesh_search import MeshSearch
 from manipcli.logs.recorded_files import (
     attached,
@@ -23,6 +21,7 @@ from manipcli.logs.recorded_files import (
     recorded_task_file,
 )
 from manipcli.model.build_robot import rebuild_robot
+from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.attachments import URDF
 from manipcli.record.recording import EMBEDDED, Recording
 from manipcli.run.run_log import mesh_files
@@ -128,14 +127,10 @@ def _drawn(recording: Recording, path: Path) -> Drawn | None:
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
     """Where steps and what is judged were written, as the plan in the log says; {} where it does not."""
-    try:
-        plan = json.loads(attached(recording, path, PLAN_FILE))
-        places = [*(step["place"] for step in plan["steps"]), *plan["judged"]]
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return {}
+    plan = PlanOutline.read(attached(recording, path, PLAN_FILE))
+    places = [*(step.place for step in plan.steps), *plan.judged]
     keys = [*(("steps", k) for k in range(len(spec.steps))), *spec.judged_at]
-    whole = len(places) == len(keys) and all(isinstance(place, str) for place in places)
-    return dict(zip(keys, places, strict=True)) if whole else {}
+    return dict(zip(keys, places, strict=True)) if len(places) == len(keys) and all(places) else {}
 
 
 def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from manipcli.conditions.members.at_pose import SLIDE, AtPoseSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
@@ -16,11 +14,11 @@ from manipcli.conditions.members.moved import UnmovedSpec
 from manipcli.conditions.members.slip import SlipSpec
 from manipcli.core.version import __version__
 from manipcli.judge.measures.facts import run_facts
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.recorded_files import recorded_robot, recorded_scene, recorded_task_file
 from manipcli.logs.replay import open_playback
+from manipcli.plan.outline import PLAN_FILE, PlanOutline
 from manipcli.record.attachments import CONTROLLERS, ROBOT, TASK
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording
@@ -172,13 +170,8 @@ def _known_places(recording: Recording) -> tuple[dict[str, str], list[str]]:
     """Where each step was written, `pour.yaml:21:5`, by its id, of those begun where the plan does not say; and where
     each expectation and watch, none where the plan does not say."""
     places = {event.step: event.place for event in recording.events if event.place}
-    try:
-        # Any: what a file holds is not known before it is looked at.
-        plan: Any = json.loads(recording.attachments.get(PLAN_FILE, b"{}"))
-        steps = {str(step["id"]): str(step["place"]) for step in plan["steps"]}
-        return places | steps, [str(place) for place in plan.get("judged", ())]
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return places, []
+    plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
+    return places | {step.id: step.place for step in plan.steps if step.place}, list(plan.judged)
 
 
 def _rate(recording: Recording) -> float:

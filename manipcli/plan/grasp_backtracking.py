@@ -8,14 +8,14 @@ from typing import Final
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.plan.steps import STEPS
 
 MOST: Final = 7
 """Grasps of an object that are tried before a task is refused."""
 
 
-class Regrasps:
+class GraspBacktracking:
     """Which grasps lead nowhere, by the step that takes the object: R_WT (3, 3) of the tool."""
 
     def __init__(self, planner: Planner) -> None:
@@ -27,7 +27,7 @@ class Regrasps:
         """Those that a step is not to use."""
         return self._grasps.get(step, ())
 
-    def back(self, refusal: NotPlannable, done: Sequence[tuple[str, Situation]]) -> int:
+    def back(self, refusal: NotPlannable, done: Sequence[tuple[str, PlanningState]]) -> int:
         """From which step on to plan again, where the one after those that are planned is refused.
 
         Args:

@@ -1,6 +1,6 @@
 """What steps plan with: the robot, the scene, inverse kinematics and collision queries, behind a few questions.
 
-A step asks the `Planner` about a situation, and strings motions together with a `Draft`.
+A step asks the `Planner` about a state, and strings motions together with a `MotionBuilder`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder
@@ -108,52 +108,52 @@ class Planner:
         """The link that carries the tool, and what the hand holds."""
         return self.solver.link
 
-    def tool_pose(self, situation: Situation) -> Transform:
+    def tool_pose(self, state: PlanningState) -> Transform:
         """X_WT."""
-        return self.solver.forward(situation.position)
+        return self.solver.forward(state.position)
 
-    def body_pose(self, situation: Situation, name: str) -> Transform:
+    def body_pose(self, state: PlanningState, name: str) -> Transform:
         """X_WO of a body."""
         body = self.scene.body(name)
-        return body.X_WO if body.fixed else situation.bodies[self.scene.movable.index(body)]
+        return body.X_WO if body.fixed else state.bodies[self.scene.movable.index(body)]
 
-    def frame(self, name: str, situation: Situation) -> Transform:
+    def frame(self, name: str, state: PlanningState) -> Transform:
         """X_WF of `world`, `base`, `tool`, a body, or a named frame."""
         if name == "world":
             return Transform.identity()
         if name == "base":
             return self.robot.X_WB
         if name == "tool":
-            return self.tool_pose(situation)
+            return self.tool_pose(state)
         for frame in self.scene.frames:
             if frame.name == name:
-                return self.frame(frame.parent, situation) @ frame.X_PF
-        return self.body_pose(situation, name)
+                return self.frame(frame.parent, state) @ frame.X_PF
+        return self.body_pose(state, name)
 
-    def held(self, situation: Situation, body: str) -> None:
+    def held(self, state: PlanningState, body: str) -> None:
         """Nothing, if this object is held.
 
         Raises:
             NotPlannable: it is not.
         """
-        carried = situation.carried
+        carried = state.carried
         if carried is not None and carried.body == body:
             return
         if carried is not None:
             holds = f"holds '{carried.body}'"
         else:
-            holds = "is closed, but not on it" if situation.closed else "holds nothing"
+            holds = "is closed, but not on it" if state.closed else "holds nothing"
         raise NotPlannable(
             f"'{body}' is not held: the hand {holds}", hint=f"`pick` it first, or `grasp: {{object: {body}}}`"
         )
 
-    def free_hand(self, situation: Situation, body: str) -> None:
+    def free_hand(self, state: PlanningState, body: str) -> None:
         """Nothing, if the hand can take this object.
 
         Raises:
             NotPlannable: it holds something already.
         """
-        carried = situation.carried
+        carried = state.carried
         if carried is None:
             return
         if carried.body == body:
@@ -167,32 +167,32 @@ class Planner:
         last = self.robot.joint(self.solver.joints[-1])
         return pairs(self.robot.descendants(last.child), body)
 
-    def may_touch(self, situation: Situation, bodies: Sequence[str]) -> Pairs:
+    def may_touch(self, state: PlanningState, bodies: Sequence[str]) -> Pairs:
         """Every pair of these bodies with the hand, and with what it holds."""
-        held = () if situation.carried is None else (situation.carried.body,)
+        held = () if state.carried is None else (state.carried.body,)
         return frozenset(
             pair for body in bodies for pair in {*self.hand_contacts(body), *((one, body) for one in held)}
         )
 
-    def held_in_tool(self, situation: Situation) -> Transform:
+    def held_in_tool(self, state: PlanningState) -> Transform:
         """X_TO of the held object."""
-        assert situation.carried is not None  # callers ask `held` first
-        X_WO = self.body_pose(situation, situation.carried.body)
-        return self.tool_pose(situation).inverse() @ X_WO
+        assert state.carried is not None  # callers ask `held` first
+        X_WO = self.body_pose(state, state.carried.body)
+        return self.tool_pose(state).inverse() @ X_WO
 
-    def contents(self, situation: Situation, container: str) -> tuple[str, ...]:
+    def contents(self, state: PlanningState, container: str) -> tuple[str, ...]:
         """The movable bodies whose middle lies in the hollow of this one."""
         interior = self.scene.body(container).interior
         if interior is None:
             return ()
-        X_SW = (self.body_pose(situation, container) @ interior.X_OS).inverse()
+        X_SW = (self.body_pose(state, container) @ interior.X_OS).inverse()
         return tuple(
             body.name
-            for body, X_WO in zip(self.scene.movable, situation.bodies, strict=True)
+            for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
             if body.name != container and _within(interior, X_SW @ X_WO @ Transform.of(xyz=body.centre))
         )
 
-    def query(self, situation: Situation, allowed: Pairs = NOTHING) -> CollisionQuery:
+    def query(self, state: PlanningState, allowed: Pairs = NOTHING) -> CollisionQuery:
         """What the arm may hit now, everything `CLEARANCE` around it: the scene, and itself.
 
         The hand may touch what it holds; what lies in that is out of the way.
@@ -200,36 +200,35 @@ class Planner:
         Args:
             allowed: further pairs that may touch.
         """
-        carried = situation.carried
+        carried = state.carried
         gone: tuple[str, ...] = ()
         if carried is not None:
             allowed |= self.hand_contacts(carried.body)
-            gone = self.contents(situation, carried.body)
+            gone = self.contents(state, carried.body)
         moving = (*gone, carried.body) if carried is not None else gone
         standing = tuple(
-            None if body.name in moving else X_WO
-            for body, X_WO in zip(self.scene.movable, situation.bodies, strict=True)
+            None if body.name in moving else X_WO for body, X_WO in zip(self.scene.movable, state.bodies, strict=True)
         )
         key = (standing, carried, allowed, gone)
         if key not in self._queries:
             if len(self._queries) == _QUERIES:
                 del self._queries[next(iter(self._queries))]
             self._queries[key] = self.checker.at(
-                situation.bodies, carried=carried, ignore=allowed, margin=CLEARANCE, absent=gone
+                state.bodies, carried=carried, ignore=allowed, margin=CLEARANCE, absent=gone
             )
         return self._queries[key]
 
-    def free_start(self, situation: Situation, allowed: Pairs = NOTHING) -> None:
+    def free_start(self, state: PlanningState, allowed: Pairs = NOTHING) -> None:
         """Nothing, if nothing but `allowed` pairs is too near already; else no search among ways from here can succeed.
 
         Raises:
             NotPlannable: names the pair.
         """
-        hit = self.query(situation, allowed).check(situation.position)
+        hit = self.query(state, allowed).check(state.position)
         if hit is not None:
-            raise self.refusal(situation, hit, "is", "before it moves")
+            raise self.refusal(state, hit, "is", "before it moves")
 
-    def outside(self, situation: Situation) -> None:
+    def outside(self, state: PlanningState) -> None:
         """Nothing, if the robot is inside of no body; where it is, the engine would throw them apart, or wedge them.
 
         Raises:
@@ -237,32 +236,32 @@ class Planner:
         """
         hits = [
             hit
-            for hit in self.query(situation).every(situation.position)
+            for hit in self.query(state).every(state.position)
             if hit.distance < -TOLERANCE and hit.a.startswith(ROBOT) != hit.b.startswith(ROBOT)
         ]
         if hits:
-            raise self.refusal(situation, min(hits, key=lambda hit: hit.distance), "is", "at the start")
+            raise self.refusal(state, min(hits, key=lambda hit: hit.distance), "is", "at the start")
 
     def refusal(
-        self, situation: Situation, hit: CollisionHit, verb: str, when: str, *, move: bool = False
+        self, state: PlanningState, hit: CollisionHit, verb: str, when: str, *, move: bool = False
     ) -> NotPlannable:
-        """What to tell about a hit on a way that begins in `situation`: `a` `verb` too near to `b`, `when`.
+        """What to tell about a hit on a way that begins in `state`: `a` `verb` too near to `b`, `when`.
 
         In a `move` it may be meant.
         """
-        carried = situation.carried
+        carried = state.carried
         begins, held = hit.time <= 0.0, carried is not None and carried.body in (hit.a, hit.b)
         hint = NO_WAY_AROUND
         if begins and held and carried is not None:
             hint = f"`lift` '{carried.body}' first"
         elif hit.a.startswith(ROBOT) and hit.b.startswith(ROBOT):
             hint = OF_TWO_LINKS if begins else f"{NO_WAY_AROUND}; or {OF_TWO_LINKS}"
-        elif begins and situation.at_start:
+        elif begins and state.at_start:
             hint = PUT_APART
         elif begins:
-            if body := self._touchable(situation, hit):
+            if body := self._touchable(state, hit):
                 hint = f"`touch: [{body}]` of the `move` that leaves it lets it"
-        elif move and (body := self._touchable(situation, hit)):
+        elif move and (body := self._touchable(state, hit)):
             hint = f"{NO_WAY_AROUND}; or `touch: [{body}]`, where the hand shall push it or press on it"
         if begins and hit.distance < 0.0 and not held:
             cause = f"'{hit.a}' and '{hit.b}' overlap by {hit.amount} already, {when}"
@@ -271,32 +270,32 @@ class Planner:
             cause = f"'{hit.a}' {verb} within {1000 * CLEARANCE:.0f} mm of '{hit.b}' ({near}) {when}"
         return NotPlannable(cause, hint=hint, reason="in_the_way" if hint == NO_WAY_AROUND else None)
 
-    def _touchable(self, situation: Situation, hit: CollisionHit) -> str:
+    def _touchable(self, state: PlanningState, hit: CollisionHit) -> str:
         """The body that the hand, or what it holds, hit; "" where something else did."""
         pair = frozenset((hit.a, hit.b))
         bodies = [name for name in (hit.a, hit.b) if not name.startswith(ROBOT)]
-        return next((one for one in bodies if pair in map(frozenset, self.may_touch(situation, [one]))), "")
+        return next((one for one in bodies if pair in map(frozenset, self.may_touch(state, [one]))), "")
 
     def in_the_way(self, hit: CollisionHit) -> str:
         """A hit as text; of what does not overlap, also how far apart it was to stay."""
         return str(hit) if hit.distance < 0.0 else f"{hit}, and {1000 * CLEARANCE:.0f} mm are to stay between them"
 
-    def touching(self, situation: Situation, body: str) -> Pairs:
+    def touching(self, state: PlanningState, body: str) -> Pairs:
         """The pairs of a movable body with what it stands on or leans against."""
         root = self.robot.root
-        X_LO = self.robot.X_WB.inverse() @ self.body_pose(situation, body)
+        X_LO = self.robot.X_WB.inverse() @ self.body_pose(state, body)
         carried = Carried(body=body, link=root, X_LO=X_LO)
-        there = self.checker.at(situation.bodies, carried=carried, margin=TOUCHING, only=body)
-        return frozenset((hit.a, hit.b) for hit in there.every(situation.position))
+        there = self.checker.at(state.bodies, carried=carried, margin=TOUCHING, only=body)
+        return frozenset((hit.a, hit.b) for hit in there.every(state.position))
 
-    def grasping(self, situation: Situation, body: str, *, margin: float = 0.0) -> CollisionQuery:
+    def grasping(self, state: PlanningState, body: str, *, margin: float = 0.0) -> CollisionQuery:
         """Touches where the hand, which carries nothing, is nearer than the `margin` [m] to this body."""
-        return self.checker.at(situation.bodies, only=body, margin=margin)
+        return self.checker.at(state.bodies, only=body, margin=margin)
 
-    def distance(self, situation: Situation, body: str) -> float:
+    def distance(self, state: PlanningState, body: str) -> float:
         """How far [m] the robot, which carries nothing, is from this body, negative where they overlap; `CLEARANCE`
         where it is further."""
-        hits = self.grasping(situation, body, margin=CLEARANCE).every(situation.position)
+        hits = self.grasping(state, body, margin=CLEARANCE).every(state.position)
         return min((hit.distance for hit in hits), default=CLEARANCE)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.plan.planner import Pairs, Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.shapes.primitives import Cylinder
 
@@ -20,13 +20,13 @@ PRESSED: Final = 1e-3
 _LOOKS: Final = 60  # at the way of a hand that touches: each takes a fraction of a millisecond
 
 
-def put(planner: Planner, situation: Situation, where: Mapping[str, Transform]) -> Situation:
-    """The situation with some movable bodies elsewhere, at X_WO by name."""
-    bodies = zip(planner.scene.movable, situation.bodies, strict=True)
-    return replace(situation, bodies=tuple(where.get(body.name, X_WO) for body, X_WO in bodies))
+def put(planner: Planner, state: PlanningState, where: Mapping[str, Transform]) -> PlanningState:
+    """The state with some movable bodies elsewhere, at X_WO by name."""
+    bodies = zip(planner.scene.movable, state.bodies, strict=True)
+    return replace(state, bodies=tuple(where.get(body.name, X_WO) for body, X_WO in bodies))
 
 
-def carried_along(planner: Planner, before: Situation, now: Situation) -> Situation:
+def carried_along(planner: Planner, before: PlanningState, now: PlanningState) -> PlanningState:
     """What was held `before` has gone with the hand to where the joints are `now`, and what lay in it, too."""
     carried = before.carried
     if carried is None:
@@ -39,23 +39,25 @@ def carried_along(planner: Planner, before: Situation, now: Situation) -> Situat
     return put(planner, now, moved)
 
 
-def spilled(planner: Planner, situation: Situation, into: str) -> Situation:
+def spilled(planner: Planner, state: PlanningState, into: str) -> PlanningState:
     """What lay in the carried body lies on the floor of the container `into`."""
-    carried, interior = situation.carried, planner.scene.body(into).interior
+    carried, interior = state.carried, planner.scene.body(into).interior
     if carried is None or interior is None:
-        return situation
+        return state
     shape = interior.shape
     depth = shape.length if isinstance(shape, Cylinder) else shape.size[2]
-    X_WS = planner.body_pose(situation, into) @ interior.X_OS
+    X_WS = planner.body_pose(state, into) @ interior.X_OS
     landed = {}
-    for name in planner.contents(situation, carried.body):
+    for name in planner.contents(state, carried.body):
         body = planner.scene.body(name)
         bottom = body.centre[2] - body.size[2] / 2
         landed[name] = X_WS @ Transform.of(xyz=(-body.centre[0], -body.centre[1], -depth / 2 - bottom))
-    return put(planner, situation, landed)
+    return put(planner, state, landed)
 
 
-def met(planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, touching: Pairs) -> Situation:
+def met(
+    planner: Planner, before: PlanningState, now: PlanningState, motion: JointTrajectory, touching: Pairs
+) -> PlanningState:
     """`now`, or where on the way there one of the pairs that may touch is about to, or to press deeper than before."""
     query, pairs = planner.query(before), set(map(frozenset, touching))
 
@@ -68,17 +70,17 @@ def met(planner: Planner, before: Situation, now: Situation, motion: JointTrajec
     return carried_along(planner, before, now.moved(frozen(way[free])))
 
 
-def _looks(planner: Planner, situation: Situation, motion: JointTrajectory) -> Array:
-    """(_LOOKS, n) joint positions on the way, the first and the last among them; other joints are as in `situation`."""
-    way = np.tile(situation.position, (_LOOKS, 1))
+def _looks(planner: Planner, state: PlanningState, motion: JointTrajectory) -> Array:
+    """(_LOOKS, n) joint positions on the way, the first and the last among them; other joints are as in `state`."""
+    way = np.tile(state.position, (_LOOKS, 1))
     columns = planner.robot.indices(motion.names)
     way[:, columns] = motion.positions[np.linspace(0, len(motion.positions) - 1, _LOOKS).astype(int)]
     return way
 
 
 def pushed(
-    planner: Planner, before: Situation, now: Situation, motion: JointTrajectory, bodies: Iterable[str]
-) -> Situation:
+    planner: Planner, before: PlanningState, now: PlanningState, motion: JointTrajectory, bodies: Iterable[str]
+) -> PlanningState:
     """Each of the `bodies` that can move has slid along the ground as far as the tool went since the hand met it, and
     what lies in it, too."""
     way = _looks(planner, before, motion)

@@ -1,4 +1,4 @@
-"""The contract of steps: from the predicted situation before a step to the motions that do it and the one after.
+"""The contract of steps: from the predicted state before a step to the motions that do it and the one after.
 
 Steps are pure: no engine, no clock; randomness comes from the planner's generator. The pipeline turns Motions into
 controller goals.
@@ -31,7 +31,7 @@ CLOSING = "close"
 
 
 @dataclass(frozen=True, slots=True)
-class Situation:
+class PlanningState:
     """What a step starts from, predicted or measured.
 
     Attributes:
@@ -48,7 +48,7 @@ class Situation:
     closed: bool = False
     at_start: bool = True
 
-    def moved(self, position: Array) -> Situation:
+    def moved(self, position: Array) -> PlanningState:
         """The same with the robot at `position`."""
         return replace(self, position=position, at_start=False)
 
@@ -105,20 +105,12 @@ class StepPlan:
     """The motions of one step, and where they lead."""
 
     motions: tuple[Motion, ...]
-    end: Situation
+    end: PlanningState
 
     @property
     def duration(self) -> float:
         """Planned duration [s]."""
         return sum(motion.duration for motion in self.motions)
-
-
-def _switches_nothing(_: object) -> None:
-    return None
-
-
-def _goes_on(_: object) -> bool:
-    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,22 +120,22 @@ class StepMember(Generic[S]):
     Attributes:
         name: the verb.
         spec: what the user writes under it.
-        plan: (spec, planner, situation) -> StepPlan. Begins at the situation; raises NotPlannable.
+        plan: (spec, planner, state) -> StepPlan. Begins at the state; raises NotPlannable.
         check: (spec, robot, scene) -> everything in the spec that this robot and scene do not know.
         uncommanded: (spec, robot, claims) -> everything in it that these controllers cannot carry out; only to be
             asked when `check` finds nothing.
         request: (spec) -> the switch of controllers that it asks for, so that the steps after it are checked against
             who is active then.
         guarded: (spec) -> whether it stops where the step's `until` comes to hold.
-        regrasp: (spec, planner, situation, grasps) -> as `plan`, with the tool turned to the object in another way than
+        regrasp: (spec, planner, state, grasps) -> as `plan`, with the tool turned to the object in another way than
             in any of `grasps`, R_WT (3, 3) each; None for a step that takes nothing, or in one way only.
     """
 
     name: str
     spec: type[S]
-    plan: Callable[[S, Planner, Situation], StepPlan]
+    plan: Callable[[S, Planner, PlanningState], StepPlan]
     check: Callable[[S, RobotModel, Scene], tuple[Problem, ...]]
     uncommanded: Callable[[S, RobotModel, Claims], tuple[Problem, ...]]
-    request: Callable[[S], Switch | None] = _switches_nothing
-    guarded: Callable[[S], bool] = _goes_on
-    regrasp: Callable[[S, Planner, Situation, Sequence[Array]], StepPlan] | None = None
+    request: Callable[[S], Switch | None] = lambda _: None
+    guarded: Callable[[S], bool] = lambda _: False
+    regrasp: Callable[[S, Planner, PlanningState, Sequence[Array]], StepPlan] | None = None

@@ -11,17 +11,17 @@ from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import ramp
 from manipcli.plan.planner import Planner
 from manipcli.plan.sampling import LONGEST
-from manipcli.plan.step import Grip, Situation
+from manipcli.plan.step import Grip, PlanningState
 from manipcli.plan.trajectory import JointTrajectory
 
 
-def grip_time(planner: Planner, situation: Situation, grip: Grip) -> float:
+def grip_time(planner: Planner, state: PlanningState, grip: Grip) -> float:
     """How long the hand's references take to the target [s].
 
     Raises:
         NotPlannable: longer than `LONGEST`.
     """
-    here, speed = situation.position[planner.robot.indices(grip.joints)], planner.gripper_speed
+    here, speed = state.position[planner.robot.indices(grip.joints)], planner.gripper_speed
     duration = float(np.max(np.abs(grip.target - here))) / speed
     if duration > LONGEST:
         message = f"with the speed of its controller, {speed:g}, the hand takes more than {LONGEST:g} s"
@@ -30,30 +30,30 @@ def grip_time(planner: Planner, situation: Situation, grip: Grip) -> float:
 
 
 def swept(
-    planner: Planner, situation: Situation, trajectory: JointTrajectory | None, grip: Grip | None
+    planner: Planner, state: PlanningState, trajectory: JointTrajectory | None, grip: Grip | None
 ) -> tuple[Array, Array]:
     """Times (k,) [s] and positions (k, n) of all moving joints while arm and hand move together."""
     robot = planner.robot
     times = np.zeros(1) if trajectory is None else trajectory.times
     if grip is not None:
-        speed, late = planner.gripper_speed, grip_time(planner, situation, grip) - times[-1]
+        speed, late = planner.gripper_speed, grip_time(planner, state, grip) - times[-1]
         more = int(np.ceil(max(0.0, late) * speed / (0.5 * RESOLUTION)))
         times = np.append(times, times[-1] + late * np.arange(1, more + 1) / max(1, more))
-    positions = np.tile(situation.position, (len(times), 1))
+    positions = np.tile(state.position, (len(times), 1))
     if trajectory is not None:
         columns = robot.indices(trajectory.names)
         positions[:, columns] = trajectory.positions[-1]
         positions[: len(trajectory.times), columns] = trajectory.positions
     if grip is not None:
         columns = robot.indices(grip.joints)
-        positions[:, columns] = ramp(situation.position[columns], grip.target, speed * times)
+        positions[:, columns] = ramp(state.position[columns], grip.target, speed * times)
         positions = np.asarray(with_mimics(robot, positions))
     return times, positions
 
 
 def refuse_collision(
     planner: Planner,
-    situation: Situation,
+    state: PlanningState,
     query: CollisionQuery,
     label: str,
     trajectory: JointTrajectory | None,
@@ -61,12 +61,12 @@ def refuse_collision(
     *,
     move: bool = False,
 ) -> None:
-    """Nothing, if the `query` finds nothing in the way of this motion, which begins in `situation`.
+    """Nothing, if the `query` finds nothing in the way of this motion, which begins in `state`.
 
     Raises:
         NotPlannable: names the pair, and the time in the motion of this `label`.
     """
-    times, positions = swept(planner, situation, trajectory, grip)
-    hit = query.check_trajectory(range(positions.shape[1]), situation.position, times, positions)
+    times, positions = swept(planner, state, trajectory, grip)
+    hit = query.check_trajectory(range(positions.shape[1]), state.position, times, positions)
     if hit is not None:
-        raise planner.refusal(situation, hit, "would come", f"at t = {hit.time:.2f} s of '{label}'", move=move)
+        raise planner.refusal(state, hit, "would come", f"at t = {hit.time:.2f} s of '{label}'", move=move)

@@ -12,7 +12,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
 from manipcli.plan.planner import ROBOT, Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 
 ALONG = 0.5
 """Cosine from which on two directions are taken for one."""
@@ -25,16 +25,16 @@ LEAST = 2e-3
 _WRITE = "`tool: {link: ..., pose: {xyz: ..., rpy: ...}}` in the robot file"
 
 
-def too_wide(planner: Planner, situation: Situation, body: str, opened: str, poses: Sequence[Transform]) -> str | None:
+def too_wide(planner: Planner, state: PlanningState, body: str, opened: str, poses: Sequence[Transform]) -> str | None:
     """A hint where fingers on both sides of the hand, in its pose `opened`, are in the body wherever the tool is to be.
 
     Args:
-        planner, situation: whose robot, and where everything is.
+        planner, state: whose robot, and where everything is.
         body: what is to be taken.
         opened: the pose of the hand.
         poses: `X_WT` that are tried.
     """
-    robot, q = planner.robot, _posed(planner, situation, opened)
+    robot, q = planner.robot, _posed(planner, state, opened)
     X_WT = planner.solver.forward(q)
     side = {
         ROBOT + link: bool((X_WT.inverse() @ planner.kinematics.forward(q, link)).p[1] > 0.0)
@@ -42,25 +42,25 @@ def too_wide(planner: Planner, situation: Situation, body: str, opened: str, pos
     }
     k = [one.name for one in planner.scene.movable].index(body)
     for goal in poses:
-        X_WO = X_WT @ goal.inverse() @ situation.bodies[k]  # the body brought to the hand, which needs no arm
-        there = replace(situation, bodies=(*situation.bodies[:k], X_WO, *situation.bodies[k + 1 :]))
+        X_WO = X_WT @ goal.inverse() @ state.bodies[k]  # the body brought to the hand, which needs no arm
+        there = replace(state, bodies=(*state.bodies[:k], X_WO, *state.bodies[k + 1 :]))
         hits = planner.grasping(there, body).every(q)
         if len({side[name] for hit in hits for name in (hit.a, hit.b) if name in side}) < 2:
             return None
     return f"'{body}' is wider than the hand opens in its pose '{opened}'"
 
 
-def _posed(planner: Planner, situation: Situation, posture: str) -> Array:
+def _posed(planner: Planner, state: PlanningState, posture: str) -> Array:
     """(n) The positions of all joints with the hand in a pose of the robot."""
     robot = planner.robot
-    pose, q = robot.pose(posture), np.array(situation.position)
+    pose, q = robot.pose(posture), np.array(state.position)
     for name, value in zip(pose.joints, pose.positions, strict=True):
         if name in planner.gripper_joints:
             q[robot.indices((name,))] = value
     return np.asarray(with_mimics(robot, q))
 
 
-def misplaced(planner: Planner, situation: Situation, opened: str, closed: str) -> str | None:
+def misplaced(planner: Planner, state: PlanningState, opened: str, closed: str) -> str | None:
     """A hint where the tool frame does not look as if it were the hand's; None where it does.
 
     A guess from the shapes of the fingers, good for a hint alone: with two poses of the hand, `opened` and `closed`,
@@ -75,7 +75,7 @@ def misplaced(planner: Planner, situation: Situation, opened: str, closed: str) 
 
     def seen(posture: str) -> tuple[Array, Array]:
         """(k, 3) the fingers' shapes, and (3,) the last link of the arm, in the tool frame."""
-        q = _posed(planner, situation, posture)
+        q = _posed(planner, state, posture)
         X_TW = planner.solver.forward(q).inverse()
         shapes = [
             (X_TW @ planner.kinematics.forward(q, link.name) @ shape.X_LS).p

@@ -13,7 +13,7 @@ from manipcli.core.geometry import Array
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.preflight.preflight import Subject
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
@@ -31,7 +31,7 @@ class Grasp:
 
     index: int
     step: str
-    end: Situation
+    end: PlanningState
     force: float
     joints: tuple[str, ...]
     target: Array
@@ -64,19 +64,19 @@ def effort_per_force(task: Task, name: str) -> float:
     return 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
 
 
-def sensible_force(task: Task, end: Situation, force: float) -> float:
+def sensible_force(task: Task, end: PlanningState, force: float) -> float:
     """[N] of a grasp, reduced to what a light object takes, so that all findings on a grasp agree."""
     return force if end.carried is None else min(force, LIGHT * task.scene.body(end.carried.body).mass)
 
 
-def touched_parts(planner: Planner, end: Situation) -> set[str]:
+def touched_parts(planner: Planner, end: PlanningState) -> set[str]:
     """The parts that touch what is carried, and itself; empty where nothing is."""
     if end.carried is None:
         return set()
     return {part for hit in planner.grasping(end, end.carried.body).every(end.position) for part in (hit.a, hit.b)}
 
 
-def closing_rate(planner: Planner, situation: Situation, name: str, touched: Collection[str]) -> float:
+def closing_rate(planner: Planner, situation: PlanningState, name: str, touched: Collection[str]) -> float:
     """How fast a joint, with those that mimic it, closes the gap between the parts that touch, at the tool's point.
 
     |dp_1/dq - dp_2/dq| of two sides, |dp/dq| of one that slides [m/rad or 1]; 0 where it is neither.

@@ -14,7 +14,7 @@ import numpy as np
 
 from manipcli.control.control_loop import ControlLoop, HandSettings, PidLoop
 from manipcli.control.controllers import CONTROLLERS
-from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import named_postures, with_mimics
@@ -65,8 +65,8 @@ class Shift:
     """
 
     joints: tuple[ControlledJoint, ...]
-    configurations: Postures
-    load: Callable[[tuple[ControlledJoint, ...]], Load]
+    configurations: Configurations
+    load: Callable[[tuple[ControlledJoint, ...]], JointSpaceLoad]
 
     @property
     def pid_efforts(self) -> tuple[ControlledJoint, ...]:
@@ -99,7 +99,7 @@ class Subject:
 
     task: Task
     made: Plan | None
-    _loads: dict[tuple[int, tuple[str, ...]], Load] = field(default_factory=dict)
+    _loads: dict[tuple[int, tuple[str, ...]], JointSpaceLoad] = field(default_factory=dict)
 
     @property
     def planned(self) -> bool:
@@ -136,14 +136,14 @@ class Subject:
         in_steps = tuple(active_in(self.task.spec.steps, Claims.of(self.task.controllers), robot))
         kinematics = Kinematics(robot, gravity=self.task.scene.gravity)
         samples = None if self.made is None else _planned(self.task, self.made)
-        named = Postures.at_rest(named_postures(robot, start_position(self.task)))
+        named = Configurations.at_rest(named_postures(robot, start_position(self.task)))
         found = []
         for number, active in enumerate(dict.fromkeys(in_steps)):
             configurations = named if samples is None else _while(samples, [there == active for there in in_steps])
 
             def load(
-                joints: tuple[ControlledJoint, ...], number: int = number, there: Postures = configurations
-            ) -> Load:
+                joints: tuple[ControlledJoint, ...], number: int = number, there: Configurations = configurations
+            ) -> JointSpaceLoad:
                 names = tuple(joint.name for joint in joints)
                 if (number, names) not in self._loads:
                     self._loads[number, names] = load_of(robot, kinematics, names, there)
@@ -227,10 +227,10 @@ def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
     return tuple(samples)
 
 
-def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Postures:
+def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Configurations:
     """Those of the steps in which they are `there`; as in the samples, the first is the time before all steps."""
     chosen = [sample for sample in samples if there[sample.step]]
-    return Postures(
+    return Configurations(
         np.array([sample.position for sample in chosen]),
         np.array([sample.velocity for sample in chosen]),
         np.array([sample.acceleration for sample in chosen]),

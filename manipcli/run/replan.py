@@ -20,7 +20,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
 from manipcli.model.collision import Carried
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain
@@ -49,7 +49,7 @@ class Measured:
         self._limits = limits
         self._physics = physics
 
-    def situation(self, believed: Situation) -> Situation:
+    def situation(self, believed: PlanningState) -> PlanningState:
         """Where everything is now.
 
         Args:
@@ -64,7 +64,7 @@ class Measured:
         bodies = [
             Transform.of(xyz=p, quat_xyzw=q) for p, q in zip(state.body_position, state.body_quat_xyzw, strict=True)
         ]
-        now = Situation(position, tuple(bodies), carried=None, closed=believed.closed, at_start=False)
+        now = PlanningState(position, tuple(bodies), carried=None, closed=believed.closed, at_start=False)
         carried = believed.carried
         if carried is None:
             return now
@@ -76,13 +76,13 @@ class Measured:
         shift = planner.kinematics.forward(position, carried.link) @ X_LO @ X_WO.inverse()
         return replace(self._shifted(now, carried.body, shift), carried=Carried(carried.body, carried.link, X_LO))
 
-    def differences(self, planned: Situation, now: Situation, step: StepSpec) -> tuple[str, ...]:
+    def differences(self, planned: PlanningState, now: PlanningState, step: StepSpec) -> tuple[str, ...]:
         """In what `now` is not what the step was `planned` for, each with how much; () where it is near enough."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
 
     def plan(
-        self, step: StepSpec, planned: Situation, now: Situation, grasps: Sequence[Array] = ()
-    ) -> tuple[StepPlan, Situation, str]:
+        self, step: StepSpec, planned: PlanningState, now: PlanningState, grasps: Sequence[Array] = ()
+    ) -> tuple[StepPlan, PlanningState, str]:
         """The plan, by none of `grasps`, of a step that was `planned` for another situation, from where things are.
 
         An arm of few joints may be able to move what is held to where it belongs and unable to turn it. Where nothing
@@ -104,7 +104,7 @@ class Measured:
                     return plan_step(self._planner, step, turned), turned, told
             raise
 
-    def _turn_left(self, planned: Situation, now: Situation) -> tuple[Situation, str] | None:
+    def _turn_left(self, planned: PlanningState, now: PlanningState) -> tuple[PlanningState, str] | None:
         """`now` with what is held turned in the hand as `planned`, and what to tell; None where the turn counts."""
         before, after = planned.carried, now.carried
         if before is None or after is None or before.body != after.body:
@@ -119,7 +119,7 @@ class Measured:
         turned = replace(self._shifted(now, after.body, shift), carried=replace(after, X_LO=X_LO))
         return turned, f"; the arm cannot undo the {_deg(turn)} by which '{after.body}' is turned in the hand"
 
-    def _shifted(self, now: Situation, body: str, shift: Transform) -> Situation:
+    def _shifted(self, now: PlanningState, body: str, shift: Transform) -> PlanningState:
         """With a body, and what lies in it, moved in the world."""
         moving = {body, *self._planner.contents(now, body)}
         names = [one.name for one in self._planner.scene.movable]
@@ -140,7 +140,7 @@ class Measured:
         lower, upper = np.transpose([joint.limits.range for joint in robot.moving_joints])
         return frozen(np.clip(position, lower, upper))
 
-    def _joints(self, planned: Situation, now: Situation) -> Iterator[str]:
+    def _joints(self, planned: PlanningState, now: PlanningState) -> Iterator[str]:
         """The joint that is furthest off. Fingers of a closed hand are where the object lets them be."""
         robot, hand = self._planner.robot, self._planner.gripper_joints
         independent = [joint.name for joint in robot.moving_joints if joint.independent]
@@ -155,7 +155,7 @@ class Measured:
                 unit = robot.joint(names[k]).unit
                 yield f"joint '{names[k]}' is at {round(here, 4):g} {unit} and not at {round(there, 4) + 0.0:g} {unit}"
 
-    def _held(self, planned: Situation, now: Situation) -> Iterator[str]:
+    def _held(self, planned: PlanningState, now: PlanningState) -> Iterator[str]:
         before, after = planned.carried, now.carried
         if before is not None and (after is None or after.body != before.body):
             away = float(np.linalg.norm(self._pose(now, before.body).p - self._pose(planned, before.body).p))
@@ -167,7 +167,7 @@ class Measured:
             if slip > self._limits.slip or turn > self._limits.rotation:
                 yield f"'{after.body}' sits {_mm(slip)} and {_deg(turn)} off in the hand"
 
-    def _bodies(self, planned: Situation, now: Situation, step: StepSpec) -> Iterator[str]:
+    def _bodies(self, planned: PlanningState, now: PlanningState, step: StepSpec) -> Iterator[str]:
         """Bodies that stand elsewhere. What lies in the container that it was planned to lie in matters to no way;
         only to a step that names it."""
         scene = self._planner.scene
@@ -183,7 +183,7 @@ class Measured:
             if away > self._limits.position or turn > self._limits.rotation:
                 yield f"'{name}' is {_mm(away)} and {_deg(turn)} from where it was to be"
 
-    def _containers(self, situation: Situation) -> dict[str, str]:
+    def _containers(self, situation: PlanningState) -> dict[str, str]:
         """In what each body lies, of those that lie in something."""
         planner = self._planner
         return {
@@ -193,11 +193,11 @@ class Measured:
             for inside in planner.contents(situation, body.name)
         }
 
-    def _pose(self, situation: Situation, name: str) -> Transform:
+    def _pose(self, situation: PlanningState, name: str) -> Transform:
         return self._planner.body_pose(situation, name)
 
 
-def after(planned: StepPlan, before: Situation, *, done: int) -> Situation:
+def after(planned: StepPlan, before: PlanningState, *, done: int) -> PlanningState:
     """What the hand is believed to hold when `done` motions of a plan that began in `before` were done, and the next
     one was not; where things are has to be measured."""
     carried, closed = before.carried, before.closed

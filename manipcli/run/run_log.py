@@ -15,8 +15,8 @@ from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.judge.verdict import Verdict
+from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.channels import ControllerChannel, Recorded, SensorChannel
 from manipcli.record.faults import RecordingFailed, RecordingRefused
@@ -75,7 +75,7 @@ def open_log(
         (CONTROLLERS, YAML, resolved(task.controllers).encode()),
         (URDF, XML, task.robot.urdf.encode()),
         (SCENE, JSON, scene_to_json(task.true.scene)),
-        (PLAN_FILE, JSON, plan.to_json()),
+        (PLAN_FILE, JSON, plan.outline.to_json()),
     ]
     recorder = Recorder(
         path,

@@ -11,13 +11,13 @@ import numpy as np
 
 from manipcli.conditions.touch import grips, held_force
 from manipcli.control.action import GoalHandle
-from manipcli.control.cut import KINDS
+from manipcli.control.saturation import KINDS
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import WorldState
-from manipcli.plan.step import Motion, Situation
+from manipcli.plan.step import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.holding import Holding
 from manipcli.run.live_conditions import Live, Probe
@@ -119,7 +119,7 @@ class StepsRun:
         except Alarmed:
             self._executor.stop()
 
-    def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: Situation) -> StepOutcome:
+    def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: PlanningState) -> StepOutcome:
         """All attempts at a step. Where a watch is broken it ends at once; that the robot is stopped then is no part of
         it."""
         began = ended = self._session.time
@@ -207,7 +207,7 @@ class StepsRun:
         values = ", ".join(f"{name} = {value}" for name, value in changed.items())
         return f"attempt {attempt} of {attempts}{f', with {values}' if values else ''}"
 
-    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: Situation, *, again: bool) -> MotionEnd:
+    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, again: bool) -> MotionEnd:
         """One attempt, planned anew where things are not as they were planned to be, or `again`."""
         before = cuts_of(self._session)
         now = self._measured.situation(self._believed)
@@ -244,7 +244,7 @@ class StepsRun:
         found = "" if anew or not differences else f"; when it began, {'; '.join(differences)}"
         return MotionEnd(end.outcome, end.text + found + _cut_since(before, self._session))
 
-    def _motions(self, step: StepSpec, planned: PlannedStep, before: Situation) -> MotionEnd:
+    def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
         texts = []
@@ -316,7 +316,7 @@ class StepsRun:
             return None
         return MotionEnd("failed", f"'{carried.body}' is no longer in the hand")
 
-    def _still_held(self, before: Situation) -> str:
+    def _still_held(self, before: PlanningState) -> str:
         """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""
         if before.carried is None or not self._physics:
             return ""

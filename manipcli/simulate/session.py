@@ -19,11 +19,10 @@ import numpy as np
 from manipcli.control.actuation import Actuation
 from manipcli.control.command import JointCommand
 from manipcli.control.controller import ControllerOutput
-from manipcli.control.cut import EFFORT
 from manipcli.control.limiter import JointLimiter, NotFinite
 from manipcli.control.manager import ControllerManager
-from manipcli.control.motors import MotorLimits
 from manipcli.control.roles import is_hand, reads_sensors
+from manipcli.control.saturation import EFFORT, MotorLimits
 from manipcli.core.errors import SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel

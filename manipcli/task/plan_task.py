@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,10 +14,11 @@ from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.model.configuration import posture
 from manipcli.plan.claims import Claims
-from manipcli.plan.grasp_backtracking import Regrasps
+from manipcli.plan.grasp_backtracking import GraspBacktracking
 from manipcli.plan.hand import SPEED, closing_speed
+from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.task import StepSpec
@@ -54,7 +54,7 @@ class Plan:
     watches were written, for the log."""
 
     steps: tuple[PlannedStep, ...]
-    start: Situation
+    start: PlanningState
     planner: Planner
     judged: tuple[str, ...] = ()
 
@@ -67,20 +67,13 @@ class Plan:
             for motion in step.plan.motions
         )
 
-    def to_json(self) -> bytes:
-        """What the log carries: ids, verbs, where steps and what is judged were written, durations, and each
-        trajectory's ends."""
-        steps = [
-            {
-                "id": step.id,
-                "verb": step.verb,
-                "place": step.place,
-                "planned_duration": step.plan.duration,
-                "motions": [_described(motion) for motion in step.plan.motions],
-            }
-            for step in self.steps
-        ]
-        return json.dumps({"steps": steps, "judged": list(self.judged)}, indent=1).encode()
+    @property
+    def outline(self) -> PlanOutline:
+        """What the log carries."""
+        return PlanOutline(
+            tuple(StepOutline(one.id, one.verb, one.place, one.plan.duration, one.plan.motions) for one in self.steps),
+            self.judged,
+        )
 
 
 def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> Plan:
@@ -94,7 +87,7 @@ def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> P
         NotPlannable: names the step and why; no later step was planned.
     """
     planner = _planner(task)
-    start = Situation(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
+    start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
     return Plan(steps=_steps(task, planner, start, doing), start=start, planner=planner, judged=judged)
 
@@ -130,15 +123,15 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
     )
 
 
-def plan_step(planner: Planner, step: StepSpec, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
     """Plan one step, by none of `grasps`; whatever refuses it is told with its id."""
     member = STEPS[step.verb]
     try:
-        if situation.at_start:
-            planner.outside(situation)
+        if state.at_start:
+            planner.outside(state)
         if grasps and member.regrasp is not None:
-            return member.regrasp(step.body, planner, situation, grasps)
-        return member.plan(step.body, planner, situation)
+            return member.regrasp(step.body, planner, state, grasps)
+        return member.plan(step.body, planner, state)
     except NotPlannable as refusal:
         raise NotPlannable(refusal.cause, step=step.id, hint=refusal.hint, loc=refusal.loc) from refusal
 
@@ -148,10 +141,10 @@ def start_position(task: Task) -> Array:
     return posture(task.robot, task.spec.start)
 
 
-def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
+def _steps(task: Task, planner: Planner, start: PlanningState, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
     """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
     done: list[PlannedStep] = []
-    regrasps = Regrasps(planner)
+    regrasps = GraspBacktracking(planner)
     while (k := len(done)) < len(task.spec.steps):
         grasps = regrasps.of(k)
         again = ", with another grasp" if grasps else ""
@@ -163,7 +156,7 @@ def _steps(task: Task, planner: Planner, start: Situation, doing: Callable[[str]
     return tuple(done)
 
 
-def _planned(task: Task, planner: Planner, k: int, start: Situation, grasps: tuple[Array, ...]) -> PlannedStep:
+def _planned(task: Task, planner: Planner, k: int, start: PlanningState, grasps: tuple[Array, ...]) -> PlannedStep:
     """Step `k` of the task, by none of `grasps`; a refusal tells where it is written."""
     step = task.spec.steps[k]
     try:
@@ -189,19 +182,3 @@ def _planner(task: Task) -> Planner:
         gripper_joints=Claims.of(task.controllers).hand,
         gripper_speed=min(speeds, default=SPEED),
     )
-
-
-def _described(motion: Motion) -> dict[str, object]:
-    described: dict[str, object] = {"label": motion.label, "duration": motion.duration}
-    if motion.trajectory is not None:
-        described["joints"] = list(motion.trajectory.names)
-        described["from"] = motion.trajectory.positions[0].tolist()
-        described["to"] = motion.trajectory.positions[-1].tolist()
-    if motion.grip is not None:
-        described["hand"] = motion.grip.target.tolist()
-        described["force"] = motion.grip.force
-    if motion.switch is not None:
-        described["switch"] = {
-            key: list(names) for key in ("to", "activate", "deactivate") if (names := getattr(motion.switch, key))
-        }
-    return described

@@ -12,7 +12,7 @@ import numpy as np
 
 from manipcli.control.control_loop import InverseDynamicsLoop, NoLoop, PidLoop
 from manipcli.control.controllers import CONTROLLERS
-from manipcli.control.reflected import Load, Postures, load_of
+from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
 from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
 from manipcli.core.errors import Finding, InvalidInput
 from manipcli.core.geometry import Array
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from manipcli.replay.curves import Chart
 
 RANDOM_POSTURES: Final = 60
-"""Postures within the limits, beside the named ones; always the same."""
+"""Configurations within the limits, beside the named ones; always the same."""
 WIDE: Final = 2.0
 """[rad or m] how far from the start a joint without limits is put."""
 HOPELESS: Final = 0.01
@@ -207,10 +207,12 @@ class _Tuner:
             self._tell_margin(margin)
         return tuned
 
-    def _load(self, joints: list[str], q: Array) -> Load:
-        return load_of(self._robot, self._kinematics, joints, Postures.at_rest(q))
+    def _load(self, joints: list[str], q: Array) -> JointSpaceLoad:
+        return load_of(self._robot, self._kinematics, joints, Configurations.at_rest(q))
 
-    def _extreme(self, joints: list[str], score: Callable[[Load], Array], postures: Array, *, starts: int = 1) -> Array:
+    def _extreme(
+        self, joints: list[str], score: Callable[[JointSpaceLoad], Array], postures: Array, *, starts: int = 1
+    ) -> Array:
         """(n) the posture in which the score of what these joints meet is largest, uphill from `postures` (T, n)."""
         return climbed(self._robot, lambda q: score(self._load(joints, q)), postures, *self._range(), starts=starts)
 
@@ -282,12 +284,12 @@ class _Tuner:
     def _step_of(self, joint: str) -> float:
         return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)
 
-    def _postures(self) -> Postures:
+    def _postures(self) -> Configurations:
         """The named ones, and some from the whole range of the joints."""
         start = posture(self._robot)
         rng = np.random.default_rng(0)
         spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
-        return Postures.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+        return Configurations.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
 
     def _range(self) -> tuple[Array, Array]:
         """(n), (n) the least and the greatest of the joints."""
@@ -302,12 +304,12 @@ def _tunable(spec: ControllerSpec) -> PidLoop | None:
     return loop if isinstance(loop, PidLoop) and loop.tunable else None
 
 
-def _inertia(k: int, load: Load) -> Array:
+def _inertia(k: int, load: JointSpaceLoad) -> Array:
     """(T,) of a joint whose others stand."""
     return load.held_inertia[:, k]
 
 
-def _lightness(k: int, load: Load) -> Array:
+def _lightness(k: int, load: JointSpaceLoad) -> Array:
     """(T,) the inverse of what the effort of a joint alone moves."""
     return np.asarray(1.0 / load.own_inertia[:, k])
 

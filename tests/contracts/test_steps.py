@@ -15,7 +15,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position
@@ -61,7 +61,7 @@ every_case = pytest.mark.parametrize("name", list(CASES))
 class Planned:
     """A case: the step planned from `before`."""
 
-    before: Situation
+    before: PlanningState
     plan: StepPlan
 
 
@@ -78,7 +78,7 @@ def make_planner(task: Task, seed: int = 3) -> Planner:
     )  # fmt: skip
 
 
-def plan(planner: Planner, step: tuple[str, Any], situation: Situation) -> StepPlan:
+def plan(planner: Planner, step: tuple[str, Any], situation: PlanningState) -> StepPlan:
     verb, spec = step
     return STEPS[verb].plan(STEPS[verb].spec.model_validate(spec), planner, situation)
 
@@ -86,8 +86,8 @@ def plan(planner: Planner, step: tuple[str, Any], situation: Situation) -> StepP
 @pytest.fixture(scope="module")
 def planned(task: Task) -> dict[str, Planned]:
     """Every case, planned once; what leads to it is planned once, too."""
-    start = Situation(start_position(task), tuple(body.X_WO for body in task.scene.movable))
-    ends: dict[str, Situation] = {"()": start}
+    start = PlanningState(start_position(task), tuple(body.X_WO for body in task.scene.movable))
+    ends: dict[str, PlanningState] = {"()": start}
     found = {}
     for name, (step, lead) in CASES.items():
         for k, prior in enumerate(lead):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from manipcli.control import JointLimiter, NotFinite, limit_effort, limit_position, limit_velocity
 from manipcli.control.command import JointCommand
-from manipcli.control.cut import EFFORT, KINDS
 from manipcli.control.limiter import SLACK
+from manipcli.control.saturation import EFFORT, KINDS
 from manipcli.core.errors import InvalidArgument
 from manipcli.description.elements import JointLimits, SoftLimits
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from manipcli.control.course import POSITION, VELOCITY, Course, Part
-from manipcli.control.reference import Feeds, Reference
+from manipcli.control.active_trajectory import POSITION, VELOCITY, ActiveTrajectory, Part, Reference
 from manipcli.control.trajectory_goal import JointFacts
 from manipcli.control.transitions import Transitions
 from manipcli.description.elements import JointLimits
@@ -25,9 +24,9 @@ def moving(position, velocity):
     """A reference that is there now."""
     still = np.zeros(len(position))
     on = JointTrajectory.of_arrays(NAMES[: len(position)], [0.0, 1.0], [position, position], [velocity, still])
-    course = Course.hold(np.array(position)).with_part(Part(slice(None), on, 0.0))
-    reference = Reference(np.zeros((3, len(position))), Feeds(("position",), velocity_scale=None))
-    reference.follow(course, course.ticks(PERIOD), time=0.0, period=PERIOD)
+    active = ActiveTrajectory.hold(np.array(position)).with_part(Part(slice(None), on, 0.0))
+    reference = Reference(np.zeros((3, len(position))), ("position",))
+    reference.follow(active, active.ticks(PERIOD), time=0.0, period=PERIOD)
     return reference
 
 

@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from manipcli.core.errors import InvalidInput
-from manipcli.judge.steps import PLAN_FILE
 from manipcli.pipeline import judge_log, run_task
+from manipcli.plan.outline import PLAN_FILE
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
 from manipcli.record.read.reading import read_recording
 

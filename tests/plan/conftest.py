@@ -17,7 +17,7 @@ from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import Group, RobotModel
 from manipcli.plan.hand import closing_speed
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, Situation, StepPlan
+from manipcli.plan.step import Motion, PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Shape
 from manipcli.task.load_task import load_task
@@ -122,7 +122,7 @@ class Bench:
             gripper_joints=() if gripper is None else gripper.joints,
             gripper_speed=1.0 if gripper is None else closing_speed(task.robot, gripper.joints, gripper.speed),
         )
-        self.start = Situation(start_position(task), tuple(body.X_WO for body in task.scene.movable))
+        self.start = PlanningState(start_position(task), tuple(body.X_WO for body in task.scene.movable))
         self.now = self.start
 
     def plan(self, verb: str, spec: object) -> StepPlan:
@@ -147,7 +147,7 @@ class Bench:
         step = STEPS[verb]
         return [(p.loc, p.message, p.hint) for p in step.check(step.spec.model_validate(spec), self.robot, self.scene)]
 
-    def body(self, name: str, situation: Situation | None = None) -> Transform:
+    def body(self, name: str, situation: PlanningState | None = None) -> Transform:
         """X_WO as predicted."""
         index = [body.name for body in self.scene.movable].index(name)
         return (self.now if situation is None else situation).bodies[index]
@@ -170,7 +170,7 @@ class Bench:
             link = joint.parent
         return self.robot.X_WB.matrix @ X
 
-    def at(self, before: Situation, plan: StepPlan, label: str) -> tuple[Situation, Motion]:
+    def at(self, before: PlanningState, plan: StepPlan, label: str) -> tuple[PlanningState, Motion]:
         """The motion of this label in the plan of a step from `before`, and where the arm is when it begins."""
         q = np.array(before.position)
         for motion in plan.motions:
@@ -180,7 +180,7 @@ class Bench:
                 q[self.robot.indices(motion.trajectory.names)] = motion.trajectory.positions[-1]
         raise AssertionError(f"no motion '{label}'")
 
-    def tools(self, before: Situation, plan: StepPlan, label: str, count: int = 40) -> Array:
+    def tools(self, before: PlanningState, plan: StepPlan, label: str, count: int = 40) -> Array:
         """X_WT (count, 4, 4) along one motion of the plan of a step from `before`."""
         start, motion = self.at(before, plan, label)
         assert motion.trajectory is not None
@@ -198,7 +198,7 @@ class Story:
     """Steps by verb, each with the situation that it was planned from."""
 
     bench: Bench
-    steps: dict[str, tuple[Situation, StepPlan]]
+    steps: dict[str, tuple[PlanningState, StepPlan]]
 
 
 @pytest.fixture(scope="session")

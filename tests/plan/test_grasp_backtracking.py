@@ -14,7 +14,7 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.pipeline import run_task
 from manipcli.plan.grasp_backtracking import MOST
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.run import replan
 from manipcli.spec.task import StepSpec
 from manipcli.task.load_task import load_task
@@ -40,7 +40,7 @@ def task_of(folder: Path, steps: str, head: str = "") -> Task:
     return load_task(file, allow_outside=True)
 
 
-def tool(plan: Plan, end: Situation) -> Array:
+def tool(plan: Plan, end: PlanningState) -> Array:
     """R_WT at the end of a step."""
     return plan.planner.tool_pose(end).R
 
@@ -63,7 +63,7 @@ def test_what_cannot_be_lifted_as_it_is_held_is_taken_otherwise(tmp_path: Path) 
     assert min(angle(used, one) for one in left) > 40.0
     # From where it is measured it is taken by none of these either, as long as it is taken by the same step.
     away = Transform.of(xyz=(0.01, -0.01, 0.0)) @ whole.start.bodies[0]
-    moved = Situation(whole.start.position, (away,))
+    moved = PlanningState(whole.start.position, (away,))
     again = plan_step(whole.planner, task_of(tmp_path, PICK).spec.steps[0], moved, left)
     assert angle(tool(whole, again.end), used) < 0.1
 
@@ -122,7 +122,7 @@ def test_a_step_that_is_tried_with_other_values_may_use_every_grasp(
 ) -> None:
     used: list[Sequence[Array]] = []
 
-    def watched(planner: Planner, step: StepSpec, now: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+    def watched(planner: Planner, step: StepSpec, now: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
         if step.verb == "pick":
             used.append(grasps)
         return plan_step(planner, step, now, grasps)

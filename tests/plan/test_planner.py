@@ -1,4 +1,4 @@
-"""The planner's answers about a situation, and what a draft accepts."""
+"""The planner's answers about a situation, and what a builder accepts."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from manipcli.core.geometry import Transform, frozen
 from manipcli.model.collision import Carried, CollisionHit
 from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
-from manipcli.plan.draft import Draft
 from manipcli.plan.hand import fingers, moved_links, ramp
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import CLEARANCE, TOUCHING, Planner
 
 Make = Callable[..., Any]  # fixtures of conftest.py: a Bench of a robot and a scene; steps already planned on one
@@ -48,11 +48,11 @@ def test_a_robot_without_tool_moves_its_joints_and_says_what_is_missing(
 ) -> None:
     alone = planner(make_arm7(), bench)
     here = replace(bench().start, position=frozen(np.zeros(9)))
-    draft = Draft(alone, here)
-    draft.joints("move", ("joint_1",), (0.3,))
-    assert draft.plan().end.position[0] == pytest.approx(0.3)
+    builder = MotionBuilder(alone, here)
+    builder.joints("move", ("joint_1",), (0.3,))
+    assert builder.plan().end.position[0] == pytest.approx(0.3)
     with pytest.raises(NotPlannable, match="robot 'arm7' has no tool frame") as refusal:
-        draft.reach("move", Transform.of(xyz=(0.5, 0.0, 0.5)))
+        builder.reach("move", Transform.of(xyz=(0.5, 0.0, 0.5)))
     assert refusal.value.hint == "add `tool: {link: ...}` to the robot file"
 
 
@@ -60,11 +60,11 @@ def test_a_robot_without_gripper_controller_says_so_when_it_is_to_grasp(bench: M
     arm = bench()
     alone = planner(arm.robot, bench)
     for act in (
-        lambda draft: draft.close("wrap", force=8.0, must_hold=True, body="cup"),
-        lambda draft: draft.open("open"),
+        lambda builder: builder.close("wrap", force=8.0, must_hold=True, body="cup"),
+        lambda builder: builder.open("open"),
     ):
         with pytest.raises(NotPlannable, match=r"pose '\w+' has no joint that a gripper controller moves"):
-            act(Draft(alone, arm.start))
+            act(MotionBuilder(alone, arm.start))
 
 
 def test_what_stands_on_something_touches_it_and_nothing_else(bench: Make, story: Story) -> None:

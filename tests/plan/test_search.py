@@ -6,9 +6,9 @@ from pydantic import TypeAdapter, ValidationError
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import frozen
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 
-PLAN = StepPlan(motions=(), end=Situation(position=frozen([0.0]), bodies=()))
+PLAN = StepPlan(motions=(), end=PlanningState(position=frozen([0.0]), bodies=()))
 
 
 def test_a_range_is_tried_from_its_middle() -> None:

@@ -15,7 +15,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepPlan
+from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.run import replan
 from manipcli.run.execute import build_manager
 from manipcli.run.replan import COMMANDED, LOST, Measured, after
@@ -60,7 +60,7 @@ class World:
     session: Session
     measured: Measured
 
-    def stand(self, situation: Situation) -> None:
+    def stand(self, situation: PlanningState) -> None:
         """Everything is as predicted."""
         state = self.session.engine.read()
         state.position[:] = situation.position
@@ -73,7 +73,7 @@ class World:
         state = self.session.engine.read()
         state.body_position[k], state.body_quat_xyzw[k] = X_WO.p, X_WO.quat_xyzw
 
-    def before(self, step: int) -> Situation:
+    def before(self, step: int) -> PlanningState:
         return self.plan.start if step == 0 else self.plan.steps[step - 1].plan.end
 
     def told(self, step: int) -> tuple[str, ...]:
@@ -193,7 +193,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
     held = before.carried
     assert held is not None
 
-    def few_joints(planner: Planner, step: StepSpec, situation: Situation, _: Sequence[Array] = ()) -> StepPlan:
+    def few_joints(planner: Planner, step: StepSpec, situation: PlanningState, _: Sequence[Array] = ()) -> StepPlan:
         assert situation.carried is not None
         if not np.allclose(situation.carried.X_LO.R, held.X_LO.R, atol=1e-9):
             raise NotPlannable("the arm has five joints")

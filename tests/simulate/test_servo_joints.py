@@ -12,7 +12,7 @@ import pytest
 from manipcli.control.command import JointCommand, Mode
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.manager import ControllerManager
-from manipcli.control.motors import MotorLimits
+from manipcli.control.saturation import MotorLimits
 from manipcli.control.stability import largest_velocity_gain
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Transform, frozen

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.control.reflected import Load
+from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.control.tuning import MARGIN, Wish, tune_efforts
 from manipcli.core.errors import InvalidInput
 from manipcli.model.kinematics import Kinematics
@@ -33,7 +33,7 @@ def test_a_mode_in_which_many_joints_share_alike_is_calmed_too() -> None:
     """Six joints that push at one light link: each has a sixth of the mode that is unstable."""
     n = 6
     mass = 0.01 * (np.eye(n) - 0.16 * np.ones((n, n)))
-    load = Load(
+    load = JointSpaceLoad(
         joints=tuple(f"j{k}" for k in range(n)), mass=mass[None], gravity=np.zeros((1, n)), needed=np.zeros((1, n)),
         damping=np.zeros(n), effort=np.full(n, 1e3), latency=(0,) * n,
     )  # fmt: skip

@@ -32,7 +32,7 @@ from manipcli.control.control_loop import ControlLoop, NoLoop, PidLoop
 from manipcli.control.controller import ControllerMember, FeedForward, Fit
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.trajectory_controller import JointTrajectoryController
-from manipcli.control.trajectory_interfaces import controlled_by_error, refused
+from manipcli.control.trajectory_goal import controlled_by_error, refused
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.controllers import ConstraintsSpec, ControllerSpec, GainsSpec, Interface, Role

@@ -19,11 +19,11 @@ from manipcli.conditions.condition import Problem
 from manipcli.core.errors import NotPlannable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unfollowed
-from manipcli.plan.draft import Draft
 from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_joint
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
 from manipcli.plan.verify import verify_written
 from manipcli.scene.scene import Scene
@@ -116,15 +116,15 @@ class FollowSpec(Model):
         return self
 
 
-def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
-    """The points as they are, from the situation on; those of continuous joints by whole turns nearer to it.
+def plan(spec: FollowSpec, planner: Planner, state: PlanningState) -> StepPlan:
+    """The points as they are, from the state on; those of continuous joints by whole turns nearer to it.
 
     Raises:
         NotPlannable: a limit is left (names joint, value, limit and time), something is in the way, or a first point at
             0 s is not where the robot is.
     """
     names = spec.joint_names
-    start = situation.position[planner.robot.indices(names)]
+    start = state.position[planner.robot.indices(names)]
     for k, point in enumerate(spec.points):
         written = [(names[i], value, ("points", k, "positions", i)) for i, value in enumerate(point.positions)]
         verify_written(planner.robot, written, when=f" at t = {point.seconds:.3f} s")
@@ -147,9 +147,9 @@ def plan(spec: FollowSpec, planner: Planner, situation: Situation) -> StepPlan:
             )
         points[0] = replace(points[0], positions=start)
     trajectory = JointTrajectory(names, points, TrajectoryPoint(start))
-    draft = Draft(planner, situation, verb="follow")
-    draft.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
-    return draft.plan()
+    builder = MotionBuilder(planner, state, verb="follow")
+    builder.follow("follow", trajectory, limits=_limits(planner.robot, trajectory))
+    return builder.plan()
 
 
 def _limits(robot: RobotModel, trajectory: JointTrajectory) -> MotionLimits:

@@ -12,10 +12,10 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import Force
@@ -42,17 +42,17 @@ class GraspSpec(Model):
     )
 
 
-def plan(spec: GraspSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: GraspSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion of the hand.
 
     Raises:
         NotPlannable: the hand holds something already, or would not touch the object.
     """
     if spec.object is not None:
-        planner.free_hand(situation, spec.object)
-    draft = Draft(planner, situation)
-    draft.close(spec.posture, force=spec.force, must_hold=spec.until == "contact", body=spec.object)
-    return draft.plan()
+        planner.free_hand(state, spec.object)
+    builder = MotionBuilder(planner, state)
+    builder.close(spec.posture, force=spec.force, must_hold=spec.until == "contact", body=spec.object)
+    return builder.plan()
 
 
 def check(spec: GraspSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

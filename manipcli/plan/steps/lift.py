@@ -14,10 +14,10 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
@@ -35,19 +35,19 @@ class LiftSpec(Model):
     velocity_scaling: VelocityScaling = 0.5
 
 
-def plan(spec: LiftSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: LiftSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """A straight line of the tool, its orientation kept."""
-    planner.held(situation, spec.object)
-    under = planner.touching(situation, spec.object)
+    planner.held(state, spec.object)
+    under = planner.touching(state, spec.object)
 
     def attempt(height: float) -> StepPlan:
-        draft = Draft(planner, situation, verb="lift")
+        builder = MotionBuilder(planner, state, verb="lift")
         up = Transform.of(xyz=(0.0, 0.0, height))
         try:
-            draft.straight("lift", up @ planner.tool_pose(situation), speed=spec.velocity_scaling, allowed=under)
+            builder.straight("lift", up @ planner.tool_pose(state), speed=spec.velocity_scaling, allowed=under)
         except NotPlannable as refusal:
             raise NotPlannable(refusal.cause, hint=_LESS if refusal.reason == "line" else refusal.hint) from refusal
-        return draft.plan()
+        return builder.plan()
 
     return first_feasible(attempt, spread(spec.by), what=f"no height to lift '{spec.object}' by")
 

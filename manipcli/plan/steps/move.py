@@ -22,12 +22,12 @@ from manipcli.conditions.condition import Problem, unknown_body
 from manipcli.core.geometry import Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_joints, unmoved_tool
-from manipcli.plan.draft import Draft
 from manipcli.plan.inverse_kinematics import Open, pointed
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_frame, unknown_joint, unknown_pose
 from manipcli.plan.planner import NOTHING, Planner
 from manipcli.plan.prediction import met, pushed
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.verify import verify_written
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, problem
@@ -109,42 +109,42 @@ class MoveSpec(Model):
         return self
 
 
-def plan(spec: MoveSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: MoveSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion; a named pose that includes the hand moves the hand at the same time, unless it was closed."""
-    allowed = planner.may_touch(situation, spec.touch) if spec.touch else NOTHING
-    draft = Draft(planner, situation, verb="move", allowed=allowed)
+    allowed = planner.may_touch(state, spec.touch) if spec.touch else NOTHING
+    builder = MotionBuilder(planner, state, verb="move", allowed=allowed)
     if isinstance(spec.to, str):
         pose = planner.robot.pose(spec.to)
         values = dict(zip(pose.joints, pose.positions, strict=True))
         arm = {name: value for name, value in values.items() if name not in planner.gripper_joints}
-        chosen = arm if situation.closed and arm else values
-        draft.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
+        chosen = arm if state.closed and arm else values
+        builder.joints("move", tuple(chosen), tuple(chosen.values()), speed=spec.velocity_scaling)
     elif spec.to is not None:
         verify_written(planner.robot, [(name, value, ("to", name)) for name, value in spec.to.items()])
-        draft.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
+        builder.joints("move", tuple(spec.to), tuple(spec.to.values()), speed=spec.velocity_scaling)
     else:
-        X_WT, leaving = _goal(spec, planner, situation)
+        X_WT, leaving = _goal(spec, planner, state)
         if spec.path == "linear":
-            draft.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
+            builder.straight("move", X_WT, speed=spec.velocity_scaling, leaving=leaving)
         else:
-            draft.reach("move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving)
-    planned = draft.plan()
+            builder.reach("move", X_WT, speed=spec.velocity_scaling, free=spec.path == "free", leaving=leaving)
+    planned = builder.plan()
     (motion,) = planned.motions
     end = planned.end
     if spec.touch and motion.trajectory is not None:
         if spec.guarded:
-            end = met(planner, situation, end, motion.trajectory, allowed)
+            end = met(planner, state, end, motion.trajectory, allowed)
         else:
-            end = pushed(planner, situation, end, motion.trajectory, spec.touch)
+            end = pushed(planner, state, end, motion.trajectory, spec.touch)
     return StepPlan((replace(motion, awaits=spec.guarded, guarded=spec.guarded),), end)
 
 
-def _goal(spec: MoveSpec, planner: Planner, situation: Situation) -> tuple[Transform, Open]:
+def _goal(spec: MoveSpec, planner: Planner, state: PlanningState) -> tuple[Transform, Open]:
     """X_WT, and what of its orientation does not count: there it is as now, or the nearest that points as asked."""
-    X_WF = planner.frame(spec.frame, situation)
+    X_WF = planner.frame(spec.frame, state)
     if spec.pose is not None:
         return X_WF @ spec.pose.transform, "nothing"
-    R = planner.tool_pose(situation).R
+    R = planner.tool_pose(state).R
     p = X_WF.apply(spec.point or ())
     if spec.pointing is None:
         return Transform.of(xyz=p, R=R), "turn"
@@ -171,9 +171,6 @@ def uncommanded(spec: MoveSpec, robot: RobotModel, claims: Claims) -> tuple[Prob
     return unmoved_tool(claims, robot, ("pose",) if spec.pose is not None else ("point",))
 
 
-def guarded(spec: MoveSpec) -> bool:
-    """As it is written."""
-    return spec.guarded
-
-
-MEMBER = StepMember(name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=guarded)
+MEMBER = StepMember(
+    name="move", spec=MoveSpec, plan=plan, check=check, uncommanded=uncommanded, guarded=lambda spec: spec.guarded
+)

@@ -19,11 +19,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.steps.grasp import GraspSpec
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.tool_axes import misplaced, too_wide
@@ -111,22 +111,22 @@ class PickSpec(Model):
     )
 
 
-def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequence[Array] = ()) -> StepPlan:
+def plan(spec: PickSpec, planner: Planner, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
     """The first of the candidate directions, rolls, distances and slopes that is reachable and free; with the tool
     turned clearly away from those of `grasps`, R_WT (3, 3) each.
 
     Raises:
         NotPlannable: the hand holds something already, or no candidate is possible.
     """
-    planner.free_hand(situation, spec.object)
-    before = _clear(spec, planner, situation)
-    situation = before.end
-    planner.free_start(situation)
-    X_WO = planner.body_pose(situation, spec.object)
+    planner.free_hand(state, spec.object)
+    before = _clear(spec, planner, state)
+    state = before.end
+    planner.free_start(state)
+    X_WO = planner.body_pose(state, spec.object)
     body = planner.scene.body(spec.object)
     bottom = body.centre[2] - body.size[2] / 2
     height = body.centre[2] if spec.grasp.height is None else bottom + spec.grasp.height
-    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(situation).R)
+    turns = _orientations(spec.approach, X_WO, planner.robot.X_WB, planner.tool_pose(state).R)
     goals = [(height, R_WT) for R_WT in turns]
     if spec.grasp.height is None and body.kind != "sphere" and X_WO.R[2, 2] > UPRIGHT:
         from_above = [R_WT for R_WT in turns if R_WT[2, 2] < -UPRIGHT]
@@ -140,9 +140,9 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequenc
     def attempt(candidate: tuple[int, float, float]) -> StepPlan:
         k, distance, slope = candidate
         X_WG = tool_at(k)
-        draft = Draft(planner, situation)
+        builder = MotionBuilder(planner, state)
         if k not in out_of_reach:  # said once for all distances and slopes, which it does not depend on
-            out_of_reach[k] = draft.unreachable("approach", X_WG, hand=spec.open)
+            out_of_reach[k] = builder.unreachable("approach", X_WG, hand=spec.open)
         refusal = out_of_reach[k]
         if refusal is not None:
             hint = f"move '{spec.object}', or {_OTHERWISE}"
@@ -150,16 +150,16 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequenc
                 others = [word for word in get_args(Direction) if spec.approach.direction not in (None, word)]
                 hint = "; or say ".join([_AIM, *(f"`approach: {{from: {word}}}`" for word in others)])
             raise NotPlannable(refusal.cause, hint=hint)
-        draft.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
-        draft.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
-        draft.close(
+        builder.reach("reach", backed_off(X_WG, distance, slope), speed=spec.velocity_scaling, hand=spec.open)
+        builder.straight("approach", X_WG, speed=spec.velocity_scaling / 2)
+        builder.close(
             spec.grasp.posture,
             force=spec.grasp.force,
             must_hold=spec.grasp.until == "contact",
             body=spec.object,
             roomier=_HIGHER,
         )
-        planned = draft.plan()
+        planned = builder.plan()
         return replace(planned, motions=(*before.motions, *planned.motions))
 
     def candidates() -> Iterator[tuple[int, float, float]]:
@@ -173,23 +173,23 @@ def plan(spec: PickSpec, planner: Planner, situation: Situation, grasps: Sequenc
     try:
         return first_feasible(attempt, candidates(), what=f"no way to pick '{spec.object}'")
     except NotPlannable as refusal:
-        amiss = misplaced(planner, situation, spec.open, spec.grasp.posture)
-        wide = too_wide(planner, situation, spec.object, spec.open, [tool_at(k) for k in range(len(turns))])
+        amiss = misplaced(planner, state, spec.open, spec.grasp.posture)
+        wide = too_wide(planner, state, spec.object, spec.open, [tool_at(k) for k in range(len(turns))])
         hints = [hint for hint in (amiss or wide, refusal.hint) if hint is not None]
         raise NotPlannable(refusal.cause, hint="; or ".join(hints) or None) from refusal
 
 
-def _clear(spec: PickSpec, planner: Planner, situation: Situation) -> StepPlan:
+def _clear(spec: PickSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """Away from the object, if the hand is around it or at it, after a grasp that failed; else nothing."""
-    if planner.distance(situation, spec.object) >= CLEARANCE:
-        return StepPlan((), situation)
+    if planner.distance(state, spec.object) >= CLEARANCE:
+        return StepPlan((), state)
 
     def attempt(candidate: tuple[float, float]) -> StepPlan:
-        draft = Draft(planner, situation)
-        draft.open(spec.open, around=spec.object)
-        X_WT = backed_off(planner.tool_pose(situation), *candidate)
-        draft.withdraw(X_WT, spec.object, speed=spec.velocity_scaling / 2, grazing=True)
-        return draft.plan()
+        builder = MotionBuilder(planner, state)
+        builder.open(spec.open, around=spec.object)
+        X_WT = backed_off(planner.tool_pose(state), *candidate)
+        builder.withdraw(X_WT, spec.object, speed=spec.velocity_scaling / 2, grazing=True)
+        return builder.plan()
 
     ways = itertools.product(spread(spec.approach.distance), slopes())
     return first_feasible(attempt, ways, what=f"no way back from '{spec.object}'")

@@ -20,12 +20,12 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_hand, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import CLEARANCE, Planner
 from manipcli.plan.prediction import put
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.plan.steps.pick import backed_off, slopes
 from manipcli.scene.drop_test import FORMED, landing
@@ -80,30 +80,30 @@ class PlaceSpec(Model):
     )
 
 
-def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: PlaceSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """The object stands upright; at [x, y] it keeps the turn about the vertical in which it is held, or gets `yaw`.
 
     Ways on which the hand withdraws clear of the object are looked for first, then those on which it may graze it; the
     latter alone where the open hand is too near to it anyhow, as around one that sits deep in it. Where the arm would
     come too near to something, the object is put down a little tilted, the arm higher: it stands up when let go.
     """
-    planner.held(situation, spec.object)
-    planner.free_start(situation)
-    X_WG = _goal(spec, planner, situation)
-    X_OT = planner.held_in_tool(situation).inverse()
-    lowered: dict[tuple[float, float], Draft | NotPlannable] = {}
+    planner.held(state, spec.object)
+    planner.free_start(state)
+    X_WG = _goal(spec, planner, state)
+    X_OT = planner.held_in_tool(state).inverse()
+    lowered: dict[tuple[float, float], MotionBuilder | NotPlannable] = {}
 
-    def lower(tilt: float, clearance: float) -> Draft:
+    def lower(tilt: float, clearance: float) -> MotionBuilder:
         """Down at the place; found once for all ways to withdraw."""
         X_WL = _tilted(planner.scene.body(spec.object), X_WG, X_OT, tilt)
         X_WT = X_WL @ X_OT
-        draft = Draft(planner, situation)
+        builder = MotionBuilder(planner, state)
         with _hinted(_OVER):
-            draft.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
-        support = planner.touching(draft.with_body(spec.object, X_WL), spec.object)
+            builder.straight("carry", Transform.of(xyz=(0.0, 0.0, clearance)) @ X_WT, speed=spec.velocity_scaling)
+        support = planner.touching(builder.with_body(spec.object, X_WL), spec.object)
         with _hinted(_LOWER):
-            draft.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
-        return draft
+            builder.straight("lower", X_WT, speed=spec.velocity_scaling / 2, allowed=support)
+        return builder
 
     def attempt(candidate: tuple[float, bool, float, float, float]) -> StepPlan:
         tilt, grazing, clearance, retreat, slope = candidate
@@ -115,15 +115,15 @@ def plan(spec: PlaceSpec, planner: Planner, situation: Situation) -> StepPlan:
         down = lowered[tilt, clearance]
         if isinstance(down, NotPlannable):
             raise NotPlannable(down.cause, hint=down.hint)
-        draft = down.copy()
+        builder = down.copy()
         with _hinted(_ROOMIER):
-            draft.open(spec.posture, must_arrive=True)
-        X_WT = planner.tool_pose(draft.now)
-        draft.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
-        planned = draft.plan()
+            builder.open(spec.posture, must_arrive=True)
+        X_WT = planner.tool_pose(builder.now)
+        builder.withdraw(backed_off(X_WT, retreat, slope), spec.object, speed=spec.velocity_scaling, grazing=grazing)
+        planned = builder.plan()
         return replace(planned, end=put(planner, planned.end, {spec.object: X_WG}))
 
-    near = planner.distance(Draft(planner, situation).let_go(spec.posture), spec.object) < CLEARANCE
+    near = planner.distance(MotionBuilder(planner, state).let_go(spec.posture), spec.object) < CLEARANCE
     ways = spread(spec.clearance), spread(spec.retreat), [slopes()[k] for k in (1, 2, 0)]
     tilts = TILTS if X_WG.R[2, 2] > UPRIGHT and _horizontal(X_WG @ X_OT) is not None else TILTS[:1]
     candidates = itertools.product(tilts, (True,) if near else (False, True), *ways)
@@ -164,13 +164,13 @@ def _tilted(body: Body, X_WG: Transform, X_OT: Transform, tilt: float) -> Transf
     return about @ X_WG
 
 
-def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
+def _goal(spec: PlaceSpec, planner: Planner, state: PlanningState) -> Transform:
     """X_WG: where the object's frame is to stand."""
     body = planner.scene.body(spec.object)
     if spec.at == "start":
         return body.X_WO
     assert spec.onto is not None  # `check` asks for it
-    X_WU = planner.body_pose(situation, spec.onto)
+    X_WU = planner.body_pose(state, spec.onto)
     under = planner.scene.body(spec.onto)
     if X_WU.R[2, 2] < UPRIGHT:
         raise NotPlannable(f"'{spec.object}' cannot be placed on '{spec.onto}', which is tilted", loc=("onto",))
@@ -184,7 +184,7 @@ def _goal(spec: PlaceSpec, planner: Planner, situation: Situation) -> Transform:
             loc=("at",),
         )
     bottom = float(body.centre[2] - body.size[2] / 2)
-    x_axis = planner.body_pose(situation, spec.object).R[:, 0]
+    x_axis = planner.body_pose(state, spec.object).R[:, 0]
     yaw = float(np.arctan2(x_axis[1], x_axis[0])) if spec.yaw is None else spec.yaw
     X_WG = Transform.of(xyz=(*spec.at, X_WU.p[2] + floor - bottom), rpy=(0.0, 0.0, yaw))
     if under.kind not in FORMED:

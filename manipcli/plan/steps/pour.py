@@ -27,10 +27,10 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_tool
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model
@@ -56,15 +56,15 @@ class PourSpec(Model):
     )
 
 
-def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: PourSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """The first of the candidate directions, senses and clearances that is reachable and free."""
-    planner.held(situation, spec.object)
-    planner.free_start(situation)
+    planner.held(state, spec.object)
+    planner.free_start(state)
     body = planner.scene.body(spec.object)
-    X_TO = planner.held_in_tool(situation)
-    R_WT = _righted(planner.body_pose(situation, spec.object).R) @ planner.tool_pose(situation).R
+    X_TO = planner.held_in_tool(state)
+    R_WT = _righted(planner.body_pose(state, spec.object).R) @ planner.tool_pose(state).R
     receiver = planner.scene.body(spec.into)
-    X_WR = planner.body_pose(situation, spec.into)
+    X_WR = planner.body_pose(state, spec.into)
     mouth = X_WR.apply([receiver.centre[0], receiver.centre[1], receiver.centre[2] + receiver.size[2] / 2])
 
     def attempt(candidate: tuple[float, float, float]) -> StepPlan:
@@ -75,17 +75,17 @@ def plan(spec: PourSpec, planner: Planner, situation: Situation) -> StepPlan:
         lip = mouth + clearance * UP
         R_tilt = matrix_from_axis_angle(a, theta)
         p_WT = lip - R_tilt @ (_lip(body, R_WT0 @ X_TO.R, sense * np.cross(a, UP)) + R_WT0 @ X_TO.p)
-        draft = Draft(planner, situation)
-        draft.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
-        draft.turn("tilt", a, theta, speed=spec.velocity_scaling)
-        draft.dwell("dwell", spec.dwell)
+        builder = MotionBuilder(planner, state)
+        builder.straight("carry", Transform.of(xyz=p_WT, R=R_WT0), speed=spec.velocity_scaling)
+        builder.turn("tilt", a, theta, speed=spec.velocity_scaling)
+        builder.dwell("dwell", spec.dwell)
         if spec.tilt > math.pi / 2:
-            draft.spill(spec.into)
-        draft.back("tilt back")
-        return draft.plan()
+            builder.spill(spec.into)
+        builder.back("tilt back")
+        return builder.plan()
 
     candidates = itertools.product(
-        spread(spec.clearance), (math.radians(turn) for turn in TURNS_DEG), _senses(planner, situation, mouth, R_WT)
+        spread(spec.clearance), (math.radians(turn) for turn in TURNS_DEG), _senses(planner, state, mouth, R_WT)
     )
     return first_feasible(attempt, candidates, what=f"no way to pour from '{spec.object}' into '{spec.into}'")
 
@@ -99,10 +99,10 @@ def _horizontal_axis(R_WT: Array) -> Array:
     raise NotPlannable("no axis of the tool is horizontal, so the cup cannot be tilted about one")
 
 
-def _senses(planner: Planner, situation: Situation, mouth: Array, R_WT: Array) -> tuple[float, float]:
+def _senses(planner: Planner, state: PlanningState, mouth: Array, R_WT: Array) -> tuple[float, float]:
     """Tipping towards the receiver first."""
     w = np.cross(_horizontal_axis(R_WT), UP)
-    towards = mouth - planner.tool_pose(situation).p
+    towards = mouth - planner.tool_pose(state).p
     sense = 1.0 if float(towards @ w) >= 0.0 else -1.0
     return (sense, -sense)
 

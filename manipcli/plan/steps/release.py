@@ -10,10 +10,10 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_hand
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_posture
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepMember, StepPlan
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model
 
@@ -24,11 +24,11 @@ class ReleaseSpec(Model):
     posture: str = Field("open", description="The named pose that the hand opens to.")
 
 
-def plan(spec: ReleaseSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: ReleaseSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion of the hand."""
-    draft = Draft(planner, situation)
-    draft.open(spec.posture, must_arrive=True)
-    return draft.plan()
+    builder = MotionBuilder(planner, state)
+    builder.open(spec.posture, must_arrive=True)
+    return builder.plan()
 
 
 def check(spec: ReleaseSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

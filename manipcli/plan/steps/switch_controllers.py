@@ -18,7 +18,7 @@ from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unknown_controller
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, Situation, StepMember, StepPlan, Strictness, Switch
+from manipcli.plan.step import Motion, PlanningState, StepMember, StepPlan, Strictness, Switch
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
 
@@ -71,10 +71,10 @@ def request(spec: SwitchControllersSpec) -> Switch:
     return Switch(to=spec.to, activate=spec.activate, deactivate=spec.deactivate, strictness=spec.strictness)
 
 
-def plan(spec: SwitchControllersSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: SwitchControllersSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion that takes no time."""
     motion = Motion("switch", trajectory=None, grip=None, duration=0.0, switch=request(spec))
-    return StepPlan((motion,), situation)
+    return StepPlan((motion,), state)
 
 
 def check(spec: SwitchControllersSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:

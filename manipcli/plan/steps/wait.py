@@ -12,13 +12,9 @@ from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.conditions.condition import Problem
-from manipcli.model.robot import RobotModel
-from manipcli.plan.claims import Claims
-from manipcli.plan.draft import Draft
+from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation, StepMember, StepPlan
-from manipcli.scene.scene import Scene
+from manipcli.plan.step import PlanningState, StepMember, StepPlan
 from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Pause, Time
 
@@ -39,21 +35,11 @@ class WaitSpec(Model):
         return or_short(schema, handler, TypeAdapter(Time).json_schema() | {"minimum": 0, "maximum": 3600})
 
 
-def plan(spec: WaitSpec, planner: Planner, situation: Situation) -> StepPlan:
+def plan(spec: WaitSpec, planner: Planner, state: PlanningState) -> StepPlan:
     """One motion that commands nothing."""
-    draft = Draft(planner, situation)
-    draft.dwell("wait", spec.duration)
-    return draft.plan()
+    builder = MotionBuilder(planner, state)
+    builder.dwell("wait", spec.duration)
+    return builder.plan()
 
 
-def check(spec: WaitSpec, robot: RobotModel, scene: Scene) -> tuple[Problem, ...]:
-    """Nothing in it can be unknown."""
-    return ()
-
-
-def uncommanded(spec: WaitSpec, robot: RobotModel, claims: Claims) -> tuple[Problem, ...]:
-    """It commands nothing."""
-    return ()
-
-
-MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=check, uncommanded=uncommanded)
+MEMBER = StepMember(name="wait", spec=WaitSpec, plan=plan, check=lambda *_: (), uncommanded=lambda *_: ())

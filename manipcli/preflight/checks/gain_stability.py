@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.control.reflected import Load
+from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.control.stability import (
     RINGING,
     Loop,
@@ -122,7 +122,7 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
 
 
 def _together(
-    joints: tuple[ControlledJoint, ...], gains: list[GainsSpec], load: Load, period: float, substeps: int
+    joints: tuple[ControlledJoint, ...], gains: list[GainsSpec], load: JointSpaceLoad, period: float, substeps: int
 ) -> Iterator[tuple[str, Finding]]:
     """Loops that are stable alone and not together, at the configurations in which they are tightest."""
     if any(joint.ticks != 1 for joint in joints):

@@ -14,7 +14,7 @@ from manipcli.core.units import readable
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Situation
+from manipcli.plan.step import PlanningState
 from manipcli.preflight.grips import (
     NUDGE,
     grasps,
@@ -74,7 +74,7 @@ def _held_force(subject: Subject, name: str, force: float) -> float:
     return most if by_position else min(force, most)
 
 
-def _between_two(planner: Planner, end: Situation, joints: tuple[str, ...], down: Array) -> bool:
+def _between_two(planner: Planner, end: PlanningState, joints: tuple[str, ...], down: Array) -> bool:
     """Whether two links that slide, level and against each other, touch what is carried, and nothing else does."""
     robot, kinematics = planner.robot, planner.kinematics
     if any(robot.joint(name).type != "prismatic" for name in joints):

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.control_loop import PidLoop
-from manipcli.control.reflected import Load
+from manipcli.control.joint_space_load import JointSpaceLoad
 from manipcli.core.errors import Finding, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits, told_apart
@@ -47,7 +47,7 @@ def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
 
 
 def _of_joint(
-    robot: RobotModel, joint: ControlledJoint, load: Load, k: int, velocity: Array, planned: bool
+    robot: RobotModel, joint: ControlledJoint, load: JointSpaceLoad, k: int, velocity: Array, planned: bool
 ) -> Iterator[Finding]:
     """Args: `k`: number of the joint in the load; `velocity`: (T,) its own there [rad/s or m/s]."""
     gravity, needed = load.gravity[:, k], load.needed[:, k]

@@ -24,9 +24,9 @@ from manipcli.simulate.engines.pybullet_contacts import (
     ContactWatch,
     Vector,
 )
-from manipcli.simulate.engines.pybullet_flywheels import add_flywheels
 from manipcli.simulate.engines.pybullet_motors import Motors
 from manipcli.simulate.engines.pybullet_readback import differences
+from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia
 from manipcli.simulate.engines.pybullet_world import add_body, centre, couple_mimics
 from manipcli.simulate.engines.pybullet_wrench import WrenchSensors
 from manipcli.simulate.quiet import silence, stdout_to_stderr
@@ -125,7 +125,7 @@ class PybulletEngine:
         for k, position in zip(self._joints, settings.start, strict=True):
             p.resetJointState(self._robot, k, float(position), 0.0, physicsClientId=client)
         couple_mimics(p, client, robot, self._robot, self._joints)
-        add_flywheels(p, client, robot, self._robot, self._joints, step=settings.step)
+        add_rotor_inertia(p, client, robot, self._robot, self._joints, step=settings.step)
         self._motors = Motors(p, client, self._robot, self._joints, robot, settings.step)
 
     def read(self, *, velocities: bool = True) -> WorldState:

@@ -1,4 +1,5 @@
-"""Motions in the making: each verb plans one from where the last ended, timed, verified and free of collisions."""
+"""Builder of the motions of a step: each method adds one that starts where the last ended: timed, verified and free of
+collisions."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import LONGEST
-from manipcli.plan.step import CLOSING, Grip, Motion, Situation, StepPlan
+from manipcli.plan.step import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify
@@ -31,44 +32,44 @@ GRAZE = 1e-4
 """[m] by which a finger that withdraws may come nearer than it was: rounding, and the arm's own curve."""
 
 
-class Draft:
+class MotionBuilder:
     """The motions of one step. What refuses one is told with its label, unless the step has no other."""
 
-    def __init__(self, planner: Planner, situation: Situation, *, verb: str = "", allowed: Pairs = NOTHING) -> None:
+    def __init__(self, planner: Planner, state: PlanningState, *, verb: str = "", allowed: Pairs = NOTHING) -> None:
         """
         Args:
             planner: what to plan with.
-            situation: where the first motion begins.
+            state: where the first motion begins.
             verb: of the step; a motion of this label is the step itself.
             allowed: pairs that may touch in all motions.
         """
         self._planner = planner
-        self._now = situation
+        self._now = state
         self._verb = verb
         self._allowed = allowed
         self._motions: list[Motion] = []
 
     @property
-    def now(self) -> Situation:
+    def now(self) -> PlanningState:
         """Where the motions so far lead."""
         return self._now
 
     def plan(self) -> StepPlan:
-        """What was drafted."""
+        """The motions so far, and where they lead."""
         return StepPlan(motions=tuple(self._motions), end=self._now)
 
-    def copy(self) -> Draft:
+    def copy(self) -> MotionBuilder:
         """To go on from here in several ways."""
-        other = Draft(self._planner, self._now, verb=self._verb, allowed=self._allowed)
+        other = MotionBuilder(self._planner, self._now, verb=self._verb, allowed=self._allowed)
         other._motions = [*self._motions]
         return other
 
-    def with_body(self, name: str, X_WO: Transform) -> Situation:
-        """The present situation, with one body put elsewhere."""
+    def with_body(self, name: str, X_WO: Transform) -> PlanningState:
+        """The present state, with one body put elsewhere."""
         return put(self._planner, self._now, {name: X_WO})
 
-    def let_go(self, posture: str) -> Situation:
-        """The present situation with the hand at a pose, and empty; whatever is in the way of its joints."""
+    def let_go(self, posture: str) -> PlanningState:
+        """The present state with the hand at a pose, and empty; whatever is in the way of its joints."""
         grip = self._grip(self._posture(posture))
         empty = replace(self._now, carried=None, closed=False)
         return empty if grip is None else empty.moved(self._with(grip.joints, grip.target))
@@ -97,7 +98,7 @@ class Draft:
     def unreachable(self, label: str, X_WT: Transform, *, hand: str) -> NotPlannable | None:
         """Why no posture of the arm has the tool there, nothing touched and the hand in its pose `hand`; None if one.
 
-        Nothing is drafted: this asks, before a way is planned, whether its end can be reached at all.
+        Adds no motion: it tells, before a path is planned, whether its end can be reached at all.
         """
         try:
             with self._told(label):
@@ -173,7 +174,9 @@ class Draft:
         Limits are symmetric and what was passed freely is free on the way back, so nothing is planned or checked anew.
         """
         done = next(motion.trajectory for motion in reversed(self._motions) if motion.trajectory is not None)
-        assert done.velocities is not None and done.accelerations is not None  # every drafted one but `follow` has both
+        assert (
+            done.velocities is not None and done.accelerations is not None
+        )  # every motion but those of `follow` has both
         trajectory = JointTrajectory.of_arrays(
             names=done.names, times=done.times, positions=frozen(done.positions[::-1]),
             velocities=frozen(-done.velocities[::-1]), accelerations=frozen(done.accelerations[::-1]),
@@ -330,10 +333,9 @@ class Draft:
     def _straight(
         self, X_WT: Transform, speed: float, *, insist: bool = False, leaving: Open = "nothing"
     ) -> JointTrajectory:
-        def walk(solver: InverseKinematics) -> Array:
-            return linear_path(solver, self._now.position, X_WT)
-
-        return self._timed(walk, speed, insist=insist, leaving=leaving)
+        return self._timed(
+            lambda solver: linear_path(solver, self._now.position, X_WT), speed, insist=insist, leaving=leaving
+        )
 
     def _timed(self, walk: Walk, speed: float, *, insist: bool = False, leaving: Open = "nothing") -> JointTrajectory:
         limits = self._limits(self._planner.solver.joints, speed)

@@ -1,16 +1,15 @@
-"""Flywheels in Bullet: the rotors of actuators, as its joints know no inertia of their own, and damping that is stiff.
+"""Rotor inertia of actuators, and stiff joint damping, in Bullet: its joints have no inertia of their own.
 
-Each rotor is a flywheel that stands fixed in the world, geared one to one to its joint: it takes part in what the joint
-accelerates and in nothing else, no weight and no gyroscopic effect, and being a constraint it is stable whatever its
-inertia.
+Each rotor is a separate body, fixed in the world and geared one to one to its joint. It adds to what accelerates the
+joint and to nothing else: no weight, no gyroscopic effect. As a constraint it is stable for any inertia.
 
-Bullet takes the damping B of joints from the velocity v before a step h, which runs away where it takes away more than
-all of it. With what is before the step on the right, and v' after it, what is wanted is
+Bullet takes the damping B of joints from the velocity v before a step h, which diverges where h B exceeds the inertia.
+Instead, with v' after the step,
 
     M v' = M v + h tau - h B v'    or    (M + h B) v' = (M v + h tau) + (h B v - h B v):
 
-a flywheel of inertia h b whose own damping b stops it in every step. It is stable whatever b, and comes to the same
-speed under a constant effort (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.3: implicit Euler).
+a rotor of inertia h b whose own damping b stops it in every step. It is stable for any b, and reaches the same speed
+under a constant effort (Hairer, Wanner, Solving Ordinary Differential Equations II, IV.3: implicit Euler).
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 
 RIGID: Final = 1e9
-"""What the gear of a flywheel may carry [N m or N]."""
-POSTURES: Final = 60
-"""In which it is looked whether damping is stiff, always the same."""
+"""Maximum force of the gear constraint [N m or N]."""
+CONFIGURATIONS: Final = 60
+"""Number of configurations at which damping is checked for stiffness, always the same."""
 WIDE: Final = 3.2
-"""[rad or m] on both sides of zero that joints without limits are put there."""
+"""Range [rad or m] on both sides of zero for joints without limits."""
 
 
 def stiff_damping(robot: RobotModel, step: float) -> Array:
     """(n) the damping [N m s/rad or N s/m] of joints where it is stiff for a physics step [s], 0 of the others.
 
-    It is where it is in some posture within the limits.
+    It is stiff where it is so in some configuration within the limits.
     """
     moving = robot.moving_joints
     damping = np.array([joint.damping for joint in moving])
@@ -48,15 +47,15 @@ def stiff_damping(robot: RobotModel, step: float) -> Array:
     low = [-WIDE if joint.limits.lower is None else joint.limits.lower for joint in moving]
     high = [WIDE if joint.limits.upper is None else joint.limits.upper for joint in moving]
     share = np.zeros(len(moving))
-    for q in np.random.default_rng(0).uniform(low, high, (POSTURES, len(moving))):
+    for q in np.random.default_rng(0).uniform(low, high, (CONFIGURATIONS, len(moving))):
         share = np.maximum(share, damping_share(kinematics.mass_matrix(q), damping, step))
     return frozen(np.where(share > STIFF, damping, 0.0))
 
 
-def add_flywheels(
+def add_rotor_inertia(
     p: ModuleType, client: int, robot: RobotModel, body: int, joints: Sequence[int], *, step: float
 ) -> None:
-    """Gears a flywheel to every joint with reflected inertia or stiff damping.
+    """Gear a rotor to every joint with reflected inertia or stiff damping.
 
     Args:
         p: PyBullet.
@@ -72,7 +71,7 @@ def add_flywheels(
     k = len(driven)
     if k == 0:
         return
-    wheels = p.createMultiBody(
+    rotors = p.createMultiBody(
         baseMass=0.0,
         linkMasses=[1.0] * k,
         linkCollisionShapeIndices=[-1] * k,
@@ -86,10 +85,10 @@ def add_flywheels(
         linkJointAxis=[[0.0, 0.0, 1.0]] * k,
         physicsClientId=client,
     )
-    for wheel, joint in enumerate(driven):
+    for rotor, joint in enumerate(driven):
         p.changeDynamics(
-            wheels,
-            wheel,
+            rotors,
+            rotor,
             localInertiaDiagonal=[float(inertia[joint])] * 3,
             linearDamping=0.0,
             angularDamping=0.0,
@@ -98,12 +97,12 @@ def add_flywheels(
         )
         if damping[joint]:
             p.changeDynamics(body, joints[joint], jointDamping=0.0, physicsClientId=client)
-        p.setJointMotorControl2(wheels, wheel, p.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
+        p.setJointMotorControl2(rotors, rotor, p.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
         gear = p.createConstraint(
             body,
             joints[joint],
-            wheels,
-            wheel,
+            rotors,
+            rotor,
             jointType=p.JOINT_GEAR,
             jointAxis=[0.0, 0.0, 1.0],
             parentFramePosition=[0.0, 0.0, 0.0],

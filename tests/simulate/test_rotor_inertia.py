@@ -16,7 +16,7 @@ from manipcli.model.kinematics import Kinematics
 from manipcli.model.normalised_urdf import engine_urdf
 from manipcli.model.robot import Actuator, RobotModel
 from manipcli.simulate.engines.pybullet import _library
-from manipcli.simulate.engines.pybullet_flywheels import add_flywheels, stiff_damping
+from manipcli.simulate.engines.pybullet_rotor_inertia import add_rotor_inertia, stiff_damping
 
 DT = 1e-3
 TORQUE = np.array([3.0, 1.0])
@@ -65,7 +65,7 @@ def simulated(
         for k in (0, 1):
             p.changeDynamics(body, k, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
             p.setJointMotorControl2(body, k, p.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
-        add_flywheels(p, client, robot, body, [0, 1], step=DT)
+        add_rotor_inertia(p, client, robot, body, [0, 1], step=DT)
         for _ in range(round(seconds / DT)):
             p.setJointMotorControlArray(body, [0, 1], p.TORQUE_CONTROL, forces=list(torque), physicsClientId=client)
             p.stepSimulation(client)

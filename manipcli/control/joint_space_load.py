@@ -18,7 +18,7 @@ from manipcli.model.robot import RobotModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Postures:
+class Configurations:
     """Where a robot is to be and how it moves there, arrays (T, n) of all its joints; at rest, two of them are 0."""
 
     position: Array
@@ -26,13 +26,13 @@ class Postures:
     acceleration: Array
 
     @classmethod
-    def at_rest(cls, position: Array) -> Postures:
+    def at_rest(cls, position: Array) -> Configurations:
         """(T, n) positions, without motion."""
         return cls(position, np.zeros_like(position), np.zeros_like(position))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Load:
+class JointSpaceLoad:
     """What k driven joints meet in T postures.
 
     Attributes:
@@ -64,7 +64,9 @@ class Load:
         return np.asarray(np.diagonal(self.mass, axis1=1, axis2=2))
 
 
-def load_of(robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], postures: Postures) -> Load:
+def load_of(
+    robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], postures: Configurations
+) -> JointSpaceLoad:
     """What these joints, independent ones, meet when no other is driven."""
     S = _drives(robot, joints)
     moving = robot.moving_joints
@@ -81,7 +83,7 @@ def load_of(robot: RobotModel, kinematics: Kinematics, joints: Sequence[str], po
         for tag in robot.transmissions
         for joint in tag.joints
     }
-    return Load(
+    return JointSpaceLoad(
         joints=tuple(joints),
         mass=np.array(mass),
         gravity=np.array(gravity),

@@ -1,15 +1,18 @@
-"""Whether commands have to be cut, and of which joints they were, by which limits."""
+"""Saturation: the joints whose commands exceed limits, and the engine's motors that are at their effort limit."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from manipcli.control.actuation import motor_effort_limits
+from manipcli.control.command import Mode
 from manipcli.core.geometry import Array
+from manipcli.model.robot import RobotModel
 
 KINDS: Final = ("position", "velocity", "effort", "acceleration", "soft_limit")
 """Of limits, as the rows of `JointLimiter.by_kind`."""
@@ -46,11 +49,11 @@ Rows = tuple[slice, slice] | tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
 def rows_of(kinds: Sequence[int], where: npt.NDArray[np.intp]) -> Rows:
-    """The `rows` of `Cut.add`: these kinds of limits, of the joints `where`."""
+    """The `rows` of `Saturation.add`: these kinds of limits, of the joints `where`."""
     return np.array(kinds)[:, np.newaxis], where
 
 
-class Cut:
+class Saturation:
     """Which joints are cut in a tick, and by what."""
 
     __slots__ = ("any", "joints", "kinds")
@@ -78,3 +81,47 @@ class Cut:
         known = broken & cut
         self.kinds[rows] |= known
         self.kinds[SOFT, where] |= cut & ~known.any(axis=0)
+
+
+ALL: Final = 1.0 - 1e-6
+"""Share of its limit from which on a motor gives all; engines hold the limit as an impulse of a step, and round."""
+
+
+class MotorLimits:
+    """Looks at measured efforts for motors at their limits.
+
+    Args:
+        robot: the robot.
+        pressing: joints that stand at their limits by intent: those of hands, which press on what they hold.
+
+    Attributes:
+        watches: whether there is anything to look at; without, `count` need not be called.
+    """
+
+    def __init__(self, robot: RobotModel, *, pressing: Collection[str] = ()) -> None:
+        self._limits = ALL * motor_effort_limits(robot)
+        self._may = np.array([name not in pressing for name in robot.joint_names]) & np.isfinite(self._limits)
+        self._at: npt.NDArray[np.intp] = np.zeros(0, dtype=np.intp)
+        self._own = self._limits[self._at]
+        self.watches = False
+
+    def select(self, modes: Sequence[Mode]) -> None:
+        """From now on each joint (n) obeys this."""
+        driven = np.array([mode in ("position", "velocity") for mode in modes], dtype=np.bool_)
+        self._at = np.flatnonzero(driven & self._may)
+        self._own = self._limits[self._at]
+        self.watches = len(self._at) > 0
+
+    def count(self, effort: Array, cut: npt.NDArray[np.bool_], *counts: npt.NDArray[np.int64]) -> None:
+        """Adds 1 to each of the `counts` (n) of joints whose motor gave all in the last tick.
+
+        Args:
+            effort: (n) measured [N m or N].
+            cut: (n) of whom the command of that tick was cut, which is counted already.
+            counts: (n), changed in place.
+        """
+        at = self._at
+        full = (np.abs(effort[at]) >= self._own) & ~cut[at]
+        if full.any():
+            for each in counts:
+                each[at] += full

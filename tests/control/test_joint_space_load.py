@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from manipcli.control.reflected import Postures, load_of
+from manipcli.control.joint_space_load import Configurations, load_of
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Inertial, Joint, JointLimits, Link, Mimic
 from manipcli.model.kinematics import Kinematics
@@ -37,7 +37,7 @@ def slides():
 
 def test_what_follows_is_met_by_the_square_of_its_share_and_weighs_by_its_share():
     robot = slides()
-    load = load_of(robot, Kinematics(robot), ("lead",), Postures.at_rest(np.zeros((1, 3))))
+    load = load_of(robot, Kinematics(robot), ("lead",), Configurations.at_rest(np.zeros((1, 3))))
     assert load.mass[0, 0, 0] == pytest.approx(sum(MASSES[one] * share**2 for one, share in SHARES.items()))
     assert load.damping == pytest.approx([sum(DAMPING[one] * share**2 for one, share in SHARES.items())])
     assert load.gravity[0] == pytest.approx([9.81 * sum(MASSES[one] * share for one, share in SHARES.items())])

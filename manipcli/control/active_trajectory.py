@@ -1,0 +1,299 @@
+"""The trajectory that a controller follows: for each joint the one that began last, in one clock, and its samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from manipcli.core.geometry import Array
+from manipcli.plan.trajectory import JointTrajectory
+from manipcli.spec.controllers import Interface
+
+POSITION, VELOCITY, ACCELERATION, EFFORT = 0, 1, 2, 3
+"""The rows of a sample (4, n): a reference, and the effort to add to the command."""
+ROWS: Final[dict[Interface, int]] = {
+    "position": POSITION, "velocity": VELOCITY, "acceleration": ACCELERATION, "effort": EFFORT,
+}  # fmt: skip
+
+INSTANT = 1e-9
+"""Times nearer than this [s] are the same: ticks are rounded."""
+
+Columns = slice | npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A trajectory of the joints at `columns`, from `begin` [s] of its clock on; its joints rest at its end."""
+
+    columns: Columns
+    trajectory: JointTrajectory
+    begin: float
+
+    @property
+    def end(self) -> float:
+        return self.begin + self.trajectory.duration
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ActiveTrajectory:
+    """`rest` (4, n) holds for each joint until a part has it; a later part takes joints over from an earlier one."""
+
+    rest: Array
+    parts: tuple[Part, ...] = ()
+
+    @staticmethod
+    def hold(position: Array, effort: Array | float = 0.0) -> ActiveTrajectory:
+        """At rest."""
+        rest = np.zeros((4, len(position)))
+        rest[POSITION], rest[EFFORT] = position, effort
+        return ActiveTrajectory(rest)
+
+    @property
+    def end(self) -> float:
+        """[s] from when on all rests."""
+        ends = np.zeros(self.rest.shape[1])
+        for part in self.parts:
+            ends[part.columns] = part.end
+        return float(ends.max())
+
+    def sample(self, times: Array) -> Array:
+        """(T, 4, n) at ascending `times` (T) [s] of its clock."""
+        rows = np.empty((len(times), *self.rest.shape))
+        rows[:] = self.rest
+        for part in self.parts:
+            first = int(np.searchsorted(times, part.begin - INSTANT))
+            local = np.maximum(times[first:] - part.begin, 0.0)
+            trajectory = part.trajectory
+            count = int(np.searchsorted(local, trajectory.duration + INSTANT, side="right"))
+            running = np.minimum(local[:count], trajectory.duration)
+            own = rows[first : first + count]
+            own[:, POSITION, part.columns], own[:, VELOCITY, part.columns], own[:, ACCELERATION, part.columns] = (
+                trajectory.sample(running)
+            )
+            over = rows[first + count :]
+            over[:, :, part.columns] = 0.0
+            over[:, POSITION, part.columns] = trajectory.positions[-1]
+            if trajectory.efforts is not None:
+                own[:, EFFORT, part.columns] = trajectory.sample_effort(running)
+                over[:, EFFORT, part.columns] = trajectory.efforts[-1]
+            else:
+                own[:, EFFORT, part.columns] = 0.0
+        return rows
+
+    def ticks(self, period: float) -> Array:
+        """(T, 4, n) at 0, `period`, ... up to the first two ticks that are not before the end: the last is at rest."""
+        count = math.ceil(self.end / period - 1e-6)
+        return self.sample(np.arange(count + 2, dtype=np.float64) * period)
+
+    def from_time(self, now: float) -> ActiveTrajectory:
+        """The same, with `now` as its time 0."""
+        if self.end <= now:
+            return ActiveTrajectory(self.sample(np.array([now]))[0])
+        return ActiveTrajectory(
+            self.rest, tuple(Part(part.columns, part.trajectory, part.begin - now) for part in self.parts)
+        )
+
+    def with_part(self, part: Part) -> ActiveTrajectory:
+        """With one that takes its joints over; parts that have no joint left are forgotten."""
+        kept: list[Part] = []
+        taken = np.zeros(self.rest.shape[1], dtype=np.bool_)
+        for one in (part, *reversed(self.parts)):
+            if not taken[one.columns].all():
+                kept.insert(0, one)
+            if one.begin <= INSTANT:
+                taken[one.columns] = True
+        return ActiveTrajectory(self.rest, tuple(kept))
+
+
+def decelerating(row: Array, times: Array) -> ActiveTrajectory:
+    """From a moving `row` (4, n) to rest, at constant deceleration: q = q0 + v0 (t - t^2 / (2 T)), v = v0 (1 - t / T).
+
+    It ends at q0 + v0 T / 2.
+
+    Args:
+        row: what is followed now.
+        times: (n) T [s] of each joint; 0: it stops at once.
+    """
+    velocity = row[VELOCITY]
+    active = ActiveTrajectory.hold(row[POSITION], row[EFFORT])
+    for time in np.unique(times[times > INSTANT]):
+        columns = np.flatnonzero(times == time)
+        begin, rate = row[POSITION, columns], velocity[columns]
+        active = active.with_part(
+            _part(columns, float(time), (begin, begin + 0.5 * rate * time), (rate, 0.0 * rate), None, row[EFFORT])
+        )
+    return active
+
+
+def stopping_in(row: Array, duration: float) -> ActiveTrajectory:
+    """From a moving `row` (4, n) to rest in `duration` T [s], as ROS 1 stops.
+
+    The curve is the first half of the quintic that turns the joint round within 2 T, from (q0, v0, 0) to (q0, -v0, 0):
+    it ends at q0 + 5/8 v0 T.
+    """
+    n = row.shape[1]
+    position, velocity, still = row[POSITION], row[VELOCITY], np.zeros(n)
+    round_trip = JointTrajectory.of_arrays(
+        [str(k) for k in range(n)], [0.0, 2.0 * duration], [position, position], [velocity, -velocity], [still, still]
+    )
+    turn, _, bend = round_trip.sample(duration)
+    part = _part(np.arange(n), duration, (position, turn), (velocity, still), (still, bend), row[EFFORT])
+    return ActiveTrajectory.hold(position, row[EFFORT]).with_part(part)
+
+
+def _part(
+    columns: npt.NDArray[np.intp],
+    duration: float,
+    positions: Sequence[Array],
+    velocities: Sequence[Array],
+    accelerations: Sequence[Array] | None,
+    effort: Array,
+) -> Part:
+    """Two points, and an effort that stays."""
+    names = [str(k) for k in columns]
+    efforts = np.tile(effort[columns], (2, 1))
+    return Part(
+        columns,
+        JointTrajectory.of_arrays(
+            names, [0.0, duration], np.array(positions), np.array(velocities), accelerations, efforts
+        ),
+        0.0,
+    )
+
+
+ON_TICK: Final = 1e-3
+"""A time nearer than this, in periods, to a sampled tick is that tick."""
+BLOCK: Final = 32
+"""Ticks that are sampled at once where they were not before."""
+
+
+class Reference:
+    """Follows one active trajectory after the other, in a clock that runs `speed` seconds a second.
+
+    At full speed and at the ticks of the period with which a trajectory began, its samples are made beforehand;
+    otherwise they are made a block at a time.
+
+    It also gives the part of a command that does not depend on the error, one period ahead, because a command is what
+    the joint is to have when the next tick measures it: the position, velocity or acceleration of the trajectory; with
+    a PID `velocity_scale` times its velocity; and its effort.
+
+    Args:
+        rows: (3, n) written in place: position, velocity, acceleration; rad or m, per second, per second squared.
+        interfaces: (k) of the command.
+        velocity_scale: (n) of the feed-forward beside a PID; None: there is no PID.
+
+    Attributes:
+        rows: see above.
+        feed: (k, n) of this tick, or None: 0.
+        moving: whether `advance` has anything to do.
+        ended: whether the trajectory is over.
+        end: [s] of the trajectory's clock.
+        speed: of the clock.
+        scales: whether `rescale` changes it; a stop does not wait.
+    """
+
+    __slots__ = (
+        "_active", "_before", "_dt", "_end_row", "_feeds", "_interfaces", "_last", "_origin", "_scale", "_since",
+        "_table", "end", "ended", "feed", "moving", "rows", "scales", "speed",
+    )  # fmt: skip
+
+    def __init__(self, rows: Array, interfaces: Sequence[Interface], *, velocity_scale: Array | None = None) -> None:
+        self.rows = rows
+        self._interfaces = tuple(interfaces)
+        self._scale = velocity_scale
+        self.speed = 1.0
+        self.hold(ActiveTrajectory.hold(np.zeros(rows.shape[1])), time=0.0)
+
+    def hold(self, active: ActiveTrajectory, *, time: float) -> None:
+        """From now on what `active` rests at."""
+        self._active = active
+        self.rows[:] = active.rest[:EFFORT]
+        feed = self._feed(active.rest[None])
+        self.feed = None if feed is None else feed[0]
+        self.moving, self.ended, self.scales = False, True, False
+        self.end, self._before, self._since, self.speed = 0.0, 0.0, time, 1.0
+        self._table = np.zeros((0, EFFORT, self.rows.shape[1]))
+        self._feeds: Array | None = None
+        self._origin, self._dt, self._last, self._end_row = time, math.inf, -1, 0
+
+    def follow(
+        self, active: ActiveTrajectory, samples: Array, *, time: float, period: float, speed: float | None = None
+    ) -> None:
+        """From now on `active`, which begins at `time`; `samples` are its `ticks` of `period`; `speed` None: 1."""
+        self._active = active
+        self.scales = speed is not None
+        self.end = active.end
+        self._before, self._since, self.speed = 0.0, time, 1.0 if speed is None else speed
+        self._take(samples, time, period)
+        self._end_row = len(samples) - 2
+        if self.speed != 1.0:
+            self._last = -1
+        self.moving, self.ended = True, False
+
+    def clock(self, time: float) -> float:
+        """[s] of the trajectory at `time`."""
+        return self._before + (time - self._since) * self.speed
+
+    def rescale(self, speed: float, *, time: float) -> None:
+        """From `time` on the clock runs so fast; the samples made beforehand are of no use any more."""
+        if self.moving and self.scales and speed != self.speed:
+            self._before, self._since = self.clock(time), time
+            self._last = -1
+            self.speed = speed
+
+    def advance(self, time: float, period: float) -> None:
+        """Writes `rows`, `feed` and `ended` of `time` [s], where the next is a `period` later."""
+        ticks = (time - self._origin) / self._dt
+        row = int(ticks + 0.5)
+        if not (row < self._last and -ON_TICK < ticks - row < ON_TICK and period == self._dt):
+            self._look_ahead(time, period)
+            row = 0
+        self.rows[:] = self._table[row]
+        if self._feeds is not None:
+            self.feed = self._feeds[row]
+        self.ended = row >= self._end_row
+
+    def _look_ahead(self, time: float, period: float) -> None:
+        """Samples of the next ticks, for a time that is none of those that were sampled before."""
+        step = self.speed * period
+        clocks = np.maximum(self.clock(time) + step * np.arange(BLOCK + 1), 0.0)
+        self._take(self._sample(clocks), time, period)
+        self._end_row = int(np.searchsorted(clocks, self.end - 1e-6 * period))
+        if clocks[0] > self.end + 1e-6 * period:
+            self.moving = False
+
+    def _take(self, samples: Array, time: float, period: float) -> None:
+        """Samples (T, 4, n) of the ticks from `time` on; of the last one only its feed is used."""
+        self._table = samples[:, :EFFORT]
+        self._feeds = self._feed(samples[1:])
+        self.feed = None
+        self._origin, self._dt, self._last = time, period, len(samples) - 1
+
+    def _feed(self, ahead: Array) -> Array | None:
+        """(T, k, n) of the samples (T, 4, n) one period ahead; None: always 0."""
+        if self._scale is None:
+            return ahead[:, [ROWS[interface] for interface in self._interfaces]]
+        feed = self._scale * ahead[:, VELOCITY]
+        if self._interfaces == ("effort",):
+            feed = feed + ahead[:, EFFORT]
+        return feed[:, None] if feed.any() else None
+
+    def _sample(self, clock: Array) -> Array:
+        rows = self._active.sample(clock)
+        if self.speed != 1.0:
+            rows[:, VELOCITY] *= self.speed
+            rows[:, ACCELERATION] *= self.speed**2
+        return rows
+
+    def row(self, time: float) -> Array:
+        """(4, n) what is followed at `time`, a second of real time."""
+        return np.asarray(self._sample(np.array([max(0.0, self.clock(time))]))[0])
+
+    def now(self, time: float) -> ActiveTrajectory:
+        """What is left of the trajectory at `time`."""
+        return self._active.from_time(max(0.0, self.clock(time)))
