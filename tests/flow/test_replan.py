@@ -17,8 +17,10 @@ from manipcli.flow import replan
 from manipcli.flow.execute import controllers
 from manipcli.flow.load import Task, load_task
 from manipcli.flow.plan import Plan, plan_step, plan_task
-from manipcli.flow.replan import COMMANDED, LOST, Measured, after
+from manipcli.flow.replan import COMMANDED, Measured, after
 from manipcli.model.collision import Carried
+from manipcli.model.grasp import MISPLACED
+from manipcli.model.state import Contact
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import Situation, StepPlan
 from manipcli.simulate.engine import EngineSettings
@@ -94,6 +96,7 @@ def world_at(task: Task, plan: Plan) -> WorldOf:
             robot=task.robot, scene=task.scene, engine=engine, manager=controllers(task, plan.planner.kinematics),
             period=0.001,
         )  # fmt: skip
+        session._touching = (Contact("block", "robot/panda_leftfinger", 5.0, 0.0),)
         world = World(task, plan, session, Measured(session, plan.planner, ReplanSpec(), physics=True))
         world.stand(world.before(step))
         return world
@@ -217,7 +220,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
 def test_an_object_that_fell_is_no_longer_in_the_hand(world_at: WorldOf) -> None:
     world = world_at(PLACE)
     before = world.before(PLACE)
-    world.put("block", shifted(before.bodies[0], LOST + 0.02))
+    world.put("block", shifted(before.bodies[0], MISPLACED + 0.02))
     assert world.told(PLACE) == ("'block' is not in the hand: it is 70.0 mm from where it was to be",)
     assert world.measured.situation(before).carried is None
 
