@@ -97,19 +97,19 @@ class Grasp:
         length = float(np.linalg.norm(hand))
         way = hand / length if length > STILL else np.zeros(3)
         object_moved = self._centre(state) - self._start
-        lag = float((hand - object_moved) @ way)
+        behind = float((hand - object_moved) @ way) > (1.0 - FOLLOWS) * max(self._travel, length)
         why = []
         if float(state.time) - self._pressed_at > BRIDGED:
             why.append("no link of the robot presses on it")
-        if lag > (1.0 - FOLLOWS) * max(self._travel, length):
+        if behind:
             lifted = way[2] > 0.7
             verb, along = ("rose", object_moved[2]) if lifted else ("moved", object_moved @ way)
             hand_moved = hand[2] if lifted else length
             why.append(f"it {verb} {_mm(float(along))} while the tool {verb} {_mm(float(hand_moved))}")
         off = float(np.linalg.norm(self._pose(state, carried).p - carried.X_LO.p))
-        if off > MISPLACED:
+        if off > MISPLACED and not behind:
             why.append(f"it is {_mm(off)} from its place in the hand")
-        return " and ".join(why)
+        return ", ".join(why)
 
     def _moved_with_hand(self, state: WorldState) -> Array:
         """(3,) motion [m] of the object's centre since `begin` if it did not move in the hand."""
