@@ -517,7 +517,7 @@ def test_a_goal_that_replaces_a_paused_trajectory_starts_at_rest_and_goes_on_wit
         run(controller, 50)
     controller.set_speed_scaling(0.0)
     first = run(controller, 2, first=50)
-    controller.send_goal(TrajectoryGoal(to(at(2.0, 1.0))))
+    controller.send_goal(TrajectoryGoal(to(at(2.0, 1.0, velocity=0.0, acceleration=0.0))))
     paused = run(controller, 10, first=52)
     np.testing.assert_array_equal(paused[:, 1], first[-1][1])
     np.testing.assert_array_equal(paused[:, 2], 0.0)
