@@ -48,7 +48,7 @@ def test_an_example_is_small_and_says_what_to_change(example: Path) -> None:
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_does_what_its_readme_says(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
-        command(example), cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120,
+        command(example), cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600,
         env={"PYTHONPATH": str(ROOT), "PATH": "", "PYTHONIOENCODING": "utf-8"},
     )  # fmt: skip
     assert done.returncode == FAILS.get(example.name, 0), done.stdout + done.stderr

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from manipcli.conditions.condition import Problem, Setting
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
@@ -23,22 +21,6 @@ def between(pair: tuple[str, str], contact: Contact) -> bool:
 def is_part(written: str, part: str) -> bool:
     """Whether `part` of a contact is what was written, or one of its links."""
     return written == part or (written == ROBOT and part.startswith(f"{ROBOT}/"))
-
-
-def grips(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
-    """How hard each link of the robot presses on a body [N], the hardest first."""
-    found: dict[str, float] = {}
-    for contact in contacts:
-        other = contact.b if contact.a == body else contact.a if contact.b == body else ""
-        if other.startswith(f"{ROBOT}/"):
-            found[other] = found.get(other, 0.0) + contact.force
-    return sorted(((force, link) for link, force in found.items()), reverse=True)
-
-
-def held_force(contacts: Sequence[Contact], body: str) -> float:
-    """The force [N] of the second hardest link on a body: what holds it between two; 0 where fewer touch."""
-    found = grips(contacts, body)
-    return found[1][0] if len(found) > 1 else 0.0
 
 
 def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:

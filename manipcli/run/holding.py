@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manipcli.conditions.touch import grips
 from manipcli.core.units import readable
+from manipcli.model.grasp import pressing
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.scene.scene import Scene
@@ -30,7 +30,7 @@ class Holding:
 
     def taken(self, body: str, contacts: Sequence[Contact]) -> None:
         """The hand has closed on a body, and touches this."""
-        self._pressed[body] = grips(contacts, body)
+        self._pressed[body] = pressing(contacts, body)
 
     def told(self, name: str) -> str:
         """The force N of the hand on a body at the grasp, the mu N that friction can carry, its weight m g, and the

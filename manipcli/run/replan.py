@@ -19,6 +19,7 @@ from manipcli.control.roles import is_follower
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
 from manipcli.model.collision import Carried
+from manipcli.model.grasp import Grasp
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.simulate.session import Session
@@ -27,8 +28,6 @@ from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import StepSpec
 from manipcli.task.plan_task import plan_step
 
-LOST: Final = 0.05
-"""An object further than this [m] from where the hand should have it is not in the hand."""
 COMMANDED: Final = 1e-4
 """A trajectory that begins further than this [rad or m] from what is commanded would make the robot jump."""
 
@@ -41,6 +40,9 @@ class Measured:
         planner: of the task.
         limits: which differences count.
         physics: whether bodies move; where they do not, they are where they were predicted to be.
+
+    Attributes:
+        grasp: what the hand carries.
     """
 
     def __init__(self, session: Session, planner: Planner, limits: ReplanSpec, *, physics: bool) -> None:
@@ -48,6 +50,7 @@ class Measured:
         self._planner = planner
         self._limits = limits
         self._physics = physics
+        self.grasp = Grasp(planner.kinematics, planner.scene)
 
     def situation(self, believed: PlanningState) -> PlanningState:
         """Where everything is now.
@@ -68,10 +71,10 @@ class Measured:
         carried = believed.carried
         if carried is None:
             return now
+        if self.grasp.lost(carried, state, self._session.touching):
+            return now
         X_WO = planner.body_pose(now, carried.body)
         X_LO = planner.kinematics.forward(measured, carried.link).inverse() @ X_WO
-        if np.linalg.norm(X_LO.p - carried.X_LO.p) > LOST:
-            return now
         # The robot is told to be where it is commanded to be; so is what it holds, and what lies in that.
         shift = planner.kinematics.forward(position, carried.link) @ X_LO @ X_WO.inverse()
         return replace(self._shifted(now, carried.body, shift), carried=Carried(carried.body, carried.link, X_LO))

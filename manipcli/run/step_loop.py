@@ -7,15 +7,14 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
-from manipcli.conditions.touch import grips, held_force
 from manipcli.control.action import GoalHandle
 from manipcli.control.saturation import KINDS
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
 from manipcli.judge.cuts import Cuts
 from manipcli.judge.verdict import StepOutcome
+from manipcli.model.collision import Carried
+from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
@@ -26,7 +25,7 @@ from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import DONE, Alarmed, Executor, MotionEnd, Until
-from manipcli.simulate.session import Session
+from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.retry import retried
 from manipcli.spec.task import StepSpec
@@ -37,10 +36,6 @@ DEFAULT_UNTIL_TIME: Final = 30.0
 """How long [s] an `until` without `timeout` is waited for."""
 AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
-LEFT_BEHIND: Final = 0.05
-"""A held object further than this [m] from where it was planned is no longer held."""
-HELD: Final = 0.1
-"""An object that two links press on with this force [N] was not let go."""
 
 
 def cuts_of(session: Session) -> Cuts:
@@ -88,8 +83,7 @@ class StepsRun:
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
         self._watching = Watching(task.spec.watch, task.spec.expect, live)
-        alarm = self._alarm if task.spec.watch else None
-        self._executor = Executor(session, touch=self._physics, told=told, alarm=alarm)
+        self._executor = Executor(session, touch=self._physics, told=told, alarm=self._look)
         replan = task.spec.replan
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
@@ -176,6 +170,12 @@ class StepsRun:
         before = f"; before that: {end.outcome}: {end.text}" if end.outcome != "done" else ""
         return MotionEnd("failed", f"stopped: {broken}{before}")
 
+    def _look(self, state: WorldState) -> str:
+        """Every tick of the robot: the alarm, and what the hand carries."""
+        if self._physics and self._session.ticks % SLOW == 0:
+            self._measured.grasp.look(state, self._session.touching)
+        return self._alarm(state) if self._task.spec.watch else ""
+
     @property
     def _may_go_on(self) -> bool:
         """Whether the task has a say in what follows a failure."""
@@ -247,6 +247,7 @@ class StepsRun:
     def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
+        self._follow(before.carried)
         texts = []
         with self._asked(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
@@ -254,6 +255,10 @@ class StepsRun:
             for k, motion in enumerate(planned.plan.motions):
                 self._event("phase_started", planned, "", motion.label)
                 self._believed = after(planned.plan, before, done=k)
+                if motion.grip is not None and motion.grip.force is None and before.carried is not None and k > 0:
+                    left = self._left_behind(before.carried)
+                    if left is not None:
+                        return left
                 over = deadline
                 if motion.awaits and until is not None and over is None:
                     over = self._session.time + motion.duration + DEFAULT_UNTIL_TIME
@@ -264,6 +269,7 @@ class StepsRun:
                     return MotionEnd(end.outcome, text)
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touching)
+                    self._follow(planned.plan.end.carried)
                 if end.weak:
                     self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
@@ -278,8 +284,7 @@ class StepsRun:
         held = self._still_held(before) if planned.plan.end.carried is None else ""
         if held:
             return MotionEnd("failed", held)
-        guarded = any(motion.guarded for motion in planned.plan.motions)
-        left = self._lost(planned) if guarded else self._left_behind(planned)
+        left = self._left_behind(planned.plan.end.carried)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
@@ -295,36 +300,31 @@ class StepsRun:
         finally:
             self._live.close(probe)
 
-    def _left_behind(self, planned: PlannedStep) -> MotionEnd | None:
-        """A failure where the object that the step ends with in the hand is not there; None where it is."""
-        carried = planned.plan.end.carried
+    def _follow(self, carried: Carried | None) -> None:
+        """From now on what the hand carries is to move with it."""
+        if carried is not None and self._physics:
+            self._measured.grasp.begin(carried, self._session.engine.read(), self._session.touching)
+
+    def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
+        """A failure where the hand does not carry what it is planned to; None where it does."""
         if carried is None or not self._physics:
             return None
-        scene = self._task.scene
-        k = scene.movable.index(scene.body(carried.body))
-        away = float(np.linalg.norm(self._session.state.body_position[k] - planned.plan.end.bodies[k].p))
-        if away <= LEFT_BEHIND:
+        why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
+        if not why:
             return None
-        where = f"'{carried.body}' is {1000 * away:.0f} mm from where the hand was to hold it"
         grasp = self._holding.told(carried.body)
-        return MotionEnd("failed", f"{where}: it slipped, or was never held{f'; {grasp}' if grasp else ''}")
-
-    def _lost(self, planned: PlannedStep) -> MotionEnd | None:
-        """The same for a guarded step: where it ends only the hand can tell."""
-        carried = planned.plan.end.carried
-        if carried is None or self._measured.situation(planned.plan.end).carried is not None:
-            return None
-        return MotionEnd("failed", f"'{carried.body}' is no longer in the hand")
+        text = f"the hand does not carry '{carried.body}': {why}; it slipped, or was never held"
+        return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
 
     def _still_held(self, before: PlanningState) -> str:
         """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""
         if before.carried is None or not self._physics:
             return ""
         body = before.carried.body
-        if held_force(self._session.touching, body) < HELD:
+        if pinch_force(self._session.touching, body) < GRIP_FORCE:
             return ""
         self._believed = replace(self._believed, carried=before.carried, closed=before.closed)
-        (_, first), (_, second), *_ = grips(self._session.touching, body)
+        (_, first), (_, second), *_ = pressing(self._session.touching, body)
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
 
     def _tell(self, text: str, *, detail: bool) -> None:

@@ -265,7 +265,7 @@ def test_who_stops_listening_leaves_no_process_and_no_file(tmp_path: Path) -> No
     running = run_jobs(jobs(tmp_path, END, sleeper), at_once=2, onlooker=watch, command=(sys.executable, "-c", CHILD))
     next(running)
     partial = tmp_path / "runs" / "t1.mcap.partial"
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 120.0
     while not partial.exists():
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -334,7 +334,7 @@ def test_a_task_that_another_batch_is_running_is_an_error_and_leaves_its_files(t
     (job,) = jobs(tmp_path, "open(job.partial, 'w').close(); time.sleep(100)")
     other = Process(job, command=(sys.executable, "-c", CHILD))
     try:
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 120.0
         while not job.partial.exists():
             assert time.monotonic() < deadline
             time.sleep(0.01)

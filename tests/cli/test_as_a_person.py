@@ -156,7 +156,7 @@ def test_a_signal_ends_the_run_with_a_whole_log(long_task: Path, number: signal.
         pytest.skip("who started the tests has it ignored, as `nohup` does")
     process = begin(long_task, "--format", "json")
     process.send_signal(number)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=120)
     assert process.returncode == 2
     assert "Traceback" not in err
     answer = json.loads(out)
@@ -177,7 +177,7 @@ def test_ctrl_c_is_heard_also_where_it_was_inherited_as_ignored(long_task: Path)
     """As by a command that a shell without job control starts in the background."""
     process = begin(long_task, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=20)
+    process.communicate(timeout=120)
     assert process.returncode == 2
 
 
@@ -187,7 +187,7 @@ def test_nohup_keeps_its_word(long_task: Path) -> None:
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(1.0)
     process.send_signal(signal.SIGTERM)
-    process.communicate(timeout=20)
+    process.communicate(timeout=120)
     assert process.returncode == 2
 
 
@@ -200,7 +200,7 @@ def test_a_signal_while_the_program_starts_is_2_as_well(long_task: Path) -> None
         )  # fmt: skip
         time.sleep(delay)
         process.send_signal(signal.SIGTERM)
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=120)
         assert process.returncode in (2, -signal.SIGTERM), err
         if process.returncode == 2:
             assert "Traceback" not in err

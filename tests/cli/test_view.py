@@ -30,10 +30,10 @@ def test_it_prints_the_address_and_ends_well(tmp_path: Path, number: signal.Sign
         assert process.stdout is not None
         url = process.stdout.readline().strip()
         assert url.startswith("http://127.0.0.1:")
-        with urlopen(url, timeout=20) as answer:
+        with urlopen(url, timeout=120) as answer:
             assert b"<html" in answer.read()
         process.send_signal(number)
-        out, told = process.communicate(timeout=20)
+        out, told = process.communicate(timeout=120)
     assert process.returncode == 0
     assert out == ""
     assert "Traceback" not in told

@@ -47,7 +47,7 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
     reader.start()
     write_whole(pipe, b"through")
-    reader.join(timeout=5)
+    reader.join(timeout=60)
     assert got == [b"through"]
     assert pipe.is_fifo()
 

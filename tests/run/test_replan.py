@@ -14,11 +14,13 @@ import pytest
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
+from manipcli.model.grasp import MISPLACED
+from manipcli.model.state import Contact
 from manipcli.plan.planner import Planner
 from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.run import replan
 from manipcli.run.execute import build_manager
-from manipcli.run.replan import COMMANDED, LOST, Measured, after
+from manipcli.run.replan import COMMANDED, Measured, after
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines.kinematic import KinematicEngine
 from manipcli.simulate.session import Session
@@ -95,6 +97,7 @@ def world_at(task: Task, plan: Plan) -> WorldOf:
             robot=task.robot, scene=task.scene, engine=engine, manager=build_manager(task, plan.planner.kinematics),
             period=0.001,
         )  # fmt: skip
+        session._touching = (Contact("block", "robot/panda_leftfinger", 5.0, 0.0),)
         world = World(task, plan, session, Measured(session, plan.planner, ReplanSpec(), physics=True))
         world.stand(world.before(step))
         return world
@@ -218,7 +221,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
 def test_an_object_that_fell_is_no_longer_in_the_hand(world_at: WorldOf) -> None:
     world = world_at(PLACE)
     before = world.before(PLACE)
-    world.put("block", shifted(before.bodies[0], LOST + 0.02))
+    world.put("block", shifted(before.bodies[0], MISPLACED + 0.02))
     assert world.told(PLACE) == ("'block' is not in the hand: it is 70.0 mm from where it was to be",)
     assert world.measured.situation(before).carried is None
 

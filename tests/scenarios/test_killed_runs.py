@@ -44,7 +44,7 @@ def test_a_kill_costs_at_most_a_second_and_never_the_log_before(tmp_path: Path, 
     command = [sys.executable, "-c", CHILD, str(ROOT / "tasks" / "pour.yaml"), str(log), str(shared)]
     process = subprocess.Popen(command, cwd=ROOT)
     with shared.open("rb") as file, mmap.mmap(file.fileno(), 8, access=mmap.ACCESS_READ) as memory:
-        deadline = time.monotonic() + 120.0
+        deadline = time.monotonic() + 600.0
         while struct.unpack_from("<q", memory, 0)[0] < after:
             assert process.poll() is None
             assert time.monotonic() < deadline

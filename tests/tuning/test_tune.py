@@ -19,6 +19,7 @@ from manipcli.record.read.reading import open_recording
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
+from manipcli.spec.controllers import JointTrajectorySpec
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.task.load_task import load_task
 from manipcli.task.vocabulary import controllers_spec
@@ -175,6 +176,15 @@ def test_the_velocity_interface_too(tmp_path: Path) -> None:
     fast = tuned(tmp_path, Wish(400.0, 1.0, 1e-3), control=control, step=1e-3)
     assert fast.limited_by == "control step"
     assert fast.margin == pytest.approx(MARGIN, rel=0.01)
+
+
+def test_a_velocity_loop_is_given_the_whole_velocity_of_its_reference(tmp_path: Path) -> None:
+    """Without it, a reference at speed v is followed v / p behind."""
+    control = "command_interface: velocity, gains: {hinge: {p: 1}}"
+    found = tune(*pendulum(tmp_path, control=control), Wish(2.0, 1.0, 1e-3), simulated=False)
+    spec = found.controllers.controllers["c"]
+    assert isinstance(spec, JointTrajectorySpec)
+    assert spec.gains["hinge"].ff_velocity_scale == 1.0
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5, 40.0])

@@ -1,4 +1,4 @@
-"""`slip`: how far an object moved in the hand that holds it."""
+"""`slip`: how far an object moved in the hand while two links pinch it; not whether it is carried, see `grasp`."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from manipcli.conditions.condition import (
 )
 from manipcli.conditions.robustness import Mask, Reading, least, reading
 from manipcli.conditions.state_window import Moments
-from manipcli.conditions.touch import held_force
 from manipcli.core.geometry import Array, matrix_from_quat
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
+from manipcli.model.grasp import GRIP_FORCE, pinch_force
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
 from manipcli.spec.quantity import AngleTolerance, Force, Length
@@ -43,7 +43,7 @@ class SlipSpec(Model):
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest motion of its centre [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Largest rotation [rad], to pi. Default: any.")
     grip: Annotated[Force, Field(gt=0)] = Field(
-        default=0.1, description="It is held while two links press on it with at least this [N]. Default 0.1 N."
+        default=GRIP_FORCE, description="It is held while two links press on it with at least this [N]. Default 0.1 N."
     )
     link: str | None = Field(default=None, description="The link that moves with the hand. Default: that of the tool.")
 
@@ -108,7 +108,7 @@ def gauge(spec: SlipSpec, world: World) -> Gauge:
     hold = _Hold(spec, world)
 
     def look(moments: Moments) -> Reading:
-        held = moments.of_contacts(lambda contacts: held_force(contacts, spec.object)) >= spec.grip
+        held = moments.of_contacts(lambda contacts: pinch_force(contacts, spec.object)) >= spec.grip
         far, rotated = hold.slipped(moments, held)
         idle = f"the robot never held '{spec.object}' between two links with {readable(spec.grip, 'N')}"
 

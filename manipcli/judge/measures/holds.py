@@ -17,17 +17,15 @@ import numpy as np
 from manipcli.conditions.state_window import ROUNDING
 from manipcli.core.geometry import Array, quat_product, rotate, rotate_inverse
 from manipcli.model.batch_kinematics import tool_poses
+from manipcli.model.grasp import BRIDGED, LINK, pressing
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
 from manipcli.plan.step import CLOSING
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 from manipcli.scene.scene import Scene
 
-BRIDGED = 0.05
-"""[s] Contact that is lost for less is not lost, and what is touched for less is not stood on."""
 SHORTEST = 0.1
 """[s] of a hold, and of a time without support."""
-ROBOT = "robot/"
 
 Ending = Literal["set down", "lost", "let go", "held to the end"]
 
@@ -144,7 +142,7 @@ def _pressing(contacts: Iterable[Contact], *, robot: bool) -> list[tuple[str, st
     return [
         (one.a, one.b)
         for one in contacts
-        if one.force > 0.0 and (one.a.startswith(ROBOT) or one.b.startswith(ROBOT)) == robot
+        if one.force > 0.0 and (one.a.startswith(LINK) or one.b.startswith(LINK)) == robot
     ]
 
 
@@ -226,12 +224,8 @@ class HoldMeter:
 
     def _contacts(self, snapshot: ContactSnapshot) -> None:
         self._pass(snapshot.time)
-        forces: dict[str, float] = {}
-        for one in snapshot.contacts:
-            for link, other in ((one.a, one.b), (one.b, one.a)):
-                if other == self._hold.body and link.startswith(ROBOT) and one.force > 0.0:
-                    forces[link.removeprefix(ROBOT)] = one.force
-        self._now = (snapshot.time, forces)
+        found = pressing(snapshot.contacts, self._hold.body)
+        self._now = (snapshot.time, {link.removeprefix(LINK): force for force, link in found})
 
     def _pass(self, time: float) -> None:
         """What held until now, for as long as it held."""

