@@ -97,7 +97,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     """Runs a job; its log, picture and page are written where they are wanted."""
     from manipcli import pipeline
     from manipcli.batch.baseline import kept_baseline
-    from manipcli.batch.telling import against_baseline, draw, junit, troubles, write_invalid_page, write_page
+    from manipcli.batch.telling import against_baseline, draw, troubles, write_invalid_page, write_page
     from manipcli.record.faults import RecordingFailed
 
     beats.doing("loading")
@@ -148,8 +148,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
     if job.page is not None:
         beats.doing("writing a page")
         notes += _noted("no page", lambda: write_page(job, report, found))
-    told = junit(job, report) if settings.junit else b""
-    return End(report, findings, found, beats.warnings, told, tuple(notes))
+    return End(report, findings, found, beats.warnings, tuple(notes))
 
 
 def _noted(what: str, make: Callable[[], None]) -> tuple[str, ...]:

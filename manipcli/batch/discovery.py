@@ -1,59 +1,14 @@
-"""Which tasks there are: YAML files with a name under the top-level key `task`, and the key `robot`, below the folders
-that are named."""
+"""The tests that a task file has, and why a file that was named has none."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.batch.first_look import LEFT_OUT, SUFFIXES, first_look, is_entered
+from manipcli.batch.first_look import SUFFIXES, first_look
 from manipcli.core.errors import Finding, InvalidInput, Place
 from manipcli.report.suite import Case
-
-
-def task_files(paths: Sequence[Path], *, tell: Callable[[str], None] | None = None) -> tuple[Path, ...]:
-    """The task files among and below `paths`, each once, folder by folder in the order of names.
-
-    Args:
-        paths: files and folders.
-        tell: takes a line about each file in a folder that looks like a task and is left out.
-
-    Raises:
-        InvalidInput: a path is not there, or is a file but no task.
-    """
-    found: dict[str, Path] = {}
-    refused: list[Finding] = []
-    for path in paths:
-        if path.is_dir():
-            looks = [(file, first_look(file)) for file in _files(path)]
-            below = [file for file, look in looks if look == "task"]
-            if tell is not None:
-                for file, look in looks:
-                    if look in LEFT_OUT:
-                        tell(f"{shown_path(file)} {LEFT_OUT[look]}")
-        else:
-            below = [path]
-            refused += _no_task(path)
-        for file in below:
-            found.setdefault(os.path.realpath(file), file)
-    if refused:
-        raise InvalidInput(refused)
-    return tuple(found.values())
-
-
-def baselines_of_none(paths: Sequence[Path], files: Iterable[Path]) -> tuple[Path, ...]:
-    """Baselines below the folders among `paths` that belong to none of the task `files`: nothing is compared with them.
-
-    What else is called so is left alone.
-    """
-    from manipcli.batch.baseline import is_baseline, kept_baseline
-
-    owned = {os.path.realpath(kept_baseline(file)) for file in files}
-    below = [file for path in paths if path.is_dir() for file in _files(path)]
-    named = {os.path.realpath(file): file for file in below if file.name.endswith(".baseline.json")}
-    return tuple(file for real, file in named.items() if real not in owned and is_baseline(file))
 
 
 def read_case(path: Path, *, shown: str | None = None) -> Case:
@@ -92,19 +47,16 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
     )
 
 
-def failed_of(case: Case, failed: Collection[str]) -> tuple[Case, ...]:
-    """The task as it is written and its samples, of those whose ids are among `failed`."""
-    numbers = [one.removeprefix(f"{case.id}[").removesuffix("]") for one in failed if one.startswith(f"{case.id}[")]
-    samples = sorted(int(one) for one in numbers if one.isdecimal()) if case.varied else ()
-    candidates = (case, *(replace(case, sample=number) for number in samples))
-    return tuple(one for one in candidates if one.id in failed)
-
-
-def samples_of(case: Case, count: int | None) -> tuple[Case, ...]:
-    """Samples 0 to `count` - 1 of a task that varies; else, and where `count` is None, the task as it is written."""
-    if count is None or not case.varied:
+def samples_of(case: Case, count: int | None, named: Collection[str] = ()) -> tuple[Case, ...]:
+    """Samples 0 to `count` - 1 of a task with a `vary:`; else the task as it is written, and the samples whose names
+    (`pour[3]`) are among `named`."""
+    if not case.varied:
         return (case,)
-    return tuple(replace(case, sample=sample) for sample in range(count))
+    if count is not None:
+        return tuple(replace(case, sample=sample) for sample in range(count))
+    numbers = (name.removeprefix(f"{case.task}[").removesuffix("]") for name in named)
+    samples = (replace(case, sample=int(one)) for one in numbers if one.isdecimal())
+    return (case, *sorted((one for one in samples if one.name in named), key=lambda one: one.sample or 0))
 
 
 def shown_path(path: Path) -> str:
@@ -132,14 +84,8 @@ def is_named_task(path: Path) -> bool:
     return isinstance(root, MappingNode) and root.get("task") is not None
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for place, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if is_entered(Path(place, name)))
-        yield from (Path(place, name) for name in sorted(names))
-
-
-def _no_task(path: Path) -> tuple[Finding, ...]:
-    """Why a file that was named is not run."""
+def refused_path(path: Path) -> tuple[Finding, ...]:
+    """Why a file that was named cannot be run as a task; empty where it can."""
     from manipcli.spec.load import read_bytes
 
     try:

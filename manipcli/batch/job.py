@@ -36,7 +36,6 @@ class Settings:
 
     Attributes:
         pages: the folder that gets a page about each run; None for none.
-        junit: whether each run is told as JUnit XML, too.
         keep_logs: also those of runs that passed.
         baseline: a run of a task as it is written may not be worse than its baseline.
         silence: a run that shows no progress for so long is ended [s].
@@ -49,7 +48,6 @@ class Settings:
     allow_outside: bool = False
     folder: Path = FOLDER
     pages: Path | None = None
-    junit: bool = False
     keep_logs: bool = False
     baseline: bool = True
     silence: float = 60.0
@@ -155,7 +153,6 @@ class End:
         findings: why nothing was run.
         troubles: why it did not pass, with places in the task file.
         warnings: what was doubted before it began.
-        junit: the file about it, where one is wanted.
         notes: what could not be made of it.
     """
 
@@ -163,7 +160,6 @@ class End:
     findings: tuple[Finding, ...] = ()
     troubles: tuple[Trouble, ...] = ()
     warnings: tuple[Finding, ...] = ()
-    junit: bytes = b""
     notes: tuple[str, ...] = ()
 
 

@@ -1,4 +1,4 @@
-"""One run in a process of its own, seen from outside: started, listened to, given up on, and what came of it."""
+"""One run in a process of its own, seen from its parent: start, watchdog, and what came of it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import Pipe
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from socket import SO_RCVTIMEO, SOL_SOCKET, socket
 from struct import pack
@@ -49,7 +50,41 @@ TELLING_TIME = 60.0
 """[s] that whatever is made of a run that is over may be silent, where the run itself may be so no longer."""
 HALF_SAID = 5.0
 """[s] that a process may stop in the middle of a message, and take to be gone once it has said all."""
+LONGEST_WAIT = 60.0
+"""[s] between two looks at a run that says nothing."""
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
+
+
+def run_job(job: Job, *, onlooker: Callable[[Beat], None] | None = None, command: tuple[str, ...] = ()) -> CaseReport:
+    """What came of a job. An exception (an interrupt) ends the process and removes what it left.
+
+    Args:
+        job: the run.
+        onlooker: called with each sign of life.
+        command: another program instead of `batch/child.py`.
+    """
+    if job.case.findings:
+        return _unreadable(job)
+    try:
+        process = Process(job, command=command)
+    except Taken:
+        where = f"writes into '{job.settings.folder}', too"
+        return _no_process(job, f"another process is running this task, and {where}; nothing was run")
+    except OSError as error:
+        return _no_process(job, f"it cannot be run: {error}")
+    try:
+        while True:
+            wait([process.connection], max(0.0, min(LONGEST_WAIT, process.patience)))
+            report = process.hear()
+            if report is None and process.patience <= 0.0:
+                report = process.give_up()
+            if report is not None:
+                return report
+            if onlooker is not None:
+                onlooker(process.doing)
+    except BaseException:
+        process.forget()
+        raise
 
 
 class Process:
@@ -206,7 +241,6 @@ class Process:
             picture=kept[job.picture],
             page=str(job.page) if job.page is not None and job.page.exists() else None,
             output=kept[job.output],
-            junit=end.junit,
             notes=end.notes,
         )
         return self._with_page(report) if unfinished else report
@@ -242,6 +276,33 @@ class Process:
     def _last_line(self) -> str:
         lines = self.job.output.read_text("utf-8", "replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+
+
+def _no_process(job: Job, why: str) -> CaseReport:
+    return CaseReport(job.case, "error", 0.0, job.command(), why, troubles=(Trouble(why),))
+
+
+def _unreadable(job: Job) -> CaseReport:
+    from manipcli.batch.telling import write_invalid_page
+
+    findings = job.case.findings
+    notes: tuple[str, ...] = ()
+    try:
+        write_invalid_page(job, findings)
+    except OSError as error:
+        notes = (f"no page: {error}",)
+    return CaseReport(
+        case=job.case,
+        outcome="invalid",
+        duration=0.0,
+        command=job.command(),
+        text="the file cannot be read",
+        findings=findings,
+        troubles=troubles_of(findings),
+        warnings=doubts_of(findings),
+        page=None if job.page is None or notes else str(job.page),
+        notes=notes,
+    )
 
 
 def _locked(path: Path) -> BinaryIO:

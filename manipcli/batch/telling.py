@@ -13,12 +13,11 @@ from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
 from manipcli.logs.invalid import invalid_page, invalid_verdict
 from manipcli.logs.replay import open_playback
-from manipcli.logs.report import file_places, log_page, refused_page
+from manipcli.logs.report import log_page, refused_page
 from manipcli.pipeline import load_task
 from manipcli.replay.frames import Frames
 from manipcli.replay.renderer import png_bytes
 from manipcli.report.html import render_page
-from manipcli.report.junit import render_junit
 from manipcli.report.run_page import Cause, RunPage, Written
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Trouble
@@ -156,9 +155,3 @@ def _causes(page: RunPage, found: Sequence[Trouble]) -> tuple[Cause, ...]:
         return lines.get(f"{Path(place.file).name}:{place.line}", Written(str(place)))
 
     return tuple(Cause(one.message, "", one.at, written(one.place)) for one in found)
-
-
-def junit(job: Job, report: RunReport) -> bytes:
-    """The run as `manipcli run --junit` tells it, but for its log, which may not be kept."""
-    places = file_places(job.path, job.settings.overrides)
-    return render_junit(report.verdict, *places, file=job.case.file)

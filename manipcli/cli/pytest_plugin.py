@@ -1,20 +1,24 @@
 """The plugin of pytest: task files are tests, and `run_task` runs one from a test in Python.
 
-It is loaded into every run of pytest, so nothing of manipcli is imported before there is a task to run.
+`manipcli test` runs pytest with it, too. It is loaded into every run of pytest, so nothing of manipcli is imported
+before there is a task to run.
 """
 
 from __future__ import annotations
 
 import math
-from argparse import ArgumentTypeError
-from collections.abc import Iterator, Sequence
+import os
+import pickle
+import signal
+from argparse import SUPPRESS, ArgumentTypeError
+from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
 
 if TYPE_CHECKING:
-    from manipcli.batch.job import Settings
+    from manipcli.batch.job import Beat, Job, Settings
     from manipcli.report.run_report import JudgedRun
     from manipcli.report.suite import Case, CaseReport
 
@@ -24,6 +28,11 @@ MARKS_OF_PYTEST = frozenset(
     {"filterwarnings", "parametrize", "skip", "skipif", "tryfirst", "trylast", "usefixtures", "xfail"}
 )
 """Marks that mean something to pytest itself: a tag of that name is a word for `-k` and nothing else."""
+
+SETTINGS, PROGRESS = "settings", ".progress"
+"""Files in the folder of a session of `manipcli test`: the settings of all runs, and what each process is running."""
+REPORT = "manipcli_report"
+"""Attribute of pytest's report that brings a pickled `CaseReport` from a worker to the session."""
 
 _SEEN = pytest.StashKey[dict[Path, Path]]()
 """Task files that are tests, by what they are without links."""
@@ -49,11 +58,50 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="S",
         help="end a task that shows no progress for so long [s]; 0: never",
     )
+    group.addoption("--manipcli-session", type=Path, help=SUPPRESS)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     _register(config, "slow", "takes more than a few seconds")
     _register(config, "engine_NAME", "a task for the engine NAME, as engine_pybullet")
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """A worker of `manipcli test` says that it is there, and can be interrupted, once, even where a shell that starts
+    the command in the background lets it ignore that."""
+    folder = session.config.getoption("manipcli_session")
+    if folder is not None and hasattr(session.config, "workerinput"):
+        _progress(folder).touch()
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def _interrupt(number: int, frame: object) -> None:
+    signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+def _progress(folder: Path) -> Path:
+    return folder / f"{os.getpid()}{PROGRESS}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Gives the report of a test to `manipcli test`, with the line and the time of the task."""
+    report = yield
+    if isinstance(item, TaskItem) and item.report is not None and call.when == "call":
+        done = item.report
+        if item.config.getoption("manipcli_session") is not None:
+            setattr(report, REPORT, pickle.dumps(done))
+            report.duration = done.duration
+            places = (one.place for one in done.troubles if one.place is not None and one.place.file == done.case.file)
+            report.location = (
+                report.location[0],
+                next((one.line for one in places if one.line), done.case.line),
+                item.name,
+            )
+    return report
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile | None:
@@ -81,7 +129,9 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> TaskFile |
         return None
     if stash.setdefault(_SEEN, {}).setdefault(file_path.resolve(), file_path) != file_path and not named:
         return None
-    return TaskFile.from_parent(parent, path=file_path)
+    # pytest would name files outside of its root by their last part alone.
+    outside = None if file_path.is_relative_to(parent.config.rootpath) else str(file_path)
+    return TaskFile.from_parent(parent, path=file_path, nodeid=outside)
 
 
 def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
@@ -95,26 +145,37 @@ def pytest_report_collectionfinish(config: pytest.Config) -> list[str]:
 
 
 class TaskFile(pytest.File):
-    """A task file: one test, or one a sample."""
+    """A task file: one test, or one for each sample."""
 
     def collect(self) -> Iterator[TaskItem]:
         from manipcli.batch.discovery import read_case, samples_of, shown_path
 
         case = read_case(self.path, shown=shown_path(self.path))
-        for one in samples_of(case, self.config.getoption("manipcli_samples")):
+        for one in samples_of(case, self.config.getoption("manipcli_samples"), self._named()):
             for tag in one.tags:
                 if tag not in MARKS_OF_PYTEST and tag not in _registered(self.config):
                     _register(self.config, tag, "a tag of a task")
             yield TaskItem.from_parent(self, name=one.name, case=one)
+
+    def _named(self) -> set[str]:
+        """Names of tests in this file that were given as ids, or failed last where these are asked for."""
+        ids = [*self.config.args]
+        if self.config.getoption("lf", default=False) and self.config.cache is not None:
+            ids += self.config.cache.get("cache/lastfailed", {})
+        files = (self.nodeid, str(self.path))
+        split = (id_.partition("::") for id_ in ids)
+        return {name for file, _, name in split if file in files or self.config.rootpath / file == self.path}
 
 
 class TaskItem(pytest.Item):
     """One run of a task, in a process of its own."""
 
     def __init__(self, *, name: str, parent: TaskFile, case: Case) -> None:
-        super().__init__(name, parent)
+        # Written out as text, from which pytest takes the number of a sample for parameters, as it does in its cache.
+        super().__init__(name, parent, nodeid=f"{parent.nodeid}::{name}")
         self._case = case
-        self.extra_keyword_matches.update(case.tags)
+        self.report: CaseReport | None = None
+        self.extra_keyword_matches.update((case.id, *case.tags))
         for tag in case.tags:
             if tag not in MARKS_OF_PYTEST:
                 self.add_marker(tag)
@@ -124,16 +185,35 @@ class TaskItem(pytest.Item):
         Raises:
             TaskFailed: it did not pass.
         """
-        from manipcli.batch.discovery import shown_path
-        from manipcli.batch.job import FOLDER
+        from manipcli.batch.process import run_job
         from manipcli.report.suite_text import judged_lines
 
-        chosen = self.config.getoption("manipcli_logs") or FOLDER
-        folder = Path(shown_path(self.config.invocation_params.dir / chosen))
-        report = _run(self._case, self.path, _settings(self.config, folder))
-        if not report.passed:
-            raise TaskFailed(report)
-        self.add_report_section("call", "margins", "\n".join(judged_lines(report)))
+        folder = self.config.getoption("manipcli_session")
+        progress = None if folder is None else _progress(folder)
+
+        def show(beat: Beat) -> None:
+            if progress is not None:
+                progress.write_text(f"{self._case.id}\n{beat}", "utf-8")
+
+        self.report = run_job(self.job, onlooker=show)
+        if progress is not None:
+            progress.write_text("")
+        if not self.report.passed:
+            raise TaskFailed(self.report)
+        self.add_report_section("call", "margins", "\n".join(judged_lines(self.report)))
+
+    @property
+    def job(self) -> Job:
+        from manipcli.batch.discovery import shown_path
+        from manipcli.batch.job import FOLDER, Job
+
+        session = self.config.getoption("manipcli_session")
+        if session is not None:
+            settings: Settings = pickle.loads((session / SETTINGS).read_bytes())
+        else:
+            chosen = self.config.getoption("manipcli_logs") or FOLDER
+            settings = _settings(self.config, Path(shown_path(self.config.invocation_params.dir / chosen)))
+        return Job(self._case, Path(shown_path(self.path)), settings)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: object = None) -> str:
         """What `manipcli test` tells of it, instead of a traceback."""
@@ -185,6 +265,8 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
         from dataclasses import replace
 
         from manipcli.batch.discovery import read_case, shown_path
+        from manipcli.batch.job import Job
+        from manipcli.batch.process import run_job
         from manipcli.core.errors import InvalidInput
         from manipcli.report.run_report import JudgedRun
         from manipcli.report.suite_text import render_case
@@ -199,7 +281,7 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
             keep_logs=True,
         )
         count += 1
-        report = _run(case, found, settings)
+        report = run_job(Job(case, Path(shown_path(found)), settings))
         if report.findings:
             raise InvalidInput(report.findings)
         if report.run is None:
@@ -207,15 +289,6 @@ def run_task(request: pytest.FixtureRequest, tmp_path: Path) -> RunTask:
         return JudgedRun.of(report.run, passed=report.passed, text=render_case(report), picture=report.picture)
 
     return run
-
-
-def _run(case: Case, path: Path, settings: Settings) -> CaseReport:
-    from manipcli.batch.discovery import shown_path
-    from manipcli.batch.job import Job
-    from manipcli.batch.pool import run_jobs
-
-    (report,) = run_jobs([Job(case, Path(shown_path(path)), settings)], at_once=1)
-    return report
 
 
 def _settings(config: pytest.Config, folder: Path) -> Settings:

@@ -71,7 +71,6 @@ class CaseReport:
         duration: wall time [s], without what it took to draw and write about the run.
         log, picture, page, output: files that were kept; `output` is what a process said that did not come to its end.
         command: what does the same again.
-        junit: the run as `manipcli run --junit` tells it, where that was asked for.
         notes: what could not be made of it.
     """
 
@@ -88,7 +87,6 @@ class CaseReport:
     picture: str | None = None
     page: str | None = None
     output: str | None = None
-    junit: bytes = b""
     notes: tuple[str, ...] = ()
 
     @property

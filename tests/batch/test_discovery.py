@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.batch.discovery import baselines_of_none, read_case, samples_of, task_files
+from manipcli.batch.discovery import read_case, samples_of, shown_path
 from manipcli.batch.first_look import first_look
+from manipcli.batch.job import Settings
+from manipcli.cli.task_session import TaskSession
 from manipcli.core.errors import InvalidInput
 
 TASKS = {
@@ -57,6 +59,12 @@ OTHERS = {
 }
 
 
+def task_files(paths: list[Path]) -> tuple[Path, ...]:
+    """Those that `manipcli test` finds."""
+    with TaskSession(paths, Settings()) as session:
+        return tuple(Path(shown_path(file)) for file in session.files)
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name, text in {**OTHERS, **TASKS}.items():
@@ -81,11 +89,12 @@ def test_the_task_files_below_a_folder_and_no_others(folder: Path) -> None:
         "{task: t, robt: r, expect: []}",
     ],
 )
-def test_what_looks_like_a_task_without_its_robot_is_told(folder: Path, text: str) -> None:
+def test_what_looks_like_a_task_without_its_robot_is_told(
+    folder: Path, text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     (folder / "tasks" / "left.yaml").write_text(text)
-    told: list[str] = []
-    assert Path("tasks/left.yaml") not in task_files([Path("tasks"), Path("runs")], tell=told.append)
-    assert told == ["tasks/left.yaml has `task:` but no `robot:`; not run"]
+    assert Path("tasks/left.yaml") not in task_files([Path("tasks"), Path("runs")])
+    assert capsys.readouterr().err == "tasks/left.yaml has `task:` but no `robot:`; not run\n"
 
 
 @pytest.mark.parametrize(
@@ -97,12 +106,13 @@ def test_what_looks_like_a_task_without_its_robot_is_told(folder: Path, text: st
         ("robot: r\ndescription: r.urdf\ncontrollers: c.yaml\n", False),
     ],
 )
-def test_what_looks_like_a_task_without_its_name_is_told(folder: Path, text: str, told: bool) -> None:
+def test_what_looks_like_a_task_without_its_name_is_told(
+    folder: Path, text: str, told: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
     (folder / "tasks" / "left.yaml").write_text(text)
-    lines: list[str] = []
-    assert Path("tasks/left.yaml") not in task_files([Path("tasks")], tell=lines.append)
-    wanted = "tasks/left.yaml has `robot:`, `controllers:` and `steps:` but no `task:`; not run"
-    assert lines == [wanted] * told
+    assert Path("tasks/left.yaml") not in task_files([Path("tasks")])
+    wanted = "tasks/left.yaml has `robot:`, `controllers:` and `steps:` but no `task:`; not run\n"
+    assert capsys.readouterr().err == wanted * told
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
@@ -193,8 +203,11 @@ def test_a_baseline_whose_task_was_renamed_is_found(folder: Path) -> None:
     files = [folder / "own" / "a.yaml", folder / "own" / "c.yml"]
     for file in files:
         file.write_text("task: t\nrobot: r.yaml\n")
-    assert baselines_of_none([folder / "own"], files) == (folder / "own" / "b.baseline.json",)
-    assert baselines_of_none(files, files[:1]) == ()
+    with TaskSession([Path("own")], Settings()) as session:
+        (note,) = session.notes
+    assert note.startswith("own/b.baseline.json is the baseline of no task here: ")
+    with TaskSession(files[:1], Settings()) as session:
+        assert session.notes == ()
 
 
 def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from manipcli.batch.child import _Beats, _end_of
 from manipcli.batch.discovery import read_case
 from manipcli.batch.job import Job, Settings
-from manipcli.batch.pool import run_jobs
+from manipcli.batch.process import run_job
 
 UNKNOWN = "task: t\nrobot: r.yaml\ncontrollers: c.yaml\nsteps: [{wiat: 1 s}]\n"
 """No step is called that."""
@@ -42,7 +42,7 @@ def test_its_page_tells_errors_and_lines(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_so_does_that_of_a_file_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (report,) = run_jobs([_job(BROKEN)], at_once=1)
+    report = run_job(_job(BROKEN))
     assert (report.outcome, report.page) == ("invalid", "pages/t.html")
     assert report.findings[0].message in _shown(Path("pages/t.html"))
 
@@ -50,7 +50,7 @@ def test_so_does_that_of_a_file_that_cannot_be_read(tmp_path: Path, monkeypatch:
 def test_a_page_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("pages").write_text("")
-    (report,) = run_jobs([_job(BROKEN)], at_once=1)
+    report = run_job(_job(BROKEN))
     assert report.page is None
     (note,) = report.notes
     assert note.startswith("no page: ")

@@ -21,8 +21,8 @@ from hypothesis import strategies as st
 
 from manipcli.batch.child import _Beats, _end_of
 from manipcli.batch.job import Beat, End, Job, Settings, limit
-from manipcli.batch.pool import remove_empty, run_jobs
-from manipcli.batch.process import Process
+from manipcli.batch.process import Process, run_job
+from manipcli.cli.task_session import remove_empty
 from manipcli.core.errors import Finding, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.record.faults import RecordingFailed
@@ -51,8 +51,8 @@ def jobs(tmp_path: Path, *codes: str, **settings: float) -> list[Job]:
     return [Job(Case(f"t{k}.yaml", code), tmp_path / f"t{k}.yaml", chosen) for k, code in enumerate(codes)]
 
 
-def run(todo: Sequence[Job], at_once: int = 2) -> list[CaseReport]:
-    return list(run_jobs(todo, at_once=at_once, command=(sys.executable, "-c", CHILD)))
+def run(todo: Sequence[Job]) -> list[CaseReport]:
+    return [run_job(job, command=(sys.executable, "-c", CHILD)) for job in todo]
 
 
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT, signal.SIGKILL])
@@ -133,14 +133,14 @@ def test_a_run_is_out_of_reach_of_its_terminal_and_has_one_thread_for_libraries(
 def test_a_run_whose_files_cannot_be_written_costs_itself_alone(tmp_path: Path) -> None:
     long, other = jobs(tmp_path, END, "os.abort()")
     long = replace(long, case=replace(long.case, file=f"{'x' * 245}.yaml"))
-    one, other_report = run([long, other], at_once=1)
+    one, other_report = run([long, other])
     assert (one.case, one.outcome, other_report.outcome) == (long.case, "error", "crashed")
     assert "File name too long" in one.troubles[0].message
 
 
 def test_a_process_that_never_begins_is_a_crash(tmp_path: Path) -> None:
     for _ in range(3):  # whether it is gone before it is spoken to is a matter of luck
-        (report,) = run_jobs(jobs(tmp_path, END), at_once=1, command=("/bin/false",))
+        report = run_job(jobs(tmp_path, END)[0], command=("/bin/false",))
         assert (report.outcome, report.text) == (
             "crashed",
             "ended with exit code 1 before it was done: it said nothing",
@@ -189,7 +189,7 @@ def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None
     (job,) = jobs(tmp_path, f"time.sleep(0.3); {END}", timeout=forever)
     job = replace(job, settings=replace(job.settings, silence=forever))
     onlooker = (lambda _: None) if watched else None
-    (report,) = run_jobs([job], at_once=1, onlooker=onlooker, command=(sys.executable, "-c", CHILD))
+    report = run_job(job, onlooker=onlooker, command=(sys.executable, "-c", CHILD))
     assert report.outcome == "invalid"
 
 
@@ -245,35 +245,20 @@ def test_a_process_that_takes_no_signal_is_ended_too(tmp_path: Path) -> None:
     assert report.outcome == "hung"
 
 
-def test_no_more_than_asked_run_at_once_and_in_order(tmp_path: Path) -> None:
-    marks = tmp_path / "marks"
-    marks.mkdir()
-    code = f"open('{marks}/' + job.case.file, 'w').close(); n = len(os.listdir('{marks}')); time.sleep(0.1); "
-    code += f"open('{tmp_path}/most', 'a').write(f'{{n}}'); os.remove('{marks}/' + job.case.file); {END}"
-    assert len(run(jobs(tmp_path, *[code] * 4), at_once=2)) == 4
-    assert max(map(int, (tmp_path / "most").read_text())) <= 2
-    assert [r.case.file for r in run(jobs(tmp_path, *[END] * 3), at_once=1)] == ["t0.yaml", "t1.yaml", "t2.yaml"]
+def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+    code = "open(job.partial, 'w').close(); parent.send(Beat(f'{os.getpid()}')); time.sleep(100)"
+    seen: list[str] = []
 
+    def interrupt(beat: Beat) -> None:
+        seen.append(beat.doing)
+        if beat.doing.isdecimal():
+            raise KeyboardInterrupt
 
-def test_who_stops_listening_leaves_no_process_and_no_file(tmp_path: Path) -> None:
-    sleeper = "open(job.partial, 'w').close(); time.sleep(100)"
-    seen: list[int] = []
-
-    def watch(processes: Sequence[Process]) -> None:
-        seen.extend(process._process.pid for process in processes)
-
-    running = run_jobs(jobs(tmp_path, END, sleeper), at_once=2, onlooker=watch, command=(sys.executable, "-c", CHILD))
-    next(running)
-    partial = tmp_path / "runs" / "t1.mcap.partial"
-    deadline = time.monotonic() + 120.0
-    while not partial.exists():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    running.close()
-    assert not list((tmp_path / "runs").glob("t1.*"))
-    for pid in set(seen):
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+    with pytest.raises(KeyboardInterrupt):
+        run_job(jobs(tmp_path, code)[0], onlooker=interrupt, command=(sys.executable, "-c", CHILD))
+    assert not list((tmp_path / "runs").iterdir())
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(seen[-1]), 0)
 
 
 VERDICT = Verdict(
@@ -309,7 +294,7 @@ def test_nothing_in_the_working_directory_is_imported(tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("manipcli.batch.process.CHILD", f"import json{CHILD}")
     Path("json.py").write_text("raise SystemExit('not the library')")
-    (report,) = run_jobs(jobs(tmp_path, END), at_once=1)
+    report = run_job(jobs(tmp_path, END)[0])
     assert (report.outcome, report.text) == ("invalid", "the task cannot be run")
 
 

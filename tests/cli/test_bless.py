@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
-from manipcli.batch import pool
 from manipcli.batch.job import Job
 from manipcli.cli.app import main
 from manipcli.report.suite import CaseReport
@@ -26,12 +24,13 @@ steps: [{{{{wait: 1 s}}}}]
 def test_an_interruption_keeps_what_was_told_of_the_tasks_before(
     format_: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupted(jobs: Sequence[Job], *, at_once: int) -> Iterator[CaseReport]:
-        yield CaseReport(jobs[0].case, "failed", 1.0, jobs[0].command(), "late")
-        raise KeyboardInterrupt
+    def interrupted(job: Job, **_: object) -> CaseReport:
+        if job.case.task == "b":
+            raise KeyboardInterrupt
+        return CaseReport(job.case, "failed", 1.0, job.command(), "late")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(pool, "run_jobs", interrupted)
+    monkeypatch.setattr("manipcli.batch.process.run_job", interrupted)
     for name in ("a", "b"):
         (tmp_path / f"{name}.yaml").write_text(TASK.format(name=name))
     assert main(["bless", "--format", format_]) == 2

@@ -18,6 +18,7 @@ import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
 from manipcli.batch.job import Job, Settings
 from manipcli.cli.pytest_plugin import TaskFailed, _settings
+from manipcli.cli.task_session import TaskSession
 from manipcli.report.suite import Case, CaseReport, CaseWord, Trouble
 
 pytest_plugins = ["pytester"]
@@ -80,10 +81,8 @@ def test_task_files_and_no_others_are_tests(project: pytest.Pytester) -> None:
 
 
 def test_the_files_are_those_of_the_command(project: pytest.Pytester) -> None:
-    from manipcli.batch.discovery import read_case, shown_path, task_files
-
-    ids = [read_case(path, shown=shown_path(path)).id for path in task_files([Path()])]
-    assert collected(project) == ids
+    with TaskSession([Path()], Settings()) as session:
+        assert collected(project) == [*session.jobs]
 
 
 @pytest.mark.parametrize(
@@ -103,12 +102,10 @@ def test_a_failure_says_its_outcome_once(pytester: pytest.Pytester, outcome: Cas
 
 
 def test_links_lead_to_no_test_twice(project: pytest.Pytester) -> None:
-    from manipcli.batch.discovery import task_files
-
     (project.path / "tasks" / "sub").mkdir()
     (project.path / "tasks" / "sub" / "loop").symlink_to("..")
     (project.path / "tasks" / "sub" / "link.yaml").symlink_to("../good.yaml")
-    assert len(collected(project)) == len(task_files([Path()])) == 3
+    assert len(collected(project)) == 3
     assert collected(project, "tasks/sub/link.yaml") == ["tasks/sub/link.yaml::good"]  # it was named
 
 
@@ -178,7 +175,7 @@ def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, w
     )
 
 
-Given = list[tuple[Path, Settings]]
+Given = list[Job]
 
 
 @pytest.fixture
@@ -186,11 +183,11 @@ def given(monkeypatch: pytest.MonkeyPatch) -> Given:
     """What would be run, and how; nothing is."""
     asked: Given = []
 
-    def run(case: Case, path: Path, settings: Settings) -> CaseReport:
-        asked.append((path, settings))
-        return CaseReport(case, "crashed", 1.0, "", "not run")
+    def run(job: Job, **_: object) -> CaseReport:
+        asked.append(job)
+        return CaseReport(job.case, "crashed", 1.0, "", "not run")
 
-    monkeypatch.setattr(f"{PLUGIN}._run", run)
+    monkeypatch.setattr("manipcli.batch.process.run_job", run)
     return asked
 
 
@@ -204,26 +201,15 @@ def test_a_python_test_finds_tasks_beside_it_then_below_the_root(pytester: pytes
     )
     result = pytester.runpytest_inprocess(*LOADED, *ALONE, "sub/test_it.py")
     result.assert_outcomes(failed=3)
-    assert [path for path, _ in given] == [
-        pytester.path / name for name in ("sub/both.yaml", "below.yaml", "both.yaml")
-    ]
-    assert {(settings.keep_logs, settings.folder.name) for _, settings in given} == {(True, "0")}
+    assert [str(job.path) for job in given] == ["sub/both.yaml", "below.yaml", "both.yaml"]
+    assert {(job.settings.keep_logs, job.settings.folder.name) for job in given} == {(True, "0")}
 
 
-def test_findings_name_files_as_the_rest_of_a_failure_does(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[Job] = []
-
-    def run(jobs: list[Job], *, at_once: int) -> list[CaseReport]:
-        asked.extend(jobs)
-        return [CaseReport(job.case, "crashed", 1.0, "", "not run") for job in jobs]
-
-    monkeypatch.setattr("manipcli.batch.pool.run_jobs", run)
+def test_findings_name_files_as_the_rest_of_a_failure_does(pytester: pytest.Pytester, given: Given) -> None:
     (pytester.path / "tasks").mkdir()
     (pytester.path / "tasks" / "t.yaml").write_text("task: t\nrobot: r.yaml\n")
     pytester.runpytest_inprocess(*LOADED, *ALONE, "tasks").assert_outcomes(failed=1)
-    assert [(job.path, job.case.file) for job in asked] == [(Path("tasks/t.yaml"), "tasks/t.yaml")]
+    assert [(job.path, job.case.file) for job in given] == [(Path("tasks/t.yaml"), "tasks/t.yaml")]
 
 
 @pytest.mark.parametrize(("words", "folder"), [([], "runs/test"), (["--manipcli-logs", "else/where"], "else/where")])
@@ -233,8 +219,8 @@ def test_logs_go_below_where_pytest_was_called_wherever_a_test_went(
     pytester.makeconftest("import os\ndef pytest_runtest_setup(item): os.chdir('/')\n")
     pytester.makefile(".yaml", t="task: t\nrobot: r.yaml\n")
     pytester.runpytest_inprocess(*LOADED, *ALONE, *words).assert_outcomes(failed=1)
-    ((_, settings),) = given
-    assert (Path("/") / settings.folder, settings.keep_logs) == (pytester.path / folder, False)
+    (job,) = given
+    assert (Path("/") / job.settings.folder, job.settings.keep_logs) == (pytester.path / folder, False)
 
 
 def test_the_plugin_loads_nothing_but_itself() -> None:

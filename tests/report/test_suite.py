@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from xml.etree.ElementTree import fromstring
 
 import pytest
 
@@ -16,11 +15,8 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report import suite_json
 from manipcli.report.case_page import render_case_page
 from manipcli.report.github import render_annotations
-from manipcli.report.junit import render_junit as render_run_junit
-from manipcli.report.run_page import Written
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, CaseWord, Suite, Trouble, doubts_of, signal_name, troubles_of
-from manipcli.report.suite_junit import render_junit
 from manipcli.report.suite_page import render_page
 from manipcli.report.suite_text import gist, render_case, render_line, render_suite, render_summary
 
@@ -139,9 +135,6 @@ def test_what_a_word_of_the_command_line_does_is_told_with_the_task() -> None:
         "::error file=tasks/pour.yaml,line=1,col=1,title=pour invalid::"
         "--set scene.nope.x=1: error[TASK212]: there is no 'nope'"
     )
-    (case,) = fromstring(render_junit(Suite((odd,), 1, 1, 1.0))).iter("testcase")
-    assert (case.get("file"), case.get("line")) == ("tasks/pour.yaml", None)
-    assert "--set scene.nope.x=1: error[TASK212]" in (case.findtext("error") or "")
 
 
 def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -150,62 +143,16 @@ def test_annotations_name_files_from_the_top_of_the_checkout(monkeypatch: pytest
     assert "file=project/tasks/pour.yaml," in render_annotations([FAILED], workspace=tmp_path)
 
 
-def test_junit_holds_the_suites_of_all_runs_and_adds_them_up() -> None:
-    sampled = replace(PASSED, case=replace(PASSED.case, sample=7))
-    root = fromstring(render_junit(Suite((with_junit(sampled), with_junit(FAILED), CRASHED), 3, 1, 1.0)))
-    suites = root.findall("testsuite")
-    assert [one.get("name") for one in suites] == [
-        "tasks/pour.yaml::pour[7]", "tasks/pour.yaml::pour", "tasks/pour.yaml::pour",
-    ]  # fmt: skip
-    for counted in ("tests", "failures", "errors"):
-        assert int(root.get(counted, "")) == sum(int(one.get(counted, "")) for one in suites)
-    assert len(root.findall(".//testcase")) == int(root.get("tests", ""))
-    assert len(root.findall(".//failure")) == int(root.get("failures", "")) == 1
-    assert len(root.findall(".//error")) == int(root.get("errors", "")) == 1
-    assert suites[0].find("testcase[@name='near']").get("classname") == "pour.expect.sample_7"  # type: ignore[union-attr]
-    error = suites[2].find("testcase/error")
-    assert error is not None
-    assert (error.get("type"), error.get("message")) == ("crashed", "crashed by signal 11 (SIGSEGV)")
-    assert "again: manipcli run tasks/pour.yaml" in [one.text for one in suites[2].findall("system-out")]
-
-
-def test_a_run_that_passed_and_is_worse_than_its_baseline_is_one_failure_more() -> None:
-    """Its own suite says that all is well."""
-    at = Place("tasks/pour.yaml", 9, 5)
-    worse = replace(with_junit(PASSED), outcome="failed", text="worse", troubles=(Trouble("takes 7 s", at),))
-    (suite,) = root = fromstring(render_junit(Suite((worse,), 1, 1, 1.0)))
-    cases = suite.findall("testcase")
-    assert suite.get("tests") == root.get("tests") == str(len(cases))
-    assert suite.get("failures") == root.get("failures") == "1"
-    (failure,) = cases[-1]
-    assert (cases[-1].get("classname"), failure.get("message")) == ("pour.baseline", "worse")
-    assert str(failure.text).splitlines()[0] == "tasks/pour.yaml:9:5: takes 7 s"
-
-
-@pytest.mark.parametrize(("stopped", "errors", "skipped"), [("interrupted", "2", "0"), ("first failure", "0", "2")])
-def test_what_was_not_run_is_in_the_file(stopped: str, errors: str, skipped: str) -> None:
-    undone = (Case("a.yaml", "a"), Case("b.yaml", "b", sample=3))
-    suite = Suite((), 2, 1, 1.0, stopped, undone=undone)  # type: ignore[arg-type]
-    root = fromstring(render_junit(suite))
-    assert [root.get(name) for name in ("tests", "failures", "errors")] == ["2", "0", errors]
-    assert len(root.findall(".//skipped")) == int(skipped)
-    assert [one.get("name") for one in root] == ["a.yaml::a", "b.yaml::b[3]"]
+def test_what_was_not_run_is_named() -> None:
+    suite = Suite((), 2, 1, 1.0, "interrupted", undone=(Case("a.yaml", "a"), Case("b.yaml", "b", sample=3)))
     assert json.loads(suite_json.render_suite(suite))["not_run"] == ["a.yaml::a", "b.yaml::b[3]"]
-
-
-def with_junit(one: CaseReport) -> CaseReport:
-    assert one.run is not None
-    verdict = one.run.verdict
-    written = [Written("pour.yaml:3")] * 3
-    xml = render_run_junit(verdict, written[:1], written[: len(verdict.expectations)], file=one.case.file)
-    return replace(one, junit=xml)
 
 
 def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -> None:
     weak = Finding("CTRL153", "joint_4: p 5", Place("weak.yaml", 12, 16), hint="d 3 gives 0.7", severity="warning")
     assert FAILED.run is not None
     drawn = replace(FAILED.run, verdict=replace(FAILED.run.verdict, drawn=Drawn(3, (("scene.cup.mass", 0.25),))))
-    odd = with_junit(replace(FAILED, run=drawn, warnings=(weak,)))
+    odd = replace(FAILED, run=drawn, warnings=(weak,))
     told = [
         "sample 3: scene.cup.mass=0.25",
         "weak.yaml:12:16: warning[CTRL153]: joint_4: p 5",
@@ -213,8 +160,6 @@ def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -
     ]
     lines = render_case(odd).splitlines()
     assert [line.removeprefix("  ") for line in lines[3:6]] == told
-    (failure,) = fromstring(render_junit(Suite((odd,), 1, 1, 1.0))).iter("failure")
-    assert str(failure.text).splitlines()[-3:] == told
     assert all(line in render_page(Suite((odd,), 1, 1, 1.0), Path()) for line in told)
     (case,) = json.loads(suite_json.render_suite(Suite((odd,), 1, 1, 1.0)))["cases"]
     assert [(one["code"], one["hint"]) for one in case["warnings"]] == [("CTRL153", "d 3 gives 0.7")]
@@ -229,19 +174,6 @@ def test_a_page_tells_all_that_was_drawn_and_a_line_the_first_of_it() -> None:
     for page in (render_page(Suite((odd,), 1, 1, 1.0), Path()), render_case_page(odd, Path())):
         assert "scene.body_8.mass=0.25" in page
         assert "and 1 more" not in page
-
-
-def test_junit_has_times_of_the_wall_and_names_a_log_that_was_kept() -> None:
-    hung = report("hung", text="hung: it took longer than 4 s", log="runs/test/tasks/pour.mcap.partial")
-    root = fromstring(render_junit(Suite((with_junit(PASSED), with_junit(FAILED), hung), 3, 1, 9.0)))
-    for suite in root:
-        times = [float(case.get("time", "")) for case in suite.iter("testcase")]
-        assert sum(times) == times[0] == float(suite.get("time", "")) == 3.5
-    logs = [one.findtext("properties/property[@name='log']") is not None for one in root]
-    values = [[one.get("value") for one in suite.findall(".//property[@name='log']")] for suite in root]
-    assert (logs, values) == (
-        [False, True, True], [[], ["runs/test/tasks/pour.mcap"], ["runs/test/tasks/pour.mcap.partial"]],
-    )  # fmt: skip
 
 
 def test_what_is_wrong_with_a_file_is_told_once_for_all_samples() -> None:

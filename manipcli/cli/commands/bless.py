@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -40,14 +39,11 @@ def bless(
     from manipcli.cli.interrupts import Interrupts
 
     with Interrupts():
-        from manipcli.batch.discovery import read_case, shown_path, task_files
-        from manipcli.batch.job import Job, Settings
-        from manipcli.batch.pool import remove_empty, run_jobs
-        from manipcli.report.suite import Suite
+        from manipcli.batch.job import Settings
+        from manipcli.cli.task_session import TaskSession
         from manipcli.report.suite_json import render_suite
         from manipcli.report.suite_text import render_case, render_summary
 
-        began = time.monotonic()
         settings = Settings(
             folder=Path("runs") / "bless",
             keep_logs=True,
@@ -55,32 +51,26 @@ def bless(
             package_path=tuple(package_path or ()),
             allow_outside=allow_outside,
         )
-        files = task_files(paths or [Path()], tell=console.talk)
-        chosen = [Job(read_case(file, shown=shown_path(file)), file, settings) for file in files]
-        if not chosen and format_ == "text":
-            console.result("nothing to bless: there is no task file")
-        told: list[CaseReport] = []
-        stopped: Literal["", "interrupted"] = ""
-        running = run_jobs(chosen, at_once=jobs)
-        try:
-            for done in running:
-                job = next(job for job in chosen if job.case.id == done.case.id)
-                lines = _blessed(job, done) if done.passed else [render_case(done), "  nothing is blessed"]
+        blessed: dict[str, CaseReport] = {}
+        with TaskSession(paths or [Path()], settings) as session:
+
+            def ended(done: CaseReport) -> None:
+                if done.passed:
+                    lines = _blessed(session.jobs[done.case.id], done)
+                    blessed[done.case.id] = _without_log(done, lines)
+                else:
+                    lines = [render_case(done), "  nothing is blessed"]
                 if format_ == "text":
                     console.result("\n".join(lines))
-                told.append(_without_log(done, lines) if done.passed else done)
-        except KeyboardInterrupt:
-            stopped = "interrupted"
-        finally:
-            running.close()
-        known = {one.case.id for one in told}
-        undone = tuple(job.case for job in chosen if job.case.id not in known)
-        suite = Suite(tuple(told), len(chosen), jobs, time.monotonic() - began, stopped, undone=undone)
+
+            if not session.jobs and format_ == "text":
+                console.result("nothing to bless: there is no task file")
+            suite = session.run(at_once=jobs, ended=ended)
+        suite = replace(suite, reports=tuple(blessed.get(one.case.id, one) for one in suite.reports))
         if format_ == "json":
             console.result(render_suite(suite))
-        elif stopped:
+        elif suite.stopped:
             console.result(render_summary(suite))
-        remove_empty(settings.folder)
         return suite.exit_code
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from threading import Event, Lock, Thread
+from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
@@ -15,14 +15,13 @@ from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
 from manipcli.cli.outputs import check_outputs
 from manipcli.core.errors import ExitCode, Finding, InvalidInput
-from manipcli.core.text import number_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from manipcli.batch.job import Job, Settings
-    from manipcli.batch.process import Process
+    from manipcli.cli.task_session import TaskSession
     from manipcli.report.suite import CaseReport, Suite
+
+PERIOD = 0.1
+"""[s] between two looks at what is running."""
 
 
 def test(
@@ -80,7 +79,7 @@ def test(
 
     with Interrupts():
         from manipcli.batch.job import FOLDER, Settings, limit
-        from manipcli.batch.pool import remove_empty
+        from manipcli.cli.task_session import TaskSession
 
         settings = Settings(
             overrides=tuple(overrides or ()),
@@ -89,7 +88,6 @@ def test(
             allow_outside=allow_outside,
             folder=logs or FOLDER,
             pages=report,
-            junit=junit is not None,
             keep_logs=keep_logs,
             silence=limit(_time("--silence", silence)),
             timeout=limit(_time("--timeout", timeout)),
@@ -99,123 +97,58 @@ def test(
         _check_folder("--report", report)
         _check_folder("--logs", settings.folder, hint=None if logs else "--logs DIR names another place")
         places = paths or [Path()]
-        chosen, among = _jobs(places, settings, keyword=keyword, samples=samples, last_failed=last_failed)
-        at_once = min(jobs or _cores(), max(1, len(chosen)))
-        lines = _Lines(chosen, text=format_ == "text", quiet=quiet)
-        suite = _run(chosen, at_once, lines, first=first)
-        suite = replace(suite, notes=(*suite.notes, *_notes(chosen, among, keyword, places)))
-        remove_empty(settings.folder)
-        lines.clear()
-        unwritten = _write(suite, junit, report)
-        _tell(replace(suite, notes=(*suite.notes, *unwritten)), format_, github=github)
+        with TaskSession(places, settings, keyword=keyword, samples=samples, last_failed=last_failed) as session:
+            with _Lines(session, text=format_ == "text", quiet=quiet) as lines:
+                suite = session.run(at_once=jobs or _cores(), ended=lines.ended, first=first)
+            unwritten = _write(suite, session, junit, report)
+        _show(replace(suite, notes=(*suite.notes, *unwritten)), format_, github=github)
         return suite.exit_code or (ExitCode.INTERNAL if unwritten else ExitCode.PASSED)
 
 
-def _jobs(
-    paths: Sequence[Path], settings: Settings, *, keyword: str, samples: int | None, last_failed: bool
-) -> tuple[tuple[Job, ...], tuple[Job, ...]]:
-    """What is to be run, in order; and what there was to choose from."""
-    from manipcli.batch.discovery import failed_of, read_case, samples_of, shown_path, task_files
-    from manipcli.batch.job import Job
-    from manipcli.batch.last_failed import last_failed as known
-    from manipcli.batch.selection import chosen_by
-
-    chosen = chosen_by(keyword) if keyword else lambda _: True
-    failed = known(settings.folder) if last_failed else frozenset()
-    found: list[Job] = []
-    again: list[Job] = []
-    for file in task_files(paths, tell=console.talk):
-        case = read_case(file, shown=shown_path(file))
-        cases = samples_of(case, samples)
-        found += (Job(one, file, settings) for one in cases)
-        again += (Job(one, file, settings) for one in failed_of(case, failed) if samples is None or one in cases)
-    matching = [[job for job in jobs if chosen(job.case)] for jobs in (again, found)]
-    return tuple(matching[0] or matching[1]), tuple(found)
-
-
-def _notes(jobs: Sequence[Job], among: Sequence[Job], keyword: str, places: Sequence[Path]) -> Iterator[str]:
-    """What a user would miss."""
-    from manipcli.batch.baseline import kept_baseline
-    from manipcli.batch.discovery import baselines_of_none, shown_path
-
-    if keyword and among and not jobs:
-        yield f"-k '{keyword}' matches none of {number_of(len(among), 'test')}"
-    for file in baselines_of_none(places, [job.path for job in among]):
-        yield f"{shown_path(file)} is the baseline of no task here: rename it as its task, or remove it"
-    uncompared = sum(not job.nominal and kept_baseline(job.path).exists() for job in jobs)
-    if uncompared:
-        why = "it is that of the task as it is written, without --set, --seed and --samples"
-        yield f"{number_of(uncompared, 'test')} not compared with the baseline: {why}"
-
-
-def _run(jobs: Sequence[Job], at_once: int, lines: _Lines, *, first: bool) -> Suite:
-    from manipcli.batch.last_failed import remember
-    from manipcli.batch.pool import run_jobs
-    from manipcli.report.suite import Suite
-
-    began = time.monotonic()
-    reports: list[CaseReport] = []
-    stopped: Literal["", "interrupted", "first failure"] = ""
-    notes: tuple[str, ...] = ()
-    running = run_jobs(jobs, at_once=at_once, onlooker=lines.running)
-    try:
-        for done in running:
-            reports.append(done)
-            lines.ended(done)
-            if first and not done.passed and len(reports) < len(jobs):
-                stopped = "first failure"
-                break
-    except KeyboardInterrupt:
-        stopped = "interrupted"
-        notes = tuple(f"interrupted: {one.job.case.id}: {one.doing}" for one in lines.now)
-    finally:
-        running.close()
-    if reports:
-        try:
-            remember(jobs[0].settings.folder, reports)
-        except OSError as error:
-            console.talk(f"what failed is not remembered: {error}")
-    order = {job.case.id: k for k, job in enumerate(jobs)}
-    reports.sort(key=lambda one: order[one.case.id])
-    known = {one.case.id for one in reports}
-    undone = tuple(job.case for job in jobs if job.case.id not in known)
-    return Suite(tuple(reports), len(jobs), at_once, time.monotonic() - began, stopped, notes, undone)
-
-
 class _Lines:
-    """What is shown while it goes on: a line each case that ends, and on a terminal what is running."""
+    """What is shown meanwhile: a line for each test that ends, and on a terminal what is running."""
 
-    def __init__(self, jobs: Sequence[Job], *, text: bool, quiet: bool) -> None:
+    def __init__(self, session: TaskSession, *, text: bool, quiet: bool) -> None:
         from manipcli.report.suite_text import id_width
 
-        self._total, self._done = len(jobs), 0
-        self._width = id_width([job.case for job in jobs])
+        self._session = session
+        self._width = id_width([job.case for job in session.jobs.values()])
+        self._done = 0
         self._text, self._quiet = text, quiet
-        self._live = console.is_live() and not quiet
-        self.now: Sequence[Process] = ()
+        self._lock, self._over = Lock(), Event()
+        self._thread = Thread(target=self._watch, daemon=True) if console.is_live() and not quiet else None
 
-    def running(self, processes: Sequence[Process]) -> None:
-        self.now = processes
-        if self._live:
-            told = "   ".join(f"{one.job.case.name}: {one.doing}" for one in processes)
-            console.redraw(f"[{self._done}/{self._total}] {told}")
+    def __enter__(self) -> Self:
+        if self._thread is not None:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+            console.redraw("")
 
     def ended(self, report: CaseReport) -> None:
         from manipcli.report.suite_text import render_line
 
-        self._done += 1
-        self.clear()
-        if self._quiet and report.passed:
-            return
-        show = console.result if self._text else console.talk
-        show(render_line(report, width=self._width))
+        with self._lock:
+            self._done += 1
+            if self._thread is not None:
+                console.redraw("")
+            if report.passed and self._quiet:
+                return
+            show = console.result if self._text else console.talk
+            show(render_line(report, width=self._width))
 
-    def clear(self) -> None:
-        if self._live:
-            console.redraw("")
+    def _watch(self) -> None:
+        while not self._over.wait(PERIOD):
+            running = (f"{id_.partition('::')[2]}: {doing}" for id_, doing in self._session.running)
+            with self._lock:
+                console.redraw(f"[{self._done}/{len(self._session.jobs)}] {'   '.join(running)}")
 
 
-def _tell(suite: Suite, format_: str, *, github: bool) -> None:
+def _show(suite: Suite, format_: str, *, github: bool) -> None:
     from manipcli.report import suite_json, suite_text
     from manipcli.report.github import render_annotations
 
@@ -226,23 +159,19 @@ def _tell(suite: Suite, format_: str, *, github: bool) -> None:
     console.result(suite_json.render_suite(suite) if format_ == "json" else suite_text.render_suite(suite))
 
 
-def _write(suite: Suite, junit: Path | None, report: Path | None) -> list[str]:
-    """The files that are asked for; why one is not written: that takes nothing from what is told."""
+def _write(suite: Suite, session: TaskSession, junit: Path | None, report: Path | None) -> list[str]:
+    """Writes the files that are asked for; why one could not be written."""
     from manipcli.core.whole_file import write_whole
-    from manipcli.report.suite_junit import render_junit
     from manipcli.report.suite_page import render_page
 
-    files: list[tuple[Path, Callable[[], bytes]]] = []
-    if junit is not None:
-        files.append((junit, lambda: render_junit(suite)))
+    files: list[tuple[Path, bytes]] = [] if junit is None else [(junit, session.junit)]
     if report is not None:
-        files.append((report / "index.html", lambda: render_page(suite, report).encode()))
+        files.append((report / "index.html", render_page(suite, report).encode()))
     unwritten = []
-    for path, render in files:
+    for path, data in files:
         try:
-            if path != junit:
-                path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, render())
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, data)
         except OSError as error:
             unwritten.append(f"not written: {path}: {error.strerror}")
         else:
