@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from manipcli.logs.chart import open_chart
+from manipcli.logs.plot import open_chart
 from manipcli.logs.replay import open_playback
 from manipcli.replay import figure
 from manipcli.replay.contact_sheet import contact_sheet

@@ -106,12 +106,12 @@ def _units(one: Condition[Any]) -> str:
 
 
 def _section(one: Condition[Any]) -> list[str]:
-    gauge = one.open.func if isinstance(one.open, partial) else one.open
+    monitor = one.open.func if isinstance(one.open, partial) else one.open
     fields = []
     for name, field in one.spec.model_fields.items():
         told = field.is_required() or "efault" in str(field.description)
         fields.append(f"- `{name}`: {field.description}{'' if told else ' Optional.'}")
-    return ["", f"### {one.name}", "", about(one.spec), "", *fields, "", f"Margin: {cleandoc(gauge.__doc__ or '')}"]
+    return ["", f"### {one.name}", "", about(one.spec), "", *fields, "", f"Margin: {cleandoc(monitor.__doc__ or '')}"]
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from manipcli.core.lazy import lazy_exports
 from manipcli.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, SimulationFailed
+    from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPlannable, SimulationFailed
     from manipcli.judge.verdict import Verdict
     from manipcli.model.state import WorldState
     from manipcli.pipeline import Plan, Task, check_files, judge_log, load_task, plan_task, run_task
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from manipcli.report.run_report import RunReport
 
 __all__ = [
-    "Finding",
+    "Diagnostic",
     "InvalidInput",
     "ManipcliError",
     "NotPlannable",
@@ -48,7 +48,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Finding": "core.errors",
+    "Diagnostic": "core.errors",
     "InvalidInput": "core.errors",
     "ManipcliError": "core.errors",
     "NotPlannable": "core.errors",

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Unpack
 
-from manipcli.core.errors import Finding, NotPlannable
+from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.stopwatch import timed
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 from manipcli.logs.judge_log import judge_log
@@ -35,7 +35,7 @@ from manipcli.task.task import Task
 from manipcli.task.vocabulary import meanings
 
 __all__ = [
-    "Finding",
+    "Diagnostic",
     "Plan",
     "Task",
     "check_files",
@@ -135,7 +135,7 @@ def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
     return task
 
 
-def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Finding, ...]]:
+def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
     """The plan, or the verdict on a task that has none; and every warning before the run."""
     try:
         plan = plan_task(task, doing=progress.doing)

@@ -15,7 +15,7 @@ from typing import Final
 
 from manipcli.batch.first_look import SUFFIXES
 from manipcli.batch.job import own_stem
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import listed
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
@@ -236,6 +236,6 @@ def _number(value: object) -> float:
     return number
 
 
-def _no_baseline(path: Path, why: str) -> Finding:
+def _no_baseline(path: Path, why: str) -> Diagnostic:
     hint = "`manipcli bless` writes a new one"
-    return Finding("USE087", f"this is no baseline: {why}", Place(str(path), 0, 0), hint=hint)
+    return Diagnostic("USE087", f"this is no baseline: {why}", Place(str(path), 0, 0), hint=hint)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from manipcli.batch.job import Beat, End, Job, Message
 from manipcli.core import collector
-from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, ManipcliError
 from manipcli.judge.verdict import StepOutcome
 from manipcli.report.suite import Trouble, troubles_of
 
@@ -51,7 +51,7 @@ class _Beats:
     """The progress of a run, as signs of life."""
 
     def __init__(self, parent: Parent) -> None:
-        self.warnings: tuple[Finding, ...] = ()
+        self.warnings: tuple[Diagnostic, ...] = ()
         self._parent = parent
         self._doing = ""
         self._written = ""
@@ -62,7 +62,7 @@ class _Beats:
         """Something that has no time of its own."""
         self._parent.send(Beat(what))
 
-    def warned(self, findings: Sequence[Finding]) -> None:
+    def warned(self, findings: Sequence[Diagnostic]) -> None:
         self.warnings += tuple(findings)
         self.doing("told of doubts")
 
@@ -122,7 +122,7 @@ def _end_of(job: Job, beats: _Beats) -> End:
         return End(None, troubles=(Trouble(str(failure), at=failure.time),), warnings=beats.warnings)
     beats.judged()
     found = troubles(job, report.verdict)
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
     notes: list[str] = []
     compare = report.verdict.verdict == "passed" and job.nominal and settings.baseline
     if compare and kept_baseline(job.path).exists():

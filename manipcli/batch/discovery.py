@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from manipcli.batch.first_look import SUFFIXES, first_look
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.report.suite import Case
 
 
@@ -31,7 +31,9 @@ def read_case(path: Path, *, shown: str | None = None) -> Case:
     task = root.get("task") if isinstance(root, MappingNode) else None
     if not isinstance(root, MappingNode) or not isinstance(task, ScalarNode) or not isinstance(task.value, str):
         message = "`task:` is no name; expected a text"
-        return Case(name, path.stem, findings=(Finding("TASK200", message, task.place if task is not None else None),))
+        return Case(
+            name, path.stem, findings=(Diagnostic("TASK200", message, task.place if task is not None else None),)
+        )
     tags = root.get("tags")
     words = [one.value for one in tags.items if isinstance(one, ScalarNode)] if isinstance(tags, SequenceNode) else []
     tagged = tuple(word for word in words if isinstance(word, str) and TAG.fullmatch(word))
@@ -84,7 +86,7 @@ def is_named_task(path: Path) -> bool:
     return isinstance(root, MappingNode) and root.get("task") is not None
 
 
-def refused_path(path: Path) -> tuple[Finding, ...]:
+def refused_path(path: Path) -> tuple[Diagnostic, ...]:
     """Why a file that was named cannot be run as a task; empty where it can."""
     from manipcli.spec.load import read_bytes
 
@@ -95,4 +97,4 @@ def refused_path(path: Path) -> tuple[Finding, ...]:
     if is_named_task(path):
         return ()
     message = "this is no task file: a YAML file with the top-level keys `task` and `robot` was expected"
-    return (Finding("USE105", message, Place(str(path), 1, 1)),)
+    return (Diagnostic("USE105", message, Place(str(path), 1, 1)),)

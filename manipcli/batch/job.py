@@ -7,7 +7,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.report.markup import link
 from manipcli.report.run_report import RunReport
 from manipcli.report.suite import Case, Trouble
@@ -157,9 +157,9 @@ class End:
     """
 
     report: RunReport | None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
     troubles: tuple[Trouble, ...] = ()
-    warnings: tuple[Finding, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
     notes: tuple[str, ...] = ()
 
 

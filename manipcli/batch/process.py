@@ -55,7 +55,7 @@ LONGEST_WAIT = 60.0
 _WORDS: dict[ExitCode, CaseWord] = {ExitCode.PASSED: "passed", ExitCode.FAILED: "failed"}
 
 
-def run_job(job: Job, *, onlooker: Callable[[Beat], None] | None = None, command: tuple[str, ...] = ()) -> CaseReport:
+def run_job(job: Job, *, observer: Callable[[Beat], None] | None = None, command: tuple[str, ...] = ()) -> CaseReport:
     """What came of a job. An exception (an interrupt) ends the process and removes what it left.
 
     Args:
@@ -80,8 +80,8 @@ def run_job(job: Job, *, onlooker: Callable[[Beat], None] | None = None, command
                 report = process.give_up()
             if report is not None:
                 return report
-            if onlooker is not None:
-                onlooker(process.doing)
+            if observer is not None:
+                observer(process.doing)
     except BaseException:
         process.forget()
         raise

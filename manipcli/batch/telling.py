@@ -8,7 +8,7 @@ from pathlib import Path
 
 from manipcli.batch.baseline import Key, compared, kept_baseline, measured, read_baseline
 from manipcli.batch.job import Job
-from manipcli.core.errors import Finding, Loc, Place
+from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.whole_file import write_whole
 from manipcli.judge.verdict import Verdict
 from manipcli.logs.invalid import invalid_page, invalid_verdict
@@ -129,7 +129,7 @@ def write_page(job: Job, report: RunReport, found: Sequence[Trouble]) -> None:
     _write(job, replace(page, warnings=report.warnings))
 
 
-def write_invalid_page(job: Job, findings: Sequence[Finding]) -> None:
+def write_invalid_page(job: Job, findings: Sequence[Diagnostic]) -> None:
     """The page about a task that cannot be used, as `manipcli run --report` makes it, where pages are wanted.
 
     Raises:

@@ -38,7 +38,7 @@ from manipcli.cli.commands import (
 )
 from manipcli.cli.commands import list as list_
 from manipcli.core import collector
-from manipcli.core.errors import ExitCode, Finding, ManipcliError
+from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
 from manipcli.core.version import __version__
 from manipcli.record.faults import RecordingFailed
 
@@ -180,35 +180,35 @@ def _fail(error: BaseException, *, format_: str) -> ExitCode:
     return code
 
 
-def _classify(error: BaseException) -> tuple[ExitCode, tuple[Finding, ...]]:
+def _classify(error: BaseException) -> tuple[ExitCode, tuple[Diagnostic, ...]]:
     """The exit code of an error, and what to tell of it."""
     if isinstance(error, ManipcliError):
         return error.exit_code, error.findings
     if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "manipcli"
-        finding = Finding(
+        finding = Diagnostic(
             code="USE001", message=_without_jargon(error.format_message()), hint=f"`{command} --help` shows the usage"
         )
         return ExitCode.USAGE, (finding,)
     if _is_interrupt(error):
-        return ExitCode.INTERRUPTED, (Finding(code="USE002", message="interrupted"),)
+        return ExitCode.INTERRUPTED, (Diagnostic(code="USE002", message="interrupted"),)
     if isinstance(error, OSError) and error.errno in _FULL:
         where = "what was to be written" if error.filename is None else str(error.filename)
         message = f"{where}: {_FULL[error.errno]} ({error.strerror})"
-        return ExitCode.INTERNAL, (Finding(code="INT001", message=message),)
+        return ExitCode.INTERNAL, (Diagnostic(code="INT001", message=message),)
     if isinstance(error, OSError) and error.filename is not None:
-        return ExitCode.USAGE, (Finding(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
+        return ExitCode.USAGE, (Diagnostic(code="USE003", message=f"'{error.filename}': {error.strerror}"),)
     if isinstance(error, FileNotFoundError):  # of no name: the working folder's was asked for, or `tempfile` says this
         if error.strerror == os.strerror(errno.ENOENT):
-            finding = Finding("USE004", "the working folder has been removed", hint="enter it again, or another one")
+            finding = Diagnostic("USE004", "the working folder has been removed", hint="enter it again, or another one")
         else:
-            finding = Finding("USE006", str(error.strerror or error), hint="TMPDIR=FOLDER names another one")
+            finding = Diagnostic("USE006", str(error.strerror or error), hint="TMPDIR=FOLDER names another one")
         return ExitCode.USAGE, (finding,)
     if isinstance(error, UnicodeEncodeError) and error.encoding == sys.getfilesystemencoding() != "utf-8":
         message = f"no file can be called '{error.object}': this locale knows {error.encoding} only"
-        return ExitCode.USAGE, (Finding("USE005", message, hint="set LC_ALL=C.UTF-8"),)
-    finding = Finding(
+        return ExitCode.USAGE, (Diagnostic("USE005", message, hint="set LC_ALL=C.UTF-8"),)
+    finding = Diagnostic(
         code=ManipcliError.code,
         message=f"{type(error).__name__}: {error}".replace("\n", " "),
         hint="this is a bug in manipcli; MANIPCLI_DEBUG=1 shows where",

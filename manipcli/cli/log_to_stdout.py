@@ -8,7 +8,7 @@ from pathlib import Path
 
 from manipcli.cli import console
 from manipcli.cli.options import OutputFormat
-from manipcli.core.errors import Finding, InvalidInput, ManipcliError
+from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError
 
 
 class LogCut(ManipcliError):
@@ -27,10 +27,10 @@ def refuse_stdout(format_: OutputFormat) -> None:
     """
     if format_ == "json":
         message = "--log - and --format json both want stdout"
-        raise InvalidInput([Finding("USE051", message, hint="give the log a file, or leave out --format json")])
+        raise InvalidInput([Diagnostic("USE051", message, hint="give the log a file, or leave out --format json")])
     if console.result_is_terminal():
         message = "the log would go to the terminal, which cannot show it"
-        raise InvalidInput([Finding("USE048", message, hint="redirect it: --log - > run.mcap")])
+        raise InvalidInput([Diagnostic("USE048", message, hint="redirect it: --log - > run.mcap")])
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 
 OutputFormat = Literal["text", "json"]
 
@@ -64,7 +64,7 @@ def seconds(word: str) -> float:
         value = float(word) if word.strip()[-1:].isdecimal() else to_si(word, TIME)
     except (ValueError, UnitError) as error:
         message = error.cause if isinstance(error, UnitError) else f"'{word}' is no time"
-        raise InvalidInput([Finding("USE050", message, hint="write 3.2, '3.2 s' or 250ms")]) from error
+        raise InvalidInput([Diagnostic("USE050", message, hint="write 3.2, '3.2 s' or 250ms")]) from error
     return value
 
 
@@ -80,9 +80,9 @@ def hertz(word: str) -> float:
         value = float(word) if word.strip()[-1:].isdecimal() else to_si(word, FREQUENCY)
     except (ValueError, UnitError) as error:
         message = error.cause if isinstance(error, UnitError) else f"'{word}' is no frequency"
-        raise InvalidInput([Finding("USE072", message, hint="write 5, '5 Hz' or 0.5kHz")]) from error
+        raise InvalidInput([Diagnostic("USE072", message, hint="write 5, '5 Hz' or 0.5kHz")]) from error
     if not 0.0 < value < 1e9:
-        raise InvalidInput([Finding("USE072", f"'{word}' is no frequency above 0")])
+        raise InvalidInput([Diagnostic("USE072", f"'{word}' is no frequency above 0")])
     return value
 
 
@@ -97,6 +97,6 @@ def xacro_arguments(words: list[str]) -> dict[str, str]:
         name, mark, value = word.partition(":=")
         if not mark or not name:
             message = f"'{word}' is no argument of a description; expected NAME:=VALUE"
-            raise InvalidInput([Finding("USE045", message)])
+            raise InvalidInput([Diagnostic("USE045", message)])
         found[name] = value
     return found

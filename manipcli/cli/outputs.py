@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manipcli.cli import console
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,15 +44,15 @@ def check_outputs(*outputs: tuple[str, Path | None], reads: Sequence[Path | None
             continue
         if str(path) == "-":
             message = f"{option} '-': stdout has the answer of the command; expected the name of a file"
-            raise InvalidInput([Finding("USE083", message)])
+            raise InvalidInput([Diagnostic("USE083", message)])
         if os.path.realpath(path) in taken:
-            raise InvalidInput([Finding("USE081", f"{option} '{path}': the same command has that file already")])
+            raise InvalidInput([Diagnostic("USE081", f"{option} '{path}': the same command has that file already")])
         if path.is_dir() or not path.parent.is_dir():
             what = "is a folder" if path.is_dir() else f"there is no folder '{path.parent}'"
-            raise InvalidInput([Finding("USE082", f"{option} '{path}': {what}")])
+            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': {what}")])
         whole = path if path.exists() and not path.is_file() else Path(os.path.realpath(path)).parent
         if not os.access(whole, os.W_OK):
-            raise InvalidInput([Finding("USE082", f"{option} '{path}': nothing can be written in '{whole}'")])
+            raise InvalidInput([Diagnostic("USE082", f"{option} '{path}': nothing can be written in '{whole}'")])
         taken.append(os.path.realpath(path))
 
 
@@ -62,7 +62,7 @@ def check_picture(path: Path | None) -> None:
         InvalidInput: its name is not that of a PNG file.
     """
     if path is not None and path.suffix.lower() != ".png":
-        raise InvalidInput([Finding("USE063", f"'{path}': a picture is a .png")])
+        raise InvalidInput([Diagnostic("USE063", f"'{path}': a picture is a .png")])
 
 
 class Outputs:
@@ -95,7 +95,7 @@ class Outputs:
         *,
         task: Path | None = None,
         overrides: Sequence[str] = (),
-        warnings: Sequence[Finding] = (),
+        warnings: Sequence[Diagnostic] = (),
         meshes: Mapping[str, Path] = {},
         package_path: Sequence[Path] = (),
         allow_outside: bool = False,
@@ -126,7 +126,7 @@ class Outputs:
             page = log_page(log, meshes=meshes, package_path=package_path, allow_outside=allow_outside)
             self._write(self._report, render_page(replace(page, warnings=tuple(warnings))).encode())
 
-    def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Finding]) -> None:
+    def of_refusal(self, task: Task, verdict: Verdict, file: Path, warnings: Sequence[Diagnostic]) -> None:
         """Writes what is asked for about a task of which a step cannot be planned."""
         from manipcli.logs.report import refused_page, task_places
         from manipcli.report.html import render_page
@@ -139,7 +139,7 @@ class Outputs:
             page = replace(refused_page(task, verdict), warnings=tuple(warnings))
             self._write(self._report, render_page(page).encode())
 
-    def of_invalid(self, findings: Sequence[Finding], *, task: Path | None = None, log: Path | None = None) -> None:
+    def of_invalid(self, findings: Sequence[Diagnostic], *, task: Path | None = None, log: Path | None = None) -> None:
         """Writes what is asked for about a task or a log that cannot be used: no page of an earlier run may stay."""
         file = task or log
         if file is None or not self.wanted:

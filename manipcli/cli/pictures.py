@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from manipcli.cli import console
 from manipcli.cli.outputs import check_picture
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.replay.camera import Vector
@@ -49,7 +49,7 @@ class Pictures:
         ):
             if value is not None and not drawn:
                 hint = f"give {needed}, too"
-                raise InvalidInput([Finding("USE062", f"{option} has no effect without {needed}", hint=hint)])
+                raise InvalidInput([Diagnostic("USE062", f"{option} has no effect without {needed}", hint=hint)])
         check_picture(self.picture)
         check_picture(self.sheet)
         if self.wanted:

@@ -7,7 +7,7 @@ from typing import Protocol, Self
 
 from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.judge.verdict import StepOutcome
 from manipcli.report.text import describe, describe_step
 
@@ -48,7 +48,7 @@ class StepProgress:
     def doing(self, what: str) -> None:
         """Is told to nobody: it soon is done."""
 
-    def warned(self, findings: Sequence[Finding]) -> None:
+    def warned(self, findings: Sequence[Diagnostic]) -> None:
         """What may go wrong, known before the first step."""
         for finding in findings:
             if not self._quiet:

@@ -195,7 +195,7 @@ class TaskItem(pytest.Item):
             if progress is not None:
                 progress.write_text(f"{self._case.id}\n{beat}", "utf-8")
 
-        self.report = run_job(self.job, onlooker=show)
+        self.report = run_job(self.job, observer=show)
         if progress is not None:
             progress.write_text("")
         if not self.report.passed:

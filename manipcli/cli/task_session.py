@@ -25,7 +25,7 @@ from manipcli.batch.discovery import refused_path, shown_path
 from manipcli.batch.first_look import NOT_ENTERED
 from manipcli.batch.job import Settings
 from manipcli.cli import console, pytest_plugin
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import number_of
 from manipcli.report.suite import CaseReport, Suite, Trouble
 
@@ -91,7 +91,7 @@ class TaskSession:
         if code == pytest.ExitCode.USAGE_ERROR:
             message = told.getvalue().strip().removeprefix("ERROR: ")
             hint = "for example: -k 'pour and not (slow or kinematic)'" if "'-k'" in message else None
-            raise InvalidInput([Finding("USE085", message, hint=hint)])
+            raise InvalidInput([Diagnostic("USE085", message, hint=hint)])
         if code == pytest.ExitCode.INTERNAL_ERROR:
             raise RuntimeError(told.getvalue())
         if found.interrupted:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, Literal, TypeVar
 
-from manipcli.conditions.robustness import Reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
@@ -31,7 +31,7 @@ Scope = Literal["end", "always"]
 Seen = Literal["bodies", "contacts", "references"]
 """What a log may have been told to leave out."""
 
-Gauge = Callable[[Moments], Reading]
+Gauge = Callable[[StateWindow], Robustness]
 """Answers for successive moments, each call going on where the last one ended. The first tick that it is shown is where
 it starts to count: from there something moved, slipped, took time or energy."""
 
@@ -69,7 +69,7 @@ class World:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class CheckContext:
     """What a spec may speak of, before anything runs.
 
     Attributes:
@@ -119,7 +119,7 @@ class Condition(Generic[S]):
     spec: type[S]
     units: tuple[str, ...]
     open: Callable[[S, World], Gauge]
-    check: Callable[[S, Setting], tuple[Problem, ...]]
+    check: Callable[[S, CheckContext], tuple[Problem, ...]]
     absent: Callable[[S, World], str | None]
     example: str
     scope: Scope = "end"

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Scope, Setting, World
-from manipcli.conditions.robustness import Reading, greatest, least, named, opposite
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, Scope, World
+from manipcli.conditions.robustness import Robustness, greatest, least, named, opposite
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
 from manipcli.spec.condition import ConditionSpec
@@ -23,12 +23,12 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
     """The gauge of a condition or combination, from the next moments on."""
     if not spec.combines:
         member = seam[spec.name]
-        gauge: Gauge = member.open(spec.body, world)
-        return gauge
+        monitor: Gauge = member.open(spec.body, world)
+        return monitor
     members = [_told(one, opened(one, world, seam)) for one in spec.members]
 
-    def look(moments: Moments) -> Reading:
-        readings = [member(moments) for member in members]
+    def look(window: StateWindow) -> Robustness:
+        readings = [member(window) for member in members]
         if spec.name == "not":
             return opposite(readings[0])
         return least(readings) if spec.name == "all" else greatest(readings)
@@ -36,9 +36,9 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
     return look
 
 
-def _told(spec: ConditionSpec, gauge: Gauge) -> Gauge:
+def _told(spec: ConditionSpec, monitor: Gauge) -> Gauge:
     """As a member of a combination it says which condition it is."""
-    return gauge if spec.combines else lambda moments: named(gauge(moments), spec.name)
+    return monitor if spec.combines else lambda window: named(monitor(window), spec.name)
 
 
 def absent(spec: ConditionSpec, world: World, seam: Seams) -> str | None:
@@ -50,15 +50,15 @@ def absent(spec: ConditionSpec, world: World, seam: Seams) -> str | None:
     return None
 
 
-def problems(spec: ConditionSpec, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
+def problems(spec: ConditionSpec, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
     """Everything in it that the setting does not know; `loc` begins with the word."""
     found: list[Problem] = []
     if spec.combines:
         for k, one in enumerate(spec.members):
             loc: Loc = (spec.name,) if spec.name == "not" else (spec.name, k)
-            found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(one, setting, seam)]
+            found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(one, context, seam)]
         return tuple(found)
-    told = seam[spec.name].check(spec.body, setting)
+    told = seam[spec.name].check(spec.body, context)
     return tuple(Problem((spec.name, *p.loc), p.message, p.hint, p.code) for p in told)
 
 

@@ -59,7 +59,7 @@ class NotEvaluated:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class Robustness:
     """Margins on T successive ticks.
 
     Attributes:
@@ -84,7 +84,7 @@ class Reading:
         return self.margins if len(self.units) == 1 else self.relative
 
 
-def reading(
+def robustness(
     margins: Array,
     times: Array,
     *,
@@ -94,7 +94,7 @@ def reading(
     at: Callable[[int], float | None] | None = None,
     applies: Mask | None = None,
     idle: str = "",
-) -> Reading:
+) -> Robustness:
     """Margins in one unit.
 
     Args:
@@ -104,7 +104,7 @@ def reading(
         scale: the tolerance that they were compared to, above 0, in `unit`.
         say: tick -> what was measured there.
         at: tick -> the moment [s] to name; default: the tick's own.
-        applies, idle: see `Reading`; default: everywhere.
+        applies, idle: see `Robustness`; default: everywhere.
     """
     every = np.broadcast_to(margins, np.shape(times))
 
@@ -113,20 +113,20 @@ def reading(
         return Measured(margin, unit, float(times[k]) if at is None else at(k), say(k))
 
     everywhere = np.ones(np.shape(times), dtype=bool) if applies is None else applies
-    return Reading(every, every / scale, (unit,), everywhere, idle, found)
+    return Robustness(every, every / scale, (unit,), everywhere, idle, found)
 
 
-def least(readings: Sequence[Reading]) -> Reading:
+def least(readings: Sequence[Robustness]) -> Robustness:
     """`all`: on each tick the least margin; it applies where every member does."""
     return _picked(readings, np.argmin)
 
 
-def greatest(readings: Sequence[Reading]) -> Reading:
+def greatest(readings: Sequence[Robustness]) -> Robustness:
     """`any`: on each tick the greatest margin; it applies where every member does."""
     return _picked(readings, np.argmax)
 
 
-def opposite(of: Reading, *, word: str = "not ") -> Reading:
+def opposite(of: Robustness, *, word: str = "not ") -> Robustness:
     """`not`: the same margin with the other sign, and -`EDGE` at most where `of` holds; `word` is said before what was
     found."""
 
@@ -142,7 +142,7 @@ def _negated(margins: Array) -> Array:
     return np.where(margins >= 0.0, -np.maximum(margins, EDGE), -margins)
 
 
-def never(of: Reading) -> Reading:
+def never(of: Robustness) -> Robustness:
     """`never`: the opposite, and what is asked is told as such: `'cup' moved by 38 mm; never at least 60 mm`.
 
     Never not is always.
@@ -159,7 +159,7 @@ def never(of: Reading) -> Reading:
     return replace(against, found=found)
 
 
-def named(of: Reading, word: str) -> Reading:
+def named(of: Robustness, word: str) -> Robustness:
     """The same, telling which condition it is."""
 
     def found(k: int) -> Measured:
@@ -169,7 +169,7 @@ def named(of: Reading, word: str) -> Reading:
     return replace(of, found=found)
 
 
-def _picked(readings: Sequence[Reading], pick: Callable[..., npt.NDArray[np.intp]]) -> Reading:
+def _picked(readings: Sequence[Robustness], pick: Callable[..., npt.NDArray[np.intp]]) -> Robustness:
     # argmin and argmax both pick what is not a number, so that it is not lost.
     if len(readings) == 1:
         return readings[0]
@@ -180,7 +180,7 @@ def _picked(readings: Sequence[Reading], pick: Callable[..., npt.NDArray[np.intp
     ticks = np.arange(margins.shape[1])
     applies = np.logical_and.reduce([one.applies for one in readings])
     idle = next((one.idle for one in readings if not one.applies.all()), "")
-    return Reading(
+    return Robustness(
         margins[member, ticks], relative[member, ticks], units, applies, idle, lambda k: readings[member[k]].found(k)
     )
 
@@ -199,7 +199,7 @@ class Extreme:
         self.broken_ticks = 0
         """At how many ticks it did not."""
 
-    def add(self, more: Reading, times: Array, first: int = 0, last: int | None = None) -> None:
+    def add(self, more: Robustness, times: Array, first: int = 0, last: int | None = None) -> None:
         """The ticks from `first` up to and without `last` count, too."""
         order, applies = more.order[first:last], more.applies[first:last]
         ticks = np.flatnonzero(applies)

@@ -46,7 +46,7 @@ class StepTime:
 
 
 @dataclass(frozen=True, slots=True)
-class Moments:
+class StateWindow:
     """Successive control ticks.
 
     Attributes:
@@ -68,7 +68,7 @@ class Moments:
         """(T,) [s]"""
         return self.states.time
 
-    def part(self, first: int, last: int) -> Moments:
+    def part(self, first: int, last: int) -> StateWindow:
         """The ticks from `first` up to and without `last`."""
         if first == 0 and last == len(self.times):
             return self

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.conditions.condition import Problem, Setting
+from manipcli.conditions.condition import CheckContext, Problem
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.model.batch_kinematics import still_links
@@ -23,10 +23,10 @@ def is_part(written: str, part: str) -> bool:
     return written == part or (written == ROBOT and part.startswith(f"{ROBOT}/"))
 
 
-def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:
+def unknown_part(context: CheckContext, name: str, loc: Loc) -> tuple[Problem, ...]:
     """Empty if `name` is a body, the robot, or one of its links."""
-    bodies = tuple(body.name for body in setting.scene.bodies)
-    links = tuple(f"{ROBOT}/{link.name}" for link in setting.robot.links)
+    bodies = tuple(body.name for body in context.scene.bodies)
+    links = tuple(f"{ROBOT}/{link.name}" for link in context.robot.links)
     if name == ROBOT or name in bodies or name in links:
         return ()
     message = f"'{name}' is neither a body of the scene nor a part of the robot"
@@ -36,9 +36,9 @@ def unknown_part(setting: Setting, name: str, loc: Loc) -> tuple[Problem, ...]:
     return (Problem(loc, message, did_you_mean(name, known)),)
 
 
-def impossible_pair(setting: Setting, pair: tuple[str, str], loc: Loc) -> tuple[Problem, ...]:
+def impossible_pair(context: CheckContext, pair: tuple[str, str], loc: Loc) -> tuple[Problem, ...]:
     """Empty if both parts exist and the simulation lets them touch each other."""
-    unknown = tuple(found for k, name in enumerate(pair) for found in unknown_part(setting, name, (*loc, k)))
+    unknown = tuple(found for k, name in enumerate(pair) for found in unknown_part(context, name, (*loc, k)))
     if unknown:
         return unknown
     if all(name.partition("/")[0] == ROBOT for name in pair):
@@ -46,8 +46,8 @@ def impossible_pair(setting: Setting, pair: tuple[str, str], loc: Loc) -> tuple[
         return (Problem(loc, message, "leave the pair out: the planner keeps the robot off itself"),)
     if pair[0] == pair[1]:
         return (Problem(loc, f"'{pair[0]}' cannot touch itself"),)
-    fixed = {body.name for body in setting.scene.bodies if body.fixed}
-    fixed |= {f"{ROBOT}/{link}" for link in still_links(setting.robot)}
+    fixed = {body.name for body in context.scene.bodies if body.fixed}
+    fixed |= {f"{ROBOT}/{link}" for link in still_links(context.robot)}
     if fixed.issuperset(pair):
         return (Problem(loc, f"'{pair[0]}' and '{pair[1]}' are both fixed, so nothing can be said of their contact"),)
     return ()

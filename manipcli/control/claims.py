@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from manipcli.control.command import may_go_together
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import did_you_mean, listed
 from manipcli.spec.controllers import Interface
 
@@ -46,7 +46,7 @@ class Claims:
 
 def conflicts(
     controllers: Sequence[Claimant], joints: Collection[str], following: Collection[str]
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """Everything for which these controllers cannot be active at once.
 
     Args:
@@ -58,7 +58,7 @@ def conflicts(
     names = [controller.name for controller in controllers]
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
-            findings.append(Finding("CTRL141", f"two controllers are named '{name}'"))
+            findings.append(Diagnostic("CTRL141", f"two controllers are named '{name}'"))
     claims = Claims.of(controllers)
     twice: dict[tuple[str, str], list[str]] = {}
     excluded: dict[tuple[tuple[Interface, str], ...], dict[str, None]] = {}
@@ -76,21 +76,21 @@ def conflicts(
             if not may_go_together(together):
                 excluded.setdefault(tuple((i, claims.owners[joint, i]) for i in together), {})[joint] = None
     for (owner, name), what in twice.items():
-        findings.append(Finding("CTRL142", f"controllers '{owner}' and '{name}' both claim {listed(what, most=3)}"))
+        findings.append(Diagnostic("CTRL142", f"controllers '{owner}' and '{name}' both claim {listed(what, most=3)}"))
     for claimed, (first, *others) in excluded.items():
         all_of = ", ".join(f"{first}/{interface} ({owner})" for interface, owner in claimed)
         more = f"; the same of {listed(others, most=3)}" if others else ""
-        findings.append(Finding("CTRL148", f"a joint cannot be commanded on all of these at once: {all_of}{more}"))
+        findings.append(Diagnostic("CTRL148", f"a joint cannot be commanded on all of these at once: {all_of}{more}"))
     return tuple(findings)
 
 
-def _unfit(controller: Claimant, joint: str, joints: Collection[str], following: Collection[str]) -> Finding | None:
+def _unfit(controller: Claimant, joint: str, joints: Collection[str], following: Collection[str]) -> Diagnostic | None:
     """Why a controller could have a joint under no circumstances."""
     name = controller.name
     if joint not in joints:
         message = f"controller '{name}' wants joint '{joint}', but the robot has no such moving joint"
-        return Finding("CTRL144", message, hint=did_you_mean(joint, joints, kind="joints"))
+        return Diagnostic("CTRL144", message, hint=did_you_mean(joint, joints, kind="joints"))
     if joint in following and controller.interfaces:
         what = f"{joint}/{controller.interfaces[0]}"
-        return Finding("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' follows another joint")
+        return Diagnostic("CTRL143", f"controller '{name}' claims {what}, but joint '{joint}' follows another joint")
     return None

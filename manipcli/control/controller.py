@@ -162,7 +162,7 @@ S = TypeVar("S", bound=ControllerSpec)
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class BuildContext:
     """What controllers are built for: the robot, its kinematics (made when first asked for), and ROS's dialect."""
 
     robot: RobotModel
@@ -185,7 +185,7 @@ class ControllerMember(Generic[S]):
 
     name: str
     spec: type[S]
-    build: Callable[[str, S, Fit], Controller]
+    build: Callable[[str, S, BuildContext], Controller]
     check: Callable[[S, RobotModel], Iterable[Problem]]
     loop: Callable[[S], ControlLoop]
     hand: Callable[[S], HandSettings] | None = None

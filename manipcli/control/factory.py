@@ -6,12 +6,12 @@ from collections.abc import Callable, Collection, Iterator
 from functools import cache
 
 from manipcli.control.command import may_go_together
-from manipcli.control.controller import Fit
+from manipcli.control.controller import BuildContext
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.feed_forward import ModelFeedForward
 from manipcli.control.lifecycle import ticks_between
 from manipcli.control.manager import ControllerManager
-from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, Loc, Place
+from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, listed
 from manipcli.description.transmission import Compat
 from manipcli.model.kinematics import Kinematics
@@ -52,14 +52,14 @@ def build_controllers(
     errors = [f for f in controller_findings(spec, robot, period, place) if f.severity == "error"]
     if errors:
         raise InvalidInput(errors)
-    fit = Fit(robot, kinematics=cache(lambda: kinematics or Kinematics(robot)), compat=compat)
-    built = {name: CONTROLLERS[one.type].build(name, one, fit) for name, one in spec.controllers.items()}
+    context = BuildContext(robot, kinematics=cache(lambda: kinematics or Kinematics(robot)), compat=compat)
+    built = {name: CONTROLLERS[one.type].build(name, one, context) for name, one in spec.controllers.items()}
     wanted = any(controller.feed_forward != "none" for controller in built.values())
     manager = ControllerManager(
         joints=robot.joint_names,
         period=period,
         following=robot.following,
-        feed_forward=ModelFeedForward(robot, fit.kinematics()) if wanted else None,
+        feed_forward=ModelFeedForward(robot, context.kinematics()) if wanted else None,
     )
     for name, controller in built.items():
         manager.load(controller, update_rate=spec.controllers[name].update_rate)
@@ -70,21 +70,21 @@ def build_controllers(
 
 def controller_findings(
     spec: ControllersSpec, robot: RobotModel, period: float, place: Where = _nowhere
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """Errors: unknown, fixed, mimic or repeated joints; what two active controllers both claim; an update rate that
     does not divide the control rate; what the types object to. Warnings: joints that nobody commands, joints that
     follow two, and positions that are commanded at a lower rate than the control rate."""
     return tuple(_findings(spec, robot, period, place))
 
 
-def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Where) -> Iterator[Finding]:
+def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Where) -> Iterator[Diagnostic]:
     owners: dict[str, dict[Interface, str]] = {}
     commanded: set[str] = set()
     together: set[tuple[str, str, str]] = set()
     for name, one in spec.controllers.items():
         at = ("controllers", name)
         if not one.joints and one.interfaces:
-            yield Finding("CTRL101", f"controller '{name}' has no joints", place((*at, "joints")))
+            yield Diagnostic("CTRL101", f"controller '{name}' has no joints", place((*at, "joints")))
         for k, joint in enumerate(one.joints):
             where = place((*at, "joints", k))
             yield from _joint_findings(name, one, joint, robot, where)
@@ -96,11 +96,11 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
         yield from _rate_findings(name, one, robot, period, place((*at, "update_rate")))
         for problem in CONTROLLERS[one.type].check(one, robot):
             message = f"controller '{name}': {problem.message}"
-            yield Finding(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
+            yield Diagnostic(problem.code or "CTRL100", message, place((*at, *problem.loc)), hint=problem.hint)
     yield from _rivals(spec, together, place)
     idle = [joint.name for joint in robot.moving_joints if joint.independent and joint.name not in commanded]
     if idle:
-        yield Finding(
+        yield Diagnostic(
             "CTRL145",
             f"no controller commands {', '.join(repr(joint) for joint in idle)} of robot '{robot.name}'",
             place(("controllers",)),
@@ -111,7 +111,7 @@ def _findings(spec: ControllersSpec, robot: RobotModel, period: float, place: Wh
 
 def _rate_findings(
     name: str, spec: ControllerSpec, robot: RobotModel, period: float, place: Place | None
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     """A rate that does not divide the control rate; positions that are commanded in steps."""
     if spec.update_rate is None:
         return
@@ -119,7 +119,7 @@ def _rate_findings(
         ticks = ticks_between(spec.update_rate, period)
     except InvalidArgument as refused:
         (why,) = refused.findings
-        yield Finding(why.code, f"controller '{name}': {why.message}", place, hint=why.hint)
+        yield Diagnostic(why.code, f"controller '{name}': {why.message}", place, hint=why.hint)
         return
     limited = [
         joint.name
@@ -130,31 +130,31 @@ def _rate_findings(
         message = f"controller '{name}' commands positions once in {ticks} control ticks: the acceleration limits of "
         message += f"{listed(limited, most=3)} cut such steps, and they lag"
         hint = "leave `update_rate` out; positions are commanded at every tick then"
-        yield Finding("CTRL170", message, place, hint, "warning")
+        yield Diagnostic("CTRL170", message, place, hint, "warning")
 
 
 def _claim_findings(
     name: str, spec: ControllerSpec, joint: str, owners: dict[str, dict[Interface, str]], place: Place | None
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     """One at most; `owners`: joint -> interface -> controller, of the active ones so far; grows."""
     claimed = owners.setdefault(joint, {})
     hint = "say `active: false` of one of them; a step `switch_controllers` changes who is active"
     for interface in spec.interfaces:
         owner = claimed.get(interface)
         if owner is not None:
-            yield Finding(
+            yield Diagnostic(
                 "CTRL142", f"controllers '{owner}' and '{name}' both claim {joint}/{interface}", place, hint=hint
             )
             return
     if claimed and spec.interfaces and not may_go_together((*claimed, *spec.interfaces)):
         interface, owner = next(iter(claimed.items()))
         message = f"controllers '{owner}' ({joint}/{interface}) and '{name}' ({joint}/{spec.interfaces[0]}) exclude "
-        yield Finding("CTRL148", message + "each other: a joint obeys one of them", place, hint=hint)
+        yield Diagnostic("CTRL148", message + "each other: a joint obeys one of them", place, hint=hint)
         return
     claimed.update(dict.fromkeys(spec.interfaces, name))
 
 
-def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], place: Where) -> Iterator[Finding]:
+def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], place: Where) -> Iterator[Diagnostic]:
     """Two that follow trajectories with the same joints, at its positions and its efforts; `together`: both, joint."""
     rivals: dict[tuple[str, str], list[str]] = {}
     for one, other, joint in sorted(together):
@@ -162,7 +162,7 @@ def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], p
             rivals.setdefault((one, other), []).append(joint)
     for (one, other), joints in rivals.items():
         message = f"controllers '{one}' and '{other}' are both active on {listed(joints)}: a joint obeys the positions "
-        yield Finding(
+        yield Diagnostic(
             "CTRL149",
             message + "of one and adds the efforts of the other",
             place(("controllers", other)),
@@ -173,11 +173,11 @@ def _rivals(spec: ControllersSpec, together: Collection[tuple[str, str, str]], p
 
 def _joint_findings(
     name: str, spec: ControllerSpec, joint: str, robot: RobotModel, place: Place | None
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     known = {other.name: other for other in robot.joints}
     if joint not in known:
         commandable = [other.name for other in robot.joints if other.independent]
-        yield Finding(
+        yield Diagnostic(
             "CTRL144",
             f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
             place,
@@ -186,7 +186,7 @@ def _joint_findings(
         return
     found = known[joint]
     if not found.moves:
-        yield Finding("CTRL146", f"controller '{name}': joint '{joint}' is fixed; it cannot be commanded", place)
+        yield Diagnostic("CTRL146", f"controller '{name}': joint '{joint}' is fixed; it cannot be commanded", place)
     elif found.mimic is not None and spec.interfaces:
         message = f"controller '{name}': joint '{joint}' mimics '{found.mimic.joint}'; it cannot be commanded"
-        yield Finding("CTRL143", message, place, hint=f"claim '{found.mimic.joint}' instead")
+        yield Diagnostic("CTRL143", message, place, hint=f"claim '{found.mimic.joint}' instead")

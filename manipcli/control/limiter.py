@@ -350,7 +350,7 @@ class JointLimiter:
             self._others.append(_Velocities(velocities, self._limits, dt))
 
     def apply(self, command: JointCommand, position: Array, velocity: Array, dt: float) -> None:
-        """Cuts the command in place.
+        """Saturations the command in place.
 
         Args:
             command: of this tick.

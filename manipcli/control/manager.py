@@ -33,7 +33,7 @@ from manipcli.control.lifecycle import (
     strictness_of,
     ticks_between,
 )
-from manipcli.core.errors import Finding, InvalidArgument, InvalidInput, ManipcliError
+from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
 from manipcli.plan.step import Strictness, Switch
@@ -83,7 +83,7 @@ class ControllerManager:
         self.following = tuple(following)
         self.command = JointCommand(len(self.joints))
         self.outputs: tuple[ControllerOutput | None, ...] = ()
-        self.faults: tuple[Finding, ...] = ()
+        self.faults: tuple[Diagnostic, ...] = ()
         self._feed_forward = feed_forward if feed_forward is not None else NoDynamics()
         self._slots: dict[str, Slot] = {}
         self._active: tuple[Slot, ...] = ()
@@ -319,7 +319,7 @@ class ControllerManager:
 
     def _fail(self, slot: Slot, cause: str, time: float) -> None:
         text = f"controller '{slot.controller.name}' failed in its update: {cause}"
-        self.faults += (Finding("CTRL162", text),)
+        self.faults += (Diagnostic("CTRL162", text),)
         slot.controller.deactivate(time, text)
         slot.state = "inactive"
         self._rearrange()

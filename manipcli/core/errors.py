@@ -53,7 +53,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Diagnostic:
     """One thing to tell about an input file."""
 
     code: str
@@ -79,9 +79,9 @@ class ManipcliError(Exception):
     code: ClassVar[str] = "INT000"
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Diagnostic, ...]:
         """The error as findings, for every renderer alike."""
-        return (Finding(code=self.code, message=str(self)),)
+        return (Diagnostic(code=self.code, message=str(self)),)
 
 
 class InvalidInput(ManipcliError):
@@ -90,12 +90,12 @@ class InvalidInput(ManipcliError):
     exit_code = ExitCode.USAGE
     code = "USE000"
 
-    def __init__(self, findings: Sequence[Finding]) -> None:
+    def __init__(self, findings: Sequence[Diagnostic]) -> None:
         self._findings = tuple(findings)
         super().__init__("\n".join(str(finding) for finding in self._findings))
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Diagnostic, ...]:
         return self._findings
 
 
@@ -103,7 +103,7 @@ class InvalidArgument(InvalidInput, ValueError):
     """An argument of the Python API cannot be used; also a `ValueError`, as callers in Python expect."""
 
     def __init__(self, code: str, message: str, *, hint: str | None = None) -> None:
-        super().__init__((Finding(code=code, message=message, hint=hint),))
+        super().__init__((Diagnostic(code=code, message=message, hint=hint),))
 
 
 RefusalReason = Literal["orientation", "touches", "in_the_way", "line"]
@@ -140,8 +140,8 @@ class NotPlannable(ManipcliError):
         super().__init__(f"step '{step}': {cause}" if step is not None else cause)
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        return (Finding(code=self.code, message=str(self), place=self.place, hint=self.hint),)
+    def findings(self) -> tuple[Diagnostic, ...]:
+        return (Diagnostic(code=self.code, message=str(self), place=self.place, hint=self.hint),)
 
 
 class SimulationFailed(ManipcliError):

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from manipcli.core.errors import ExitCode, Finding, ManipcliError
+from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
 from manipcli.core.text import any_of, nearest, shorten
 
 EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
@@ -32,8 +32,8 @@ class UnitError(ManipcliError):
         super().__init__(cause)
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        return (Finding(code=self.code, message=self.cause, hint=self.hint),)
+    def findings(self) -> tuple[Diagnostic, ...]:
+        return (Diagnostic(code=self.code, message=self.cause, hint=self.hint),)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
 
 VARIABLE: Final = "MANIPCLI_BOUNDS"
@@ -81,7 +81,7 @@ def _parsed(text: str) -> Bounds:
         if name not in known or not number.isascii() or not number.isdigit() or not 0 < int(number[:12]) < 10**10:
             message = f"{VARIABLE}: '{shorten(word)}' is no bound; expected NAME=NUMBER"
             hint = "whole numbers above 0" if name in known else did_you_mean(name, known, kind="bounds")
-            raise InvalidInput([Finding("USE040", message, hint=hint)])
+            raise InvalidInput([Diagnostic("USE040", message, hint=hint)])
         own[name] = int(number)
     return dataclasses.replace(Bounds(), **own)
 

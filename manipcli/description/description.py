@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.description.located_xml import Element, element_of, invalid, parse_document, read_document
 from manipcli.description.packages import Packages, Unread
@@ -24,7 +24,7 @@ class Description:
     path: Path
     root: Element
     packages: Packages
-    findings: tuple[Finding, ...]
+    findings: tuple[Diagnostic, ...]
     expanded: bool = False
 
 
@@ -49,7 +49,7 @@ def read_description(
     document = read_document(path)
     top = document.documentElement
     declared = top is not None and any(value in XACRO_NAMESPACES for _, value in top.attributes.items())
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
     expanded = path.suffix == ".xacro" or declared
     if expanded:
         from manipcli.description.xacro.expand import expand

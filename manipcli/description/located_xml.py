@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.description.bounds import bounds, raised
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def shown_path(path: Path) -> str:
 
 
 def invalid(code: str, message: str, place: Place | None = None, hint: str | None = None) -> InvalidInput:
-    return InvalidInput([Finding(code=code, message=message, place=place, hint=hint)])
+    return InvalidInput([Diagnostic(code=code, message=message, place=place, hint=hint)])
 
 
 def read_document(path: Path) -> Document:

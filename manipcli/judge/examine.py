@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import Seams, leaves
 from manipcli.conditions.robustness import NotEvaluated
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import Expected, labels, outcome
-from manipcli.judge.moments import MomentsOfSpans, Order, at_every_tick, unrecorded
+from manipcli.judge.state_windows import Order, WindowsOfSpans, at_every_tick, unrecorded
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording
@@ -43,10 +43,10 @@ def examine(
     half second of them is kept.
     """
     order = Order.of(recording, robot, scene)
-    successive: MomentsOfSpans | None = None
+    successive: WindowsOfSpans | None = None
     asked: list[Expected] = []
     stateless = [all(seam[leaf.name].stateless for leaf in leaves(one.condition)) for one in expect]
-    last: Moments | None = None
+    last: StateWindow | None = None
     end = 0.0
     for span in recording.spans:
         if span.states.time.size == 0:
@@ -55,7 +55,7 @@ def examine(
         if isinstance(order, NotEvaluated):
             continue
         if successive is None:
-            successive = MomentsOfSpans(order, steps)
+            successive = WindowsOfSpans(order, steps)
             world = World(
                 robot,
                 scene,
@@ -67,10 +67,10 @@ def examine(
                 period=_period(span.states.time, recording.period),
             )
             asked = [Expected(one, world, steps, seam) for one in expect]
-        moments = successive.next(span)
-        last = every = at_every_tick(moments, last, recording.period)
+        window = successive.next(span)
+        last = every = at_every_tick(window, last, recording.period)
         for one, of_no_state in zip(asked, stateless, strict=True):
-            one.look(every if of_no_state else moments)
+            one.look(every if of_no_state else window)
     names = labels(expect)
     if successive is None:
         none = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording holds no state")

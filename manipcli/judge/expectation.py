@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manipcli.conditions.condition import Problem, Setting, World
+from manipcli.conditions.condition import CheckContext, Problem, World
 from manipcli.conditions.formula import Seams, absent, opened, problems, scopes
 from manipcli.conditions.members.step_done import StepDoneSpec
-from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Reading, never
-from manipcli.conditions.state_window import ROUNDING, Moments
+from manipcli.conditions.robustness import EDGE, Extreme, Measured, NotEvaluated, Robustness, never
+from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.errors import Loc
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -78,7 +78,7 @@ class Expected:
     def __init__(self, spec: ExpectationSpec, world: World, steps: Sequence[StepOutcome], seam: Seams) -> None:
         self._spec = spec
         self._extreme = Extreme("greatest" if spec.quantifier == "eventually" else "least")
-        self._recent: deque[tuple[Moments, Reading]] = deque()
+        self._recent: deque[tuple[StateWindow, Robustness]] = deque()
         self._ticks, self._first, self._last = 0, 0.0, 0.0
         self._never: NotEvaluated | None = None
         self._when = When(None)
@@ -88,24 +88,24 @@ class Expected:
             self._never = found
             return
         self._when = found
-        self._gauge = opened(spec.condition, world, seam)
+        self._monitor = opened(spec.condition, world, seam)
 
-    def look(self, moments: Moments) -> None:
+    def look(self, window: StateWindow) -> None:
         """The next ticks."""
         if self._never is not None:
             return
         if not self._ticks:
-            self._first = float(moments.times[0])
-        self._ticks, self._last = self._ticks + len(moments.times), float(moments.times[-1])
+            self._first = float(window.times[0])
+        self._ticks, self._last = self._ticks + len(window.times), float(window.times[-1])
         intervals = self._when.intervals
         if intervals is None:
-            self._keep(moments)
+            self._keep(window)
             return
-        first = int(np.searchsorted(moments.times, intervals[0][0]))
-        last = int(np.searchsorted(moments.times, intervals[-1][1]))
+        first = int(np.searchsorted(window.times, intervals[0][0]))
+        last = int(np.searchsorted(window.times, intervals[-1][1]))
         if first >= last:
             return
-        shown = moments.part(first, last)
+        shown = window.part(first, last)
         answer = self._answer(shown)
         if self._when.last:
             self._recent.append((shown, answer))
@@ -116,14 +116,14 @@ class Expected:
             a, b = np.searchsorted(shown.times, (start, end))
             self._extreme.add(answer, shown.times, int(a), int(b))
 
-    def _answer(self, moments: Moments) -> Reading:
-        answer = self._gauge(moments)
+    def _answer(self, window: StateWindow) -> Robustness:
+        answer = self._monitor(window)
         return never(answer) if self._spec.quantifier == "never" else answer
 
-    def _keep(self, moments: Moments) -> None:
+    def _keep(self, window: StateWindow) -> None:
         """As many as it takes to hold the last `END_WINDOW` seconds."""
-        self._recent.append((moments, self._answer(moments)))
-        start = float(moments.times[-1]) - END_WINDOW - ROUNDING
+        self._recent.append((window, self._answer(window)))
+        start = float(window.times[-1]) - END_WINDOW - ROUNDING
         while len(self._recent) > 1 and self._recent[1][0].times[0] <= start:
             self._recent.popleft()
 
@@ -131,9 +131,9 @@ class Expected:
         """What came of it, once there are no more ticks after `end` [s]."""
         if self._never is not None:
             return self._never
-        for moments, answer in self._recent:
-            start = float(moments.times[-1]) if self._when.last else end - END_WINDOW
-            self._extreme.add(answer, moments.times, int(np.searchsorted(moments.times, start - ROUNDING)))
+        for window, answer in self._recent:
+            start = float(window.times[-1]) if self._when.last else end - END_WINDOW
+            self._extreme.add(answer, window.times, int(np.searchsorted(window.times, start - ROUNDING)))
         self._recent.clear()
         found = self._extreme.found
         if found is None:
@@ -172,9 +172,9 @@ def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:
         yield name
 
 
-def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
+def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
     """Everything in an expectation that robot, scene and steps do not know; `loc` is that inside the expectation."""
-    found = list(problems(spec.condition, setting, seam))
+    found = list(problems(spec.condition, context, seam))
     if spec.quantifier is not None:
         found = [Problem((spec.word, *p.loc), p.message, p.hint, p.code) for p in found]
     named: list[tuple[Loc, str]] = []
@@ -183,11 +183,11 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
     for k, name in enumerate(spec.steps):
         named.append((("during",) if isinstance(spec.during, str) else ("during", k), name))
     for loc, name in named:
-        if setting.steps is not None and name not in setting.steps:
-            known = (*setting.steps, END) if loc == ("at",) else setting.steps
+        if context.steps is not None and name not in context.steps:
+            known = (*context.steps, END) if loc == ("at",) else context.steps
             found.append(Problem(loc, f"the task has no step '{name}'", did_you_mean(name, known, kind="steps")))
-    if not found and setting.in_order:
-        found += _too_early(spec, named, setting.steps)
+    if not found and context.in_order:
+        found += _too_early(spec, named, context.steps)
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:
         wanted = scopes(spec.condition, seam)
         if len(wanted) > 1:
@@ -196,10 +196,10 @@ def expectation_problems(spec: ExpectationSpec, setting: Setting, seam: Seams) -
     return tuple(found)
 
 
-def until_problems(spec: ConditionSpec, step: str | None, setting: Setting, seam: Seams) -> tuple[Problem, ...]:
+def until_problems(spec: ConditionSpec, step: str | None, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
     """Everything in the `until` of a step that robot, scene and steps do not know, or that cannot come true in it."""
-    found = problems(spec, setting, seam)
-    if found or step is None or setting.steps is None or not setting.in_order:
+    found = problems(spec, context, seam)
+    if found or step is None or context.steps is None or not context.in_order:
         return found
     return tuple(
         Problem(
@@ -207,7 +207,7 @@ def until_problems(spec: ConditionSpec, step: str | None, setting: Setting, seam
             f"step '{late}' is not done before its end, and step '{step}' waits for it",
             "name an earlier step",
         )
-        for late in _undone(spec, step, setting.steps)
+        for late in _undone(spec, step, context.steps)
     )
 
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.state_window import ROUNDING
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
-from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import SAMPLE, Drawn
 from manipcli.judge.examine import examine
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.steps import ENDED, RunStatus, left_out, step_outcomes
 from manipcli.judge.verdict import INTERRUPTED, ExpectationOutcome, StepOutcome, Verdict, VerdictWord, broken_at
 from manipcli.model.robot import RobotModel
@@ -65,7 +65,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         errors=errors,
         text=text,
         drawn=_drawn(recording),
-        cuts=Cuts.from_metadata(recording.metadata, end=examined.end, period=recording.period),
+        cuts=Saturations.from_metadata(recording.metadata, end=examined.end, period=recording.period),
     )
 
 
@@ -93,34 +93,34 @@ def _drawn(recording: Recording) -> Drawn | None:
         return None
 
 
-def _errors(recording: Recording, status: str) -> tuple[Finding, ...]:
+def _errors(recording: Recording, status: str) -> tuple[Diagnostic, ...]:
     """Why the recording is not that of a run which came to its end."""
     errors = []
     if status == RunStatus.INTERRUPTED:
-        errors.append(Finding(INTERRUPTED, "the run was interrupted"))
+        errors.append(Diagnostic(INTERRUPTED, "the run was interrupted"))
     elif status not in ENDED:
         what = f"status '{status}'" if status else "no status"
-        errors.append(Finding("RUN103", f"the run did not come to its end: the log has {what}"))
+        errors.append(Diagnostic("RUN103", f"the run did not come to its end: the log has {what}"))
     if recording.lost is not None:
-        errors.append(Finding("RUN104", f"the log is incomplete: {recording.lost}"))
+        errors.append(Diagnostic("RUN104", f"the log is incomplete: {recording.lost}"))
     elif status == RunStatus.COMPLETE and left_out(recording):
-        errors.append(Finding("RUN104", f"the log is incomplete: {left_out(recording)}"))
+        errors.append(Diagnostic("RUN104", f"the log is incomplete: {left_out(recording)}"))
     return tuple(errors)
 
 
-def _cut_short(recording: Recording, end: float) -> tuple[Finding, ...]:
+def _cut_short(recording: Recording, end: float) -> tuple[Diagnostic, ...]:
     """A copy without the last of its messages, though what was stored behind them is there."""
     try:
         until = float(recording.metadata.get(STORED, {}).get(UNTIL, ""))
     except ValueError:
         return ()
     if until - end > ROUNDING:
-        return (Finding("RUN104", f"the log is incomplete: it ends at {end:.3f} s, and the run at {until:.3f} s"),)
+        return (Diagnostic("RUN104", f"the log is incomplete: it ends at {end:.3f} s, and the run at {until:.3f} s"),)
     return ()
 
 
 def _verdict(
-    errors: tuple[Finding, ...],
+    errors: tuple[Diagnostic, ...],
     cause: str,
     steps: tuple[StepOutcome, ...],
     expectations: tuple[ExpectationOutcome, ...],

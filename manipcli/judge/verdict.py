@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from manipcli.conditions.robustness import EDGE
-from manipcli.core.errors import Finding
-from manipcli.judge.cuts import Cuts
+from manipcli.core.errors import Diagnostic
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.saturations import Saturations
 
 VerdictWord = Literal["passed", "failed", "error"]
 ExpectationWord = Literal["passed", "failed", "not_evaluated"]
@@ -102,10 +102,10 @@ class Verdict:
     simulated_time: float
     steps: tuple[StepOutcome, ...]
     expectations: tuple[ExpectationOutcome, ...]
-    errors: tuple[Finding, ...] = ()
+    errors: tuple[Diagnostic, ...] = ()
     text: str = ""
     drawn: Drawn | None = None
-    cuts: Cuts = field(default_factory=Cuts)
+    cuts: Saturations = field(default_factory=Saturations)
 
     @property
     def ended_between(self) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
 from manipcli.judge.measures.step_measures import step_measures
+from manipcli.judge.saturations import ACTUATORS, JOINTS, LIMITS
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_robot

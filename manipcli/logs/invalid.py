@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.version import __version__
 from manipcli.judge.verdict import Verdict
 from manipcli.report.run_page import Cause, RunPage, Source, Written
@@ -16,7 +16,7 @@ SHOWN = 8
 """Files that are shown."""
 
 
-def invalid_verdict(file: Path, findings: Sequence[Finding]) -> Verdict:
+def invalid_verdict(file: Path, findings: Sequence[Diagnostic]) -> Verdict:
     """What there is to say without a run. The engine is "": nothing is known of it."""
     errors = tuple(one for one in findings if one.severity == "error")
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
@@ -33,7 +33,7 @@ def invalid_verdict(file: Path, findings: Sequence[Finding]) -> Verdict:
     )
 
 
-def invalid_page(verdict: Verdict, findings: Sequence[Finding], *, log: str = "") -> RunPage:
+def invalid_page(verdict: Verdict, findings: Sequence[Diagnostic], *, log: str = "") -> RunPage:
     """The page: each error with its place, and the files that these are in, as written. `log`: the name of a log."""
     sources = tuple(_sources(one.place for one in verdict.errors))
     lines = {source.name: len(source.text.splitlines()) for source in sources}

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array, Transform, frozen, quat_product, rotate
 from manipcli.core.text import did_you_mean, listed
 from manipcli.description.description import unread_description
@@ -187,7 +187,7 @@ def open_other(
         hint = f"it holds {listed(sorted(topics.all)) or 'no topic'}; `manipcli plot` shows the numbers of any topic"
         if unchosen:
             hint = f"show one of them with --robot, as in --robot {log.spaces[0]}"
-        raise InvalidInput([Finding("REPLAY002", message, hint=hint)])
+        raise InvalidInput([Diagnostic("REPLAY002", message, hint=hint)])
     count = max(1, min(int(np.ceil((log.end - log.start) * rate)), MAX_TIMES))
     times = np.linspace(log.start, log.end, count + 1) if log.end > log.start else np.array([log.start])
     tree = {child: (parent, _poses(samples, times)) for (parent, child), samples in log.frames.items()}
@@ -220,9 +220,9 @@ def open_other(
     )
 
 
-def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Finding:
+def _no_robot(path: Path, space: str, spaces: Sequence[str]) -> Diagnostic:
     hint = did_you_mean(space, spaces, kind="namespaces") or "it tells of one robot at most: leave --robot out"
-    return Finding("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
+    return Diagnostic("REPLAY003", f"{path.name}: no robot in '{space}'", hint=hint)
 
 
 def _poses(samples: _Samples, times: Array) -> _Poses:

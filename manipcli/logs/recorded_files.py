@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.model.build_robot import rebuild_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record.attachments import CONTROLLERS, ROBOT, SCENE, TASK, URDF
@@ -46,7 +46,7 @@ def recorded_scene(recording: Recording, path: Path) -> Scene:
         return scene_from_json(attached(recording, path, SCENE))
     except ValueError as error:
         message = f"{path.name}/{SCENE}: this is not the scene of a log"
-        raise InvalidInput([Finding("LOG103", message)]) from error
+        raise InvalidInput([Diagnostic("LOG103", message)]) from error
 
 
 def attached(recording: Recording, path: Path, name: str) -> bytes:
@@ -57,5 +57,7 @@ def attached(recording: Recording, path: Path, name: str) -> bytes:
     """
     if name not in recording.attachments:
         message = f"{path.name}: the log holds no '{name}', without which it cannot be judged"
-        raise InvalidInput([Finding("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")])
+        raise InvalidInput(
+            [Diagnostic("LOG102", message, hint="judge the log as manipcli wrote it, not a filtered copy")]
+        )
     return recording.attachments[name]

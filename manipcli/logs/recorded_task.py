@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Loc, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
 from manipcli.core.geometry import frozen
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE, Drawn
@@ -49,7 +49,7 @@ class RecordedTask:
 
     task: Task
     embedded: bool
-    unlike: tuple[Finding, ...]
+    unlike: tuple[Diagnostic, ...]
     keep: MeshSearch
 
 
@@ -122,7 +122,7 @@ def _drawn(recording: Recording, path: Path) -> Drawn | None:
         return Drawn.from_metadata(recording.metadata[SAMPLE])
     except ValueError:
         message = f"{path.name}: what was drawn for its sample cannot be read"
-        raise InvalidInput([Finding("LOG103", message)]) from None
+        raise InvalidInput([Diagnostic("LOG103", message)]) from None
 
 
 def _places(recording: Recording, path: Path, spec: TaskSpec) -> dict[Loc, str]:
@@ -139,22 +139,22 @@ def _check_there(files: Mapping[str, Path], path: Path, meshes: MeshSearch) -> N
         more = f" (and {len(absent) - 1} more)" if len(absent) > 1 else ""
         message = f"mesh '{absent[0]}' is not found{more}: nothing can be simulated again without it"
         hint = "; ".join(meshes.notes) or "give the place of its package with --package-path DIR"
-        raise InvalidInput([Finding("LOG400", message, Place(str(path), 0, 0), hint=hint)])
+        raise InvalidInput([Diagnostic("LOG400", message, Place(str(path), 0, 0), hint=hint)])
 
 
-def _versions(recording: Recording, path: Path, task: Task) -> Iterator[Finding]:
+def _versions(recording: Recording, path: Path, task: Task) -> Iterator[Diagnostic]:
     engine = ENGINES[task.spec.simulation.engine]
     now = {"manipcli": __version__, engine.name: engine.version()}
     then = recording.metadata.get("versions", {})
     for name in dict.fromkeys((*then, *now)):
         if then.get(name) != now.get(name):
             message = f"the run was made with {name} {then.get(name, '(unknown)')}; this is {now.get(name, 'without')}"
-            yield Finding("LOG401", message, Place(str(path), 0, 0), severity="warning")
+            yield Diagnostic("LOG401", message, Place(str(path), 0, 0), severity="warning")
 
 
-def _meshes(recording: Recording, path: Path, files: Mapping[str, Path]) -> Iterator[Finding]:
+def _meshes(recording: Recording, path: Path, files: Mapping[str, Path]) -> Iterator[Diagnostic]:
     then = recording.metadata.get("meshes", {})
     for uri, file in files.items():
         if hashlib.sha256(file.read_bytes()).hexdigest() != then.get(uri):
             message = f"mesh '{uri}' is not the file that it was in the run"
-            yield Finding("LOG402", message, Place(str(path), 0, 0), severity="warning")
+            yield Diagnostic("LOG402", message, Place(str(path), 0, 0), severity="warning")

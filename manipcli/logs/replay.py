@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import frozen
 from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome, Verdict
@@ -60,7 +60,7 @@ def _open_own(
     recording = open_recording(path)
     samples = sampled(recording, rate=rate)
     if samples is None:
-        raise InvalidInput([Finding("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
+        raise InvalidInput([Diagnostic("REPLAY001", f"{path.name}: nothing was recorded: there is no tick to show")])
     robot, scene = recorded_robot(recording, path), recorded_scene(recording, path)
     verdict = judge_recording(recording, path)
     meshes = MeshSearch(

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
-from manipcli.judge.cuts import ACTUATORS, JOINTS, LIMITS
+from manipcli.core.errors import Diagnostic, InvalidInput
+from manipcli.judge.saturations import ACTUATORS, JOINTS, LIMITS
 from manipcli.judge.steps import RunStatus
 from manipcli.record.foreign.compare import compare_logs, compared_with_itself
 from manipcli.record.read.compare_entries import compare_entries
@@ -21,7 +21,7 @@ UNFINISHED = ("run", "verdict", JOINTS, ACTUATORS, LIMITS, "repair")
 """Metadata that a run writes at its end; one that did not come to its end lacks it, or says something else."""
 
 
-def refused_as_unlike(unlike: Sequence[Finding]) -> InvalidInput:
+def refused_as_unlike(unlike: Sequence[Diagnostic]) -> InvalidInput:
     """Why a log is not simulated again: what would come out says nothing about it."""
     *others, last = (replace(finding, severity="error") for finding in unlike)
     hint = "with --allow-different it is simulated all the same; differences say little then"
@@ -29,7 +29,7 @@ def refused_as_unlike(unlike: Sequence[Finding]) -> InvalidInput:
 
 
 def compared(
-    recording: Recording, log: Path, again: Path, *, unlike: tuple[Finding, ...], began: float
+    recording: Recording, log: Path, again: Path, *, unlike: tuple[Diagnostic, ...], began: float
 ) -> Verification:
     """Everything in two logs, compared.
 

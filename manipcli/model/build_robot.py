@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.geometry import Transform, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.description.description import unread_description
@@ -32,7 +32,7 @@ def build_robot(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
     source: Source | None = None,
-) -> tuple[RobotModel, tuple[Finding, ...]]:
+) -> tuple[RobotModel, tuple[Diagnostic, ...]]:
     """The robot that a robot file describes.
 
     Args:

@@ -28,12 +28,12 @@ def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
     return frozen(position)
 
 
-def zero_posture(robot: RobotModel) -> Array:
+def zero_configuration(robot: RobotModel) -> Array:
     """(n,) every independent joint at zero, or at the limit nearest to it."""
     return with_mimics(robot, [joint.limits.nearest(0.0) for joint in robot.moving_joints])
 
 
-def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
+def configuration(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
     """(n,) a named pose; None: `home` where there is one, else zero.
 
     Args:
@@ -41,7 +41,7 @@ def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = 
         pose: its name.
         rest: (n,) where the joints are that it does not speak of; at zero by default.
     """
-    q = np.array(zero_posture(robot) if rest is None else rest)
+    q = np.array(zero_configuration(robot) if rest is None else rest)
     if pose is None:
         pose = "home" if any(known.name == "home" for known in robot.poses) else None
     if pose is not None:
@@ -50,6 +50,6 @@ def posture(robot: RobotModel, pose: str | None = None, *, rest: Array | None = 
     return with_mimics(robot, q)
 
 
-def named_postures(robot: RobotModel, start: Array) -> Array:
+def named_configurations(robot: RobotModel, start: Array) -> Array:
     """(T, n): the start, and every named pose with the other joints as at the start."""
-    return np.array([start, *(posture(robot, pose.name, rest=start) for pose in robot.poses)])
+    return np.array([start, *(configuration(robot, pose.name, rest=start) for pose in robot.poses)])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.units import describe
 from manipcli.description.elements import Joint
 from manipcli.model.robot import Group
@@ -18,7 +18,9 @@ from manipcli.spec.located import Source
 from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, shown
 
 
-def misread_units(spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> Iterator[Finding]:
+def misread_units(
+    spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]
+) -> Iterator[Diagnostic]:
     """An error for each text such as `5 cm` that fits no joint which it is about.
 
     Args:
@@ -36,7 +38,7 @@ class _Reading:
         self._joints = {joint.name: joint for joint in joints if joint.moves}
         self._groups = {group.name: group.joints for group in groups}
 
-    def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Finding]:
+    def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Diagnostic]:
         """What is wrong at `node` and below; `about`: the joints that this is about, as far as blocks around it say."""
         value, annotation, metadata = held
         if isinstance(node, ScalarNode):

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Inertial, Joint, Link, TransmissionTag
 from manipcli.description.urdf.joint import UNBOUNDED
@@ -89,14 +89,14 @@ def massless_joints(robot: RobotModel) -> tuple[str, ...]:
     return tuple(joint.name for joint in robot.moving_joints if joint.child not in massive)
 
 
-def massless_links(robot: RobotModel, code: str) -> tuple[Finding, ...]:
+def massless_links(robot: RobotModel, code: str) -> tuple[Diagnostic, ...]:
     """What `massless_joints` move, each at its place in the description: no engine with physics can hold it."""
     found = []
     for name in massless_joints(robot):
         link = robot.link(robot.joint(name).child)
         message = f"link '{link.name}', which joint '{name}' moves, has no mass, nor has what is fixed to it"
         hint = "give it an <inertial> with a mass, or use an engine without physics"
-        found.append(Finding(code, message, link.place, hint))
+        found.append(Diagnostic(code, message, link.place, hint))
     return tuple(found)
 
 
@@ -109,7 +109,7 @@ def _text(lines: list[str]) -> str:
     for line in lines:
         if len(line.encode()) > MAX_LINE:
             message = f"a name or path is too long: {line.strip()[:120]}..."
-            raise InvalidInput([Finding(code="URDF041", message=message)])
+            raise InvalidInput([Diagnostic(code="URDF041", message=message)])
     return "\n".join(lines) + "\n"
 
 

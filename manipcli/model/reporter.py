@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.core.errors import Finding, InvalidInput, Loc, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
 from manipcli.spec.located import Source
 
 
@@ -11,16 +11,18 @@ class Reporter:
 
     def __init__(self, source: Source | None) -> None:
         self.source = source
-        self.findings: list[Finding] = []
+        self.findings: list[Diagnostic] = []
 
     def error(self, code: str, message: str, loc: Loc, *, hint: str | None = None) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+        self.findings.append(Diagnostic(code=code, message=message, place=self.place(loc), hint=hint))
 
     def warning(self, code: str, message: str, loc: Loc, *, hint: str) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="warning"))
+        self.findings.append(
+            Diagnostic(code=code, message=message, place=self.place(loc), hint=hint, severity="warning")
+        )
 
     def note(self, code: str, message: str, loc: Loc, *, hint: str | None) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
+        self.findings.append(Diagnostic(code=code, message=message, place=self.place(loc), hint=hint, severity="note"))
 
     def place(self, loc: Loc) -> Place | None:
         return self.source.place(*loc) if self.source is not None else None

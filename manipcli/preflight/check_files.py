@@ -8,7 +8,7 @@ from pathlib import Path
 
 from manipcli.conditions.members import CONDITIONS
 from manipcli.control.controllers import CONTROLLERS
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.lint.checks import CHECKS
 from manipcli.description.lint.inspection import DESCRIPTIONS, inspect
 from manipcli.plan.steps import STEPS
@@ -34,7 +34,7 @@ def check_files(
     sample: int | None = None,
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """Every finding of every file, once; a task is checked with the robot and controllers files that it names.
 
     Args:
@@ -55,7 +55,7 @@ def check_files(
 
 def _findings(
     path: Path, of_task: Callable[[Path], Task], package_path: Sequence[Path], allow_outside: bool
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     try:
         if path.suffix.lower() in DESCRIPTIONS:
             return inspect(path, package_path=package_path, allow_outside=allow_outside).examination.findings

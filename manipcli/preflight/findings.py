@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manipcli.core.errors import Finding, NotPlannable
+from manipcli.core.errors import Diagnostic, NotPlannable
 from manipcli.core.registry import Seam
 from manipcli.preflight.checks import PREFLIGHT_CHECKS
 from manipcli.preflight.preflight import Check, Subject
@@ -13,7 +13,7 @@ from manipcli.task.task import Task
 
 def preflight_findings(
     task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """Warnings about gains, efforts, grips and timeouts, with the number that would do, each at its place in its file.
 
     On an engine without physics gains, efforts and forces are not examined.
@@ -24,7 +24,7 @@ def preflight_findings(
             examined at the named poses.
         checks: the registry.
     """
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     if plan is None:
         try:
             plan = plan_task(task)

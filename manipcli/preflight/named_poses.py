@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.model.collision import CollisionChecker
-from manipcli.model.configuration import posture
+from manipcli.model.configuration import configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
@@ -16,18 +16,18 @@ from manipcli.spec.located import Located
 from manipcli.spec.robot import RobotSpec
 
 
-def pose_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Finding]:
+def pose_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagnostic]:
     """A warning for every pair of links that overlap in a named pose; other joints are as at `home`, if there is one.
 
     Left out: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
     """
     nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
     query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()
-    rest = posture(robot)
+    rest = configuration(robot)
     for pose in robot.poses:
-        for hit in query.every(posture(robot, pose.name, rest=rest)):
+        for hit in query.every(configuration(robot, pose.name, rest=rest)):
             a, b = (name.removeprefix("robot/") for name in (hit.a, hit.b))
-            yield Finding(
+            yield Diagnostic(
                 code="ROBOT347",
                 message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {hit.amount}",
                 place=file.place("poses", pose.name),

@@ -15,9 +15,9 @@ import numpy as np
 from manipcli.control.control_loop import ControlLoop, HandSettings, PidLoop
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array
-from manipcli.model.configuration import named_postures, with_mimics
+from manipcli.model.configuration import named_configurations, with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.plan.claims import Claims
 from manipcli.spec.controllers import GainsSpec, Interface
@@ -136,7 +136,7 @@ class Subject:
         in_steps = tuple(active_in(self.task.spec.steps, Claims.of(self.task.controllers), robot))
         kinematics = Kinematics(robot, gravity=self.task.scene.gravity)
         samples = None if self.made is None else _planned(self.task, self.made)
-        named = Configurations.at_rest(named_postures(robot, start_position(self.task)))
+        named = Configurations.at_rest(named_configurations(robot, start_position(self.task)))
         found = []
         for number, active in enumerate(dict.fromkeys(in_steps)):
             configurations = named if samples is None else _while(samples, [there == active for there in in_steps])
@@ -178,12 +178,12 @@ class Check:
 
     name: str
     codes: tuple[str, ...]
-    findings: Callable[[Subject], Iterable[Finding]]
+    findings: Callable[[Subject], Iterable[Diagnostic]]
     needs_plan: bool = False
     needs_physics: bool = True
 
 
-def once(doubts: Iterable[tuple[str, Finding]]) -> Iterator[Finding]:
+def once(doubts: Iterable[tuple[str, Diagnostic]]) -> Iterator[Diagnostic]:
     """The first finding of each code, place and joint: a controller that stays active is examined in each shift.
 
     `doubts`: (joint, finding); "" as the joint where a finding is about several.

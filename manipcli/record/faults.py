@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
-from manipcli.core.errors import ExitCode, Finding, InvalidInput, ManipcliError, Place
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput, ManipcliError, Place
 from manipcli.core.text import any_of, listed, nearest_file
 
 
@@ -16,7 +16,7 @@ class RecordingRefused(InvalidInput):
     code = "LOG100"
 
     def __init__(self, path: Path, cause: str, *, hint: str | None = None) -> None:
-        super().__init__((Finding(code=self.code, message=f"cannot record to {path}: {cause}", hint=hint),))
+        super().__init__((Diagnostic(code=self.code, message=f"cannot record to {path}: {cause}", hint=hint),))
 
 
 class RecordingFailed(ManipcliError):
@@ -67,7 +67,7 @@ class BadRecording(InvalidInput):
             hint = _beside(path)
             if left.is_file():
                 hint = f"{left.name} is there: a run that did not come to its end left it; give its name"
-        super().__init__((Finding(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
+        super().__init__((Diagnostic(code=self.code, message=cause, place=Place(str(path), 0, 0), hint=hint),))
 
 
 def _beside(path: Path) -> str | None:

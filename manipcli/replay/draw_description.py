@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.lint.inspection import Inspection
 from manipcli.model.build_robot import bare_robot
 from manipcli.replay.renderer import draw_robot
@@ -18,5 +18,5 @@ def draw_description(inspection: Inspection, path: Path) -> tuple[str, ...]:
     """
     parts = inspection.examination.parts
     if parts is None or inspection.examination.errors:
-        raise InvalidInput([Finding("USE041", f"'{inspection.path}' has errors and is not drawn")])
+        raise InvalidInput([Diagnostic("USE041", f"'{inspection.path}' has errors and is not drawn")])
     return draw_robot(bare_robot(parts), path)

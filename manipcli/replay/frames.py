@@ -18,7 +18,7 @@ from manipcli.replay.renderer import Image, Renderer
 Numbers = npt.NDArray[np.int64]
 
 LOOKED_AT = 60
-"""Moments of a run that are all to be in view."""
+"""StateWindow of a run that are all to be in view."""
 LARGE = 0.6
 """A body that stands still and has this part of the extent of robot and things is what they stand on."""
 LEAST_SIZE, MOST_SIZE = 64, 4096

@@ -13,7 +13,7 @@ from threading import Thread
 from types import TracebackType
 from typing import Self
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
@@ -30,7 +30,7 @@ def is_meant_for(host: str | None, origin: str | None, port: int) -> bool:
 def unusable_port(port: int, reason: str = "already in use") -> InvalidInput:
     """The error for a port that a server cannot listen on."""
     hint = f"use another --port, or leave it out: the first free one from {DEFAULT_PORT} on is used"
-    return InvalidInput([Finding("VIEW001", f"port {port} is {reason}", hint=hint)])
+    return InvalidInput([Diagnostic("VIEW001", f"port {port} is {reason}", hint=hint)])
 
 
 class PageServer:

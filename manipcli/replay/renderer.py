@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from manipcli.model.configuration import posture
+from manipcli.model.configuration import configuration
 from manipcli.model.robot import RobotModel
 from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw
@@ -245,7 +245,7 @@ def draw_robot(robot: RobotModel, path: Path) -> tuple[str, ...]:
     Returns:
         What could not be drawn, one line each.
     """
-    drawing, poses = draw(robot), Placing(robot).start(posture(robot))
+    drawing, poses = draw(robot), Placing(robot).start(configuration(robot))
     with Renderer(drawing) as renderer:
         path.write_bytes(png_bytes(renderer.picture(poses, framing(drawing, poses, aspect=SIZE[0] / SIZE[1]))))
     return drawing.missing

@@ -11,7 +11,7 @@ import numpy as np
 
 from manipcli.core.geometry import Array
 from manipcli.description.elements import Joint
-from manipcli.model.configuration import posture, with_mimics, zero_posture
+from manipcli.model.configuration import configuration, with_mimics, zero_configuration
 from manipcli.model.robot import RobotModel
 from manipcli.replay.drawing import draw, floors_of
 from manipcli.replay.placing import Placing
@@ -47,7 +47,7 @@ class View(LocalServer):
         self, robot: RobotModel, scene: Scene | None = None, *, q: Array | None = None, port: int | None
     ) -> None:
         drawing, placing = draw(robot, scene), Placing(robot, scene)
-        position = posture(robot) if q is None else q
+        position = configuration(robot) if q is None else q
         super().__init__(robot.name, port=port)
         self.robot = robot
         self.missing = drawing.missing
@@ -150,7 +150,7 @@ class JointPanel:
     def named(self, name: str) -> Array:
         """(n,) the posture behind a button: joints that the pose does not speak of stay where they are."""
         known = any(pose.name == name for pose in self._robot.poses)
-        return posture(self._robot, name, rest=self._q) if known else zero_posture(self._robot)
+        return configuration(self._robot, name, rest=self._q) if known else zero_configuration(self._robot)
 
     def go(self, q: Array) -> None:
         """Show a posture, and put the sliders there."""

@@ -6,7 +6,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed, number_of, shorten
 from manipcli.description.lint.check import Check
 from manipcli.description.lint.guess_groups import GuessedGroup
@@ -18,7 +18,7 @@ from manipcli.report.text import FAIL, PASS, describe
 
 def render_text(
     file: str,
-    findings: Sequence[Finding],
+    findings: Sequence[Diagnostic],
     summary: Summary | None,
     *,
     passed: bool,
@@ -109,7 +109,7 @@ def _group(group: GuessedGroup) -> str:
 
 def render_json(
     file: str,
-    findings: Sequence[Finding],
+    findings: Sequence[Diagnostic],
     summary: Summary | None,
     *,
     passed: bool,

@@ -7,7 +7,7 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.judge.measures.facts import JointFacts, RunFacts, Use
-from manipcli.judge.measures.holds import HoldFacts, Slip, Spread
+from manipcli.judge.measures.grasp_intervals import GraspFacts, Slip, Spread
 from manipcli.report.html_parts import heading, meter, number, of_limit, percent, seek, table
 from manipcli.report.markup import Markup, element, joined
 from manipcli.report.quantity import quantity
@@ -51,7 +51,7 @@ def _few(touching: Spread) -> str:
     return f"{least}" if least == most else f"{least} to {most}, on average {touching.mean:.1f},"
 
 
-def _forces(hold: HoldFacts) -> Markup:
+def _forces(hold: GraspFacts) -> Markup:
     force = hold.force
     about = f"{number(force.least, 'N')} to {number(force.most, 'N')}"
     return joined(element("b", number(force.mean, "N")), element("small", f"on average; {about}"))

@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 
-from manipcli.core.errors import Finding
-from manipcli.judge.cuts import Cuts
+from manipcli.core.errors import Diagnostic
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome, Verdict, VerdictWord
 from manipcli.report.run_report import RunReport
 
@@ -31,13 +31,13 @@ def render_verdict(verdict: Verdict, log: str | None = None) -> str:
 
 
 def render_errors(
-    findings: Sequence[Finding], verdict: VerdictWord = "error", *, known: Mapping[str, Json] | None = None
+    findings: Sequence[Diagnostic], verdict: VerdictWord = "error", *, known: Mapping[str, Json] | None = None
 ) -> str:
     """A command that ended before there was anything to judge; `known`: what it knew of a run by then."""
     return dumps({**_object(None, findings, verdict=verdict), **(known or {})})
 
 
-def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
+def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
     """Checked files: `failed` where at least one finding is an error."""
     failed = any(finding.severity == "error" for finding in findings)
     return dumps(
@@ -56,7 +56,7 @@ def dumps(value: Json) -> str:
 
 def plain(value: object) -> Json:
     """A value as JSON: a dataclass by its fields, numbers as `number`."""
-    if isinstance(value, Finding):
+    if isinstance(value, Diagnostic):
         return finding_object(value)
     if isinstance(value, float):
         return number(value)
@@ -75,10 +75,10 @@ def picked(value: object, keys: str) -> dict[str, Json]:
     return {key: plain(getattr(value, key)) for key in keys.split()}
 
 
-def _object(judged: Verdict | None, errors: Sequence[Finding], **known: Json) -> dict[str, Json]:
+def _object(judged: Verdict | None, errors: Sequence[Diagnostic], **known: Json) -> dict[str, Json]:
     """The one object, its keys always there and in this order."""
     empty = "task verdict text seed engine sample simulated_time wall_time real_time_factor log timing"
-    found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Cuts())}
+    found: dict[str, Json] = {**dict.fromkeys(empty.split()), "text": "", "saturated": saturated_object(Saturations())}
     found |= {"steps": [], "expectations": []}
     if judged is not None:
         found |= picked(judged, "task verdict text seed engine simulated_time")
@@ -90,7 +90,7 @@ def _object(judged: Verdict | None, errors: Sequence[Finding], **known: Json) ->
     return {**found, **known, "errors": plain(errors)}
 
 
-def saturated_object(cuts: Cuts) -> dict[str, Json]:
+def saturated_object(cuts: Saturations) -> dict[str, Json]:
     """Ticks by joint and by actuator, of those that were cut."""
     return {
         "joints": _counted(cuts.joints),
@@ -107,7 +107,7 @@ def step_object(step: StepOutcome) -> dict[str, Json]:
     return picked(step, "id verb outcome started ended planned_duration text tolerated attempts replanned")
 
 
-def finding_object(finding: Finding) -> dict[str, Json]:
+def finding_object(finding: Diagnostic) -> dict[str, Json]:
     place = finding.place
     written = place is not None and place.line > 0
     return {

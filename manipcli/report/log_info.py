@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from manipcli.judge.cuts import Cuts
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
 from manipcli.record.foreign.topics import Topic, Topics
 from manipcli.record.recording import EMBEDDED
@@ -46,13 +46,13 @@ class LogInfo:
         return self.found.metadata.get("versions", {})
 
     @property
-    def cuts(self) -> Cuts:
+    def cuts(self) -> Saturations:
         """What was asked for more than it can give."""
         try:
             period = float(self.run.get("period", ""))
         except ValueError:
             period = 0.0
-        return Cuts.from_metadata(self.found.metadata, end=self.found.end / 1e9, period=period)
+        return Saturations.from_metadata(self.found.metadata, end=self.found.end / 1e9, period=period)
 
     @property
     def size_per_minute(self) -> float | None:

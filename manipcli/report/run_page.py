@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.judge.measures.facts import RunFacts
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.replay.playback import Playback
@@ -91,7 +91,7 @@ class RunPage:
     provenance: tuple[tuple[str, str], ...] = ()
     hashes: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
-    warnings: tuple[Finding, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
     index: str = ""
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
-from manipcli.core.errors import ExitCode, Finding
+from manipcli.core.errors import Diagnostic, ExitCode
 from manipcli.judge.verdict import INTERRUPTED, Verdict
 
 
@@ -40,7 +40,7 @@ class RunReport:
     verdict: Verdict
     timing: Timing
     log: str | None = None
-    warnings: tuple[Finding, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
     meshes: Mapping[str, Path] = field(default_factory=dict)
 
     @property

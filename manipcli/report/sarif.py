@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.version import __version__
 from manipcli.description.lint.check import Check
 from manipcli.report.json import Json, dumps
@@ -14,7 +14,7 @@ from manipcli.report.json import Json, dumps
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def render(findings: Sequence[Finding], checks: Iterable[Check]) -> str:
+def render(findings: Sequence[Diagnostic], checks: Iterable[Check]) -> str:
     """One run of one tool: every check as a rule, every finding as a result."""
     rules = list(checks)
     index = {check.code: k for k, check in enumerate(rules)}
@@ -42,7 +42,7 @@ def _rule(check: Check) -> Json:
     }
 
 
-def _result(finding: Finding, index: dict[str, int]) -> Json:
+def _result(finding: Diagnostic, index: dict[str, int]) -> Json:
     text = f"{finding.message}. Hint: {finding.hint}" if finding.hint else finding.message
     result: dict[str, Json] = {"ruleId": finding.code, "level": finding.severity, "message": {"text": text}}
     if finding.code in index:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from manipcli.core.errors import ExitCode, Finding, Place
+from manipcli.core.errors import Diagnostic, ExitCode, Place
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome
 from manipcli.report.run_report import RunReport
@@ -35,7 +35,7 @@ class Case:
     sample: int | None = None
     tags: tuple[str, ...] = ()
     varied: bool = False
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
     line: int = 1
 
     @property
@@ -80,9 +80,9 @@ class CaseReport:
     command: str
     text: str = ""
     run: RunReport | None = None
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
     troubles: tuple[Trouble, ...] = ()
-    warnings: tuple[Finding, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
     log: str | None = None
     picture: str | None = None
     page: str | None = None
@@ -148,7 +148,7 @@ def signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def troubles_of(findings: Sequence[Finding]) -> tuple[Trouble, ...]:
+def troubles_of(findings: Sequence[Diagnostic]) -> tuple[Trouble, ...]:
     """Why a file cannot be used, as troubles: its errors."""
     return tuple(
         Trouble(f"{one.severity}[{one.code}]: {one.message}{f' (hint: {one.hint})' if one.hint else ''}", one.place)
@@ -157,6 +157,6 @@ def troubles_of(findings: Sequence[Finding]) -> tuple[Trouble, ...]:
     )
 
 
-def doubts_of(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+def doubts_of(findings: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
     """What there is to say of a file that keeps nobody from using it."""
     return tuple(one for one in findings if one.severity != "error")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, shorten
 from manipcli.report.quantity import quantity
 from manipcli.report.suite import Case, CaseReport, Suite
@@ -104,7 +104,7 @@ def render_suite(suite: Suite) -> str:
 
 def once_a_file(reports: Sequence[CaseReport]) -> list[CaseReport]:
     """Of samples that cannot be run for the same reasons only the first."""
-    seen: set[tuple[str, tuple[Finding, ...]]] = set()
+    seen: set[tuple[str, tuple[Diagnostic, ...]]] = set()
     kept = []
     for one in reports:
         why = (one.case.file, one.findings)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of, one_line
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
@@ -41,7 +41,7 @@ def render_verdict(verdict: Verdict, log: str) -> str:
     return "\n".join([*_verdict(verdict, f"{verdict.simulated_time:.2f} s simulated"), f"log: {log}"])
 
 
-def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
+def render_findings(findings: Sequence[Diagnostic], files: Sequence[str]) -> str:
     """Every finding of some checked files, then one line that counts them."""
     errors = sum(finding.severity == "error" for finding in findings)
     warnings = sum(finding.severity == "warning" for finding in findings)
@@ -52,7 +52,7 @@ def render_findings(findings: Sequence[Finding], files: Sequence[str]) -> str:
     return "\n".join([*map(describe, findings), summary])
 
 
-def describe(finding: Finding) -> str:
+def describe(finding: Diagnostic) -> str:
     """One finding on one line, whatever names it quotes: where, how grave, what; and below it the hint."""
     line = one_line(str(finding))
     return f"{line}\n  hint: {one_line(finding.hint)}" if finding.hint else line

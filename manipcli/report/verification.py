@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import number_of
 from manipcli.record.foreign.compare import Comparison
 from manipcli.record.read.compare_entries import EntryDifference
@@ -41,7 +41,7 @@ class Verification:
     versions: Mapping[str, str]
     messages: Comparison
     entries: tuple[EntryDifference, ...]
-    unlike: tuple[Finding, ...]
+    unlike: tuple[Diagnostic, ...]
     cut: str
     wall_time: float
 

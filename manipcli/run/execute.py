@@ -16,8 +16,8 @@ from manipcli.judge.steps import RunStatus
 from manipcli.model.kinematics import Kinematics
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.live_conditions import Live
-from manipcli.run.observer import Onlooker, Progress
-from manipcli.run.step_loop import StepsRun, cuts_of
+from manipcli.run.observer import Observer, Progress
+from manipcli.run.step_loop import StepLoop, cuts_of
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
 from manipcli.simulate.executor import Executor
@@ -107,9 +107,9 @@ def _run_steps(
             )
             _settle(task, session)
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
-            onlooker = Onlooker(recorder, live, progress, simulation.control_period)
-            session.restart_clock(onlooker)
-            run = StepsRun(task, plan, session, recorder, live, progress, told=onlooker.goal, replanning=replanning)
+            observer = Observer(recorder, live, progress, simulation.control_period)
+            session.restart_clock(observer)
+            run = StepLoop(task, plan, session, recorder, live, progress, told=observer.goal, replanning=replanning)
             try:
                 run.steps()
             finally:

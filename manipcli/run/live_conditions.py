@@ -15,8 +15,8 @@ import numpy as np
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import absent, opened
 from manipcli.conditions.members import CONDITIONS
-from manipcli.conditions.robustness import Reading
-from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
+from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
 from manipcli.control.controller import Controller, ControllerOutput
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.channels import ControllerChannel
@@ -24,7 +24,7 @@ from manipcli.run.run_log import recorded
 from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 
-Told = Callable[[Moments, Reading], None]
+Told = Callable[[StateWindow, Robustness], None]
 """Sees every answer of a probe: some ticks, and the margins on them. Neither is valid afterwards."""
 
 
@@ -38,12 +38,12 @@ class Probe:
     def __init__(
         self, spec: ConditionSpec, world: World, first: int, told: Told | None, catch_up: Callable[[], None]
     ) -> None:
-        self._gauge = opened(spec, world, CONDITIONS)
+        self._monitor = opened(spec, world, CONDITIONS)
         self._word = "" if spec.combines else f"{spec.name}: "
         self._first = first
         self._catch_up = catch_up
         self._held = False
-        self._last: Reading | None = None
+        self._last: Robustness | None = None
         self.told = told
 
     @property
@@ -66,13 +66,13 @@ class Probe:
         found = self._last.found(len(self._last.margins) - 1)
         return f"it fails{found.lacking}: {self._word}{found.text}"
 
-    def look(self, moments: Moments, start: int) -> None:
+    def look(self, window: StateWindow, start: int) -> None:
         """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""
         skipped = max(self._first - start, 0)
-        if skipped >= len(moments.times):
+        if skipped >= len(window.times):
             return
-        shown = moments.part(skipped, len(moments.times))
-        answer = self._last = self._gauge(shown)
+        shown = window.part(skipped, len(window.times))
+        answer = self._last = self._monitor(shown)
         self._held = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
         if self.told is not None:
             self.told(shown, answer)
@@ -161,19 +161,19 @@ class Live:
         if not self._count:
             return
         if self._probes:
-            moments = self._moments()
+            window = self._moments()
             start = self._next - self._count
             for probe in self._probes:
-                probe.look(moments, start)
+                probe.look(window, start)
         self._numbers[0] = self._numbers[self._count]
         del self._contacts[:-1]
         self._count, self._first = 0, False
 
-    def _moments(self) -> Moments:
+    def _moments(self) -> StateWindow:
         count = self._count
         first = self._next - count
         self._rows.time[: count + 1] = [self._moment(tick) for tick in range(first - 1, self._next)]
-        return Moments(
+        return StateWindow(
             states=self._rows.map(lambda a: a[1 : count + 1]),
             before=None if self._first else self._before,
             references=tuple(Reference(one.joints, one.position[:count]) for _, one in self._references),

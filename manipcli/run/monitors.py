@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manipcli.conditions.robustness import Reading, never
-from manipcli.conditions.state_window import ROUNDING, Moments
+from manipcli.conditions.robustness import Robustness, never
+from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import broken_at
 from manipcli.run.live_conditions import Live, Probe
@@ -23,7 +23,7 @@ class Broken:
     text: str
 
 
-class Watching:
+class Monitors:
     """The watches of a run, each asked from the beginning of the first of its steps to the end of the last.
 
     Args:
@@ -62,31 +62,31 @@ class Watching:
                 self._live.close(self._probes.pop(k))
 
     def _open(self, k: int, watch: WatchSpec, name: str) -> None:
-        def told(moments: Moments, reading: Reading) -> None:
+        def told(window: StateWindow, robustness: Robustness) -> None:
             if self.broken is None:
-                self.broken = _broken(k, watch, name, moments, reading)
+                self.broken = _broken(k, watch, name, window, robustness)
 
         self._probes[k] = self._live.open(watch.condition, told=told)
 
 
-def _broken(k: int, watch: WatchSpec, name: str, moments: Moments, reading: Reading) -> Broken | None:
+def _broken(k: int, watch: WatchSpec, name: str, window: StateWindow, robustness: Robustness) -> Broken | None:
     """The first of these moments that breaks a watch."""
-    answer = never(reading) if watch.quantifier == "never" else reading
+    answer = never(robustness) if watch.quantifier == "never" else robustness
     bad = answer.applies & ~(answer.order >= 0.0)
     if watch.steps:
-        bad &= _during(watch.steps, moments)
+        bad &= _during(watch.steps, window)
     if not bad.any():
         return None
     tick = int(np.argmax(bad))
-    found, time = answer.found(tick), float(moments.times[tick])
+    found, time = answer.found(tick), float(window.times[tick])
     return Broken(k, f"{broken_at(name)}t = {time:.3f} s{found.lacking}: {found.text}")
 
 
-def _during(steps: Sequence[str], moments: Moments) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _during(steps: Sequence[str], window: StateWindow) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """(T,) which of the moments lie in one of the steps."""
-    inside = np.zeros(len(moments.times), dtype=np.bool_)
-    for step in moments.steps:
+    inside = np.zeros(len(window.times), dtype=np.bool_)
+    for step in window.steps:
         if step.id in steps and step.started is not None:
             end = np.inf if step.ended is None else step.ended - ROUNDING
-            inside |= (moments.times >= step.started - ROUNDING) & (moments.times < end)
+            inside |= (window.times >= step.started - ROUNDING) & (window.times < end)
     return inside

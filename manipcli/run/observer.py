@@ -9,7 +9,7 @@ from typing import Final, Protocol
 
 from manipcli.control.action import GoalHandle
 from manipcli.control.controller import ControllerOutput
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.state import Contact, WorldState
 from manipcli.record.write.contact_filter import ContactFilter
@@ -30,7 +30,7 @@ class Progress(Protocol):
         """A sign of life while no time goes by: a step is planned, a part of the log is judged."""
         ...
 
-    def warned(self, findings: Sequence[Finding]) -> None:
+    def warned(self, findings: Sequence[Diagnostic]) -> None:
         """What may go wrong, known before the first step: once of the files, once of the plan."""
         ...
 
@@ -55,7 +55,7 @@ class _Silent:
     """Shows nothing."""
 
     def doing(self, what: str) -> None: ...
-    def warned(self, findings: Sequence[Finding]) -> None: ...
+    def warned(self, findings: Sequence[Diagnostic]) -> None: ...
     def step_started(self, step: PlannedStep, index: int, total: int) -> None: ...
     def told(self, text: str, *, detail: bool) -> None: ...
     def tick(self, simulated_time: float, wall: float) -> None: ...
@@ -74,7 +74,7 @@ class _Goal:
     handle: GoalHandle
 
 
-class Onlooker:
+class Observer:
     """Hands every tick to the recorder and to live conditions, and now and then the time to who shows the progress."""
 
     def __init__(self, recorder: Recorder, live: Live, progress: Progress, period: float) -> None:

@@ -11,7 +11,7 @@ from typing import Literal
 from manipcli.control.controller import Controller
 from manipcli.control.manager import ControllerManager
 from manipcli.control.roles import is_follower, is_hand
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.version import __version__
 from manipcli.judge.drawn import SAMPLE
 from manipcli.judge.judge import STORED, UNTIL
@@ -47,7 +47,7 @@ def default_log(task: Task) -> Path:
         RUNS.mkdir(exist_ok=True)
     except OSError as error:
         message = f"cannot make the folder '{RUNS}' for the log: {error.strerror}"
-        raise InvalidInput([Finding("LOG101", message, hint="say where it goes with --log PATH")]) from error
+        raise InvalidInput([Diagnostic("LOG101", message, hint="say where it goes with --log PATH")]) from error
     return RUNS / f"{task.name}.mcap"
 
 

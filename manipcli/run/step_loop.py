@@ -11,16 +11,16 @@ from manipcli.control.action import GoalHandle
 from manipcli.control.saturation import KINDS
 from manipcli.core.errors import NotPlannable, SimulationFailed
 from manipcli.core.stopwatch import Stopwatch
-from manipcli.judge.cuts import Cuts
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
 from manipcli.model.state import WorldState
 from manipcli.plan.step import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
-from manipcli.run.holding import Holding
+from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe
-from manipcli.run.monitors import Watching
+from manipcli.run.monitors import Monitors
 from manipcli.run.observer import Progress
 from manipcli.run.replan import Measured, after
 from manipcli.simulate.engines import ENGINES
@@ -38,7 +38,7 @@ AFTERMATH: Final = 0.6
 """How long [s] the world is watched after the last step, so that "at rest" can be judged."""
 
 
-def cuts_of(session: Session) -> Cuts:
+def cuts_of(session: Session) -> Saturations:
     """In how many ticks each joint's command was cut, at which limits, and each actuator had no more to give."""
     names = session.robot.joint_names
     joints = dict(zip(names, map(int, session.saturations), strict=True))
@@ -47,10 +47,10 @@ def cuts_of(session: Session) -> Cuts:
         for kind, counts in zip(KINDS, session.saturations_by_kind, strict=True)
     }
     actuators = dict(zip(session.actuation.names, map(int, session.actuation.saturations), strict=True))
-    return Cuts(joints, actuators, session.ticks, kinds)
+    return Saturations(joints, actuators, session.ticks, kinds)
 
 
-class StepsRun:
+class StepLoop:
     """One pass over the steps.
 
     Args:
@@ -82,14 +82,14 @@ class StepsRun:
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
-        self._watching = Watching(task.spec.watch, task.spec.expect, live)
+        self._watching = Monitors(task.spec.watch, task.spec.expect, live)
         self._executor = Executor(session, touch=self._physics, told=told, alarm=self._look)
         replan = task.spec.replan
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
-        self._holding = Holding(task.true.robot, task.true.scene)
+        self._holding = GraspMargin(task.true.robot, task.true.scene)
         self._believed = plan.start
         self._replanning = replanning
         self._failed = False
@@ -353,7 +353,7 @@ def _no_longer(motion: Motion, probe: Probe | None) -> str:
     return f"; at rest {missing}" if missing else ""
 
 
-def _cut_since(before: Cuts, session: Session) -> str:
+def _cut_since(before: Saturations, session: Session) -> str:
     """What had nothing left to give since then; nothing where everything had."""
     cut = str(cuts_of(session).since(before))
     return f"; {cut}" if cut else ""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput, Loc
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.core.text import digits
 from manipcli.description.elements import Inertial
@@ -316,7 +316,7 @@ class _Builder:
     # -- findings
 
     def _error(self, code: str, message: str, loc: Loc, hint: str | None = None) -> None:
-        self.findings.append(Finding(code=code, message=message, place=self.place(loc), hint=hint))
+        self.findings.append(Diagnostic(code=code, message=message, place=self.place(loc), hint=hint))
 
 
 def _written(value: object, loc: Loc) -> Iterator[Loc]:

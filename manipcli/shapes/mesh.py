@@ -16,7 +16,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array, frozen
 from manipcli.shapes.mesh_collada import read_collada
 from manipcli.shapes.mesh_formats import (
@@ -243,7 +243,7 @@ def clean_mesh(mesh: Mesh, folder: Path) -> Path:
         triangles = read_mesh(mesh.path)
     except UnusableMesh as error:
         message = f"mesh '{mesh.uri}' {error.reason}"
-        raise InvalidInput([Finding("URDF200", message, hint=error.hint)]) from error
+        raise InvalidInput([Diagnostic("URDF200", message, hint=error.hint)]) from error
     suffix = ".obj" if triangles.format == "obj" else ".stl"
     name = hashlib.sha256(str(mesh.path).encode("utf-8", "surrogateescape")).hexdigest()[:16]
     path = folder / (name + suffix)

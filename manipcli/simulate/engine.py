@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from manipcli.control.command import JointCommand
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
@@ -89,7 +89,7 @@ class EngineMember:
 
     name: str
     physics: Literal["full", "none"]
-    refuses: Callable[[RobotModel], tuple[Finding, ...]]
+    refuses: Callable[[RobotModel], tuple[Diagnostic, ...]]
     open: Callable[[RobotModel, Scene, EngineSettings], Engine]
     version: Callable[[], str]
     prepare: Callable[[], object]

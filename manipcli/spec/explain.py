@@ -33,7 +33,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import any_of, did_you_mean, listed, nearest
 from manipcli.core.units import ANGLE, readable
 from manipcli.spec import hints
@@ -89,10 +89,10 @@ class _Complaint:
 _WHOLE = frozenset({"literal_error", "quantity_type", "unit"})
 
 
-def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Finding, ...]:
+def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Diagnostic, ...]:
     """Every complaint as a finding, in the order of the file."""
     complaints = [_locate(details, root) for details in error.errors(include_url=False)]
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     for complaint in _decide(_counted(complaints), root):
         findings.append(_finding(complaint[0], complaint, root, model, area))
     unique = dict.fromkeys(findings)
@@ -176,7 +176,7 @@ def _badness(branch: Sequence[_Complaint]) -> tuple[int, int]:
 
 def _finding(
     first: _Complaint, branches: Sequence[_Complaint], root: Node, model: type[BaseModel], area: str
-) -> Finding:
+) -> Diagnostic:
     kind, path = first.error["type"], first.path
     node = node_at(root, path)
     what, hint = _told(first, branches, root, model)
@@ -189,7 +189,7 @@ def _finding(
     place = key_place_at(root, path) if at_key else node.place
     where = dotted(path[:-1] if kind in ("extra_forbidden", "missing") or at_key else path)
     code = f"{area}{_MISTAKES.get(kind, 205)}"
-    return Finding(code, f"{where}: {what}" if where else what, place, hint=hint)
+    return Diagnostic(code, f"{where}: {what}" if where else what, place, hint=hint)
 
 
 def _origin(node: Node, root: Node) -> str | None:

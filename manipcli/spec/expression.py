@@ -18,7 +18,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from manipcli.core.errors import Finding, Loc, Place
+from manipcli.core.errors import Diagnostic, Loc, Place
 from manipcli.core.text import did_you_mean, escape, shorten
 from manipcli.core.units import (
     NUMBER,
@@ -195,7 +195,7 @@ class _Parser:
         return Quantity(float(value), NUMBER)
 
 
-def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Finding], frozenset[Place]]:
+def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Diagnostic], frozenset[Place]]:
     """The task with every expression computed, what could not be, and which values are unknown because of that.
 
     Parameters may use those above them in `params:`. `refused`: places of values that are none.
@@ -233,7 +233,7 @@ class _Substitution:
         self.lost: set[str] = set()
         self.declared: list[str] = []
         self.below: list[str] = []
-        self.findings: list[Finding] = []
+        self.findings: list[Diagnostic] = []
         self.refused = set(refused)
         self.unknown: set[Place] = set()
 
@@ -252,7 +252,7 @@ class _Substitution:
             return ScalarNode(evaluate(node.value, self.params), node.place, written=node.value)
         except ExpressionError as error:
             code = "TASK203" if error.unknown else "TASK211"
-            self.findings.append(Finding(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
+            self.findings.append(Diagnostic(code, f"{dotted(path)}: {error.cause}", node.place, hint=error.hint))
             self.refused.add(node.place)
             return node
 

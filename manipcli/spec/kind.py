@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.spec.ros.nodes import MANAGER
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode
 
@@ -62,4 +62,4 @@ def _certain_kind(root: MappingNode) -> str | None:
 
 def _refusal(name: str, found: str, wanted: str, *, hint: str | None = None) -> InvalidInput:
     message = f"this is {found}; a {wanted} file was expected"
-    return InvalidInput([Finding("USE105", message, Place(name, 1, 1), hint=hint)])
+    return InvalidInput([Diagnostic("USE105", message, Place(name, 1, 1), hint=hint)])

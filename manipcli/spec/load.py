@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import any_of, escape, listed, nearest_file
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
@@ -42,15 +42,15 @@ def read_bytes(path: Path) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             what = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise InvalidInput([Finding("USE102", f"this is {what}", place)])
+            raise InvalidInput([Diagnostic("USE102", f"this is {what}", place)])
         if status.st_size > MAX_BYTES:
-            raise InvalidInput([Finding("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", place)])
+            raise InvalidInput([Diagnostic("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", place)])
         return path.read_bytes()
     except (OSError, ValueError) as error:
         if isinstance(error, OSError) and error.errno in (errno.ENOENT, errno.ENOTDIR):
-            raise InvalidInput([Finding("USE101", "there is no such file", place, hint=sibling(path))]) from None
+            raise InvalidInput([Diagnostic("USE101", "there is no such file", place, hint=sibling(path))]) from None
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise InvalidInput([Finding("USE103", f"the file cannot be read: {reason}", place)]) from None
+        raise InvalidInput([Diagnostic("USE103", f"the file cannot be read: {reason}", place)]) from None
 
 
 def sibling(path: Path) -> str | None:
@@ -74,12 +74,12 @@ def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
     Raises:
         InvalidInput: it cannot be read, is no YAML mapping, or with `types` none of the three.
     """
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     root = parse(read_bytes(path), str(path), infinite=True, told=told if types is None else None)
     if not isinstance(root, MappingNode) and told:
         raise InvalidInput(told)
     if not isinstance(root, MappingNode):
-        raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
+        raise InvalidInput([Diagnostic("USE104", _NONE, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
         return "task"
     # In a file of ROS `robot` may be a namespace.
@@ -88,7 +88,7 @@ def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
         return "robot"
     wrapped = isinstance(root.get("controllers"), MappingNode)
     if types is not None and not wrapped and not names_controllers(root, types):
-        raise InvalidInput([Finding("USE104", _NONE, Place(str(path), 1, 1))])
+        raise InvalidInput([Diagnostic("USE104", _NONE, Place(str(path), 1, 1))])
     return "controllers"
 
 
@@ -143,7 +143,7 @@ def salvage_task(
 
 def _task_source(
     text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None
-) -> tuple[Source, list[Finding]]:
+) -> tuple[Source, list[Diagnostic]]:
     """The tree of a task, overrides and parameters put in, and what is wrong with those."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
     written, told = _source(text, name, "TASK", "task")
@@ -154,7 +154,7 @@ def _task_source(
     return source, [*told, *findings, *more, *_taken_twice(source)]
 
 
-def _taken_twice(source: Source) -> Iterator[Finding]:
+def _taken_twice(source: Source) -> Iterator[Diagnostic]:
     """Ids that two steps, or two of expectations and watches, have: looked for here, so that no other mistake hides
     them."""
     judged: dict[str, str] = {}
@@ -185,7 +185,7 @@ def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = 
     return validate(source, RobotSpec, findings=findings)
 
 
-def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Finding]]:
+def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Diagnostic]]:
     written, told = _source(text, name, "ROBOT", "robot")
     source, findings = _changed(written, read_overrides(overrides), RobotSpec)
     return source, [*told, *findings]
@@ -223,7 +223,7 @@ def load_controllers_text(
 
 def _controllers_source(
     text: str | bytes, name: str, model: type[ControllersSpec], overrides: Sequence[str]
-) -> tuple[Source, list[Finding]]:
+) -> tuple[Source, list[Diagnostic]]:
     written, told = _source(text, name, "CTRL", "controllers")
     root, more = rewrite(written.root, model.types)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), model)
@@ -241,18 +241,18 @@ def salvage_controllers_file(
     return salvage_controllers(source, model)
 
 
-def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Finding]]:
+def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Diagnostic]]:
     """The tree of a file, and what is wrong with its text."""
     if kind is not None:
         refuse_description(name, kind)
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     root: Node | None = parse(text, name, infinite=area == "CTRL", told=told)
     if kind is not None and root is not None:
         refuse_other_kind(root, name, kind)
     return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area), told
 
 
-def _changed(source: Source, overrides: Sequence[Override], model: type[Model]) -> tuple[Source, list[Finding]]:
+def _changed(source: Source, overrides: Sequence[Override], model: type[Model]) -> tuple[Source, list[Diagnostic]]:
     if not isinstance(source.root, MappingNode) or not source.root.entries:
         return source, []
     root, findings = apply(source.root, overrides, model, source.area)

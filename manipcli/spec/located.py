@@ -10,7 +10,7 @@ from typing import Final, Generic, Literal, TypeVar
 
 from pydantic import ValidationError
 
-from manipcli.core.errors import Finding, InvalidInput, Loc, Place, Severity
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place, Severity
 from manipcli.core.text import listed, shorten
 from manipcli.core.version import __version__
 from manipcli.spec.base import Model
@@ -85,11 +85,11 @@ class Source:
         hint: str | None = None,
         severity: Severity = "error",
         key: bool = False,
-    ) -> Finding:
+    ) -> Diagnostic:
         """Something to tell about the value (or, with `key`, the key) at `path`, under this kind of file's code."""
         place = self.key_place(*path) if key else self.place(*path)
         where = f"{dotted(self._in_file(path))}: " if path else ""
-        return Finding(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
+        return Diagnostic(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
 
     def _in_file(self, path: Loc) -> Loc:
         if len(path) > 1 and isinstance(path[0], str) and isinstance(path[1], int) and path[0] in self.kept:
@@ -103,14 +103,14 @@ class Located(Generic[M]):
 
     spec: M
     source: Source
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Diagnostic, ...] = ()
 
     def place(self, *path: str | int) -> Place:
         """`place("scene", "cup", "mass")`, `place("steps", 3, "move", "to")`."""
         return self.source.place(*path)
 
 
-def validate(source: Source, model: type[M], *, findings: Sequence[Finding]) -> Located[M]:
+def validate(source: Source, model: type[M], *, findings: Sequence[Diagnostic]) -> Located[M]:
     """The spec that the source says.
 
     Args:
@@ -139,7 +139,7 @@ def validate(source: Source, model: type[M], *, findings: Sequence[Finding]) -> 
     return Located(spec, source, told)
 
 
-def apart(findings: Sequence[Finding], unknown: AbstractSet[Place]) -> tuple[Finding, ...]:
+def apart(findings: Sequence[Diagnostic], unknown: AbstractSet[Place]) -> tuple[Diagnostic, ...]:
     """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
     places = {one.place for one in findings if one.code.startswith("YAML")}
     uncomputed = {one.place for one in findings if one.code in UNCOMPUTED}

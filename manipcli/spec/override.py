@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from types import NoneType
 
-from manipcli.core.errors import Finding, InvalidInput, Loc, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
 from manipcli.spec.base import Model
 from manipcli.spec.located import Area
@@ -47,14 +47,14 @@ def read_override(text: str) -> Override:
     parts = tuple(part.strip() for part in path_text.strip().split("."))
     if not equals or not all(parts):
         hint = "write --set scene.cup.mass='80 g'"
-        raise InvalidInput([Finding("TASK212", "an override is PATH=VALUE", place, hint=hint)])
+        raise InvalidInput([Diagnostic("TASK212", "an override is PATH=VALUE", place, hint=hint)])
     if not value_text.strip():
         hint = "null unsets a value that has a default"
-        raise InvalidInput([Finding("TASK212", "the value is missing", place, hint=hint)])
+        raise InvalidInput([Diagnostic("TASK212", "the value is missing", place, hint=hint)])
     try:
         value = parse(value_text, place.file)
     except InvalidInput as error:
-        raise InvalidInput([Finding(f.code, f.message, place, hint=f.hint) for f in error.findings]) from None
+        raise InvalidInput([Diagnostic(f.code, f.message, place, hint=f.hint) for f in error.findings]) from None
     area: Area = "TASK"
     if len(parts) > 1 and parts[0] in _FILES:
         area, parts = _FILES[parts[0]], parts if parts[0] == "controllers" else parts[1:]
@@ -70,7 +70,7 @@ def seed_override(seed: int) -> Override:
 def read_overrides(texts: Sequence[str]) -> tuple[Override, ...]:
     """All of them, or all their findings."""
     overrides: list[Override] = []
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     for text in texts:
         try:
             overrides.append(read_override(text))
@@ -81,9 +81,9 @@ def read_overrides(texts: Sequence[str]) -> tuple[Override, ...]:
     return tuple(overrides)
 
 
-def apply(root: Node, overrides: Sequence[Override], model: type[Model], area: Area) -> tuple[Node, list[Finding]]:
+def apply(root: Node, overrides: Sequence[Override], model: type[Model], area: Area) -> tuple[Node, list[Diagnostic]]:
     """The tree with the overrides of this kind of file, one after the other, and those that fit nowhere."""
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     for override in overrides:
         if override.area != area:
             continue
@@ -167,7 +167,7 @@ def _index(node: SequenceNode, override: Override, done: Loc, part: str) -> int:
 
 
 def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput:
-    return InvalidInput([Finding(f"{override.area}212", message, override.place, hint=hint)])
+    return InvalidInput([Diagnostic(f"{override.area}212", message, override.place, hint=hint)])
 
 
 def step_ids(steps: SequenceNode) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import TypeVar, get_args
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.judge.drawn import Number
 from manipcli.spec.base import Model
 from manipcli.spec.controllers_file import ControllersSpec
@@ -61,7 +61,7 @@ def bound(files: Files) -> tuple[Varied, ...]:
     return varied
 
 
-def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Finding, ...]:
+def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Diagnostic, ...]:
     """What the fields of the files refuse of the ends and items of each law; a normal law has no ends.
 
     All laws take their ends together, the shorter ones their last one again, so that fields which must fit each other
@@ -69,7 +69,7 @@ def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Finding, ...]:
     """
     written = {files.task.source.key_place("vary", one.key) for one in varied}
 
-    def refused(area: Area, k: int, inside: float) -> tuple[Finding, ...]:
+    def refused(area: Area, k: int, inside: float) -> tuple[Diagnostic, ...]:
         ends = ((one, one.ends(inside)) for one in varied if one.area == area)
         try:
             files.changed([(one, values[min(k, len(values) - 1)]) for one, values in ends if values])
@@ -77,7 +77,7 @@ def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Finding, ...]:
             return tuple(one for one in invalid.findings if one.severity == "error" and one.place in written)
         return ()
 
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     for area, k in product(get_args(Area), range(max((len(one.ends()) for one in varied), default=0))):
         told = refused(area, k, 0.0)
         # The ends themselves are never drawn: a mass from [0, 1 kg] is above 0.

@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import Final
 
-from manipcli.conditions.condition import Problem, Setting
+from manipcli.conditions.condition import CheckContext, Problem
 from manipcli.conditions.members import CONDITIONS
 from manipcli.conditions.members.collision import CollisionSpec, NoCollisionSpec
 from manipcli.conditions.members.contact_force import ContactForceSpec
 from manipcli.control.factory import controller_findings
-from manipcli.core.errors import Finding, InvalidInput, Loc
+from manipcli.core.errors import Diagnostic, InvalidInput, Loc
 from manipcli.judge.expectation import expectation_problems, until_problems
 from manipcli.model.joint_units import misread_units
 from manipcli.model.robot import RobotModel
@@ -44,7 +44,7 @@ OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL14
 
 def consistent(
     task: Located[TaskSpec], controllers: Located[ControllersSpec], robot: RobotModel, scene: Scene
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """Warnings and notes about three sound files together.
 
     Raises:
@@ -59,7 +59,7 @@ def consistent(
 
 def disagreements(
     task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """What files that are sound by themselves do not have together: names that are not there, units that fit no joint,
     what the engine refuses, what no controller commands. Warnings and notes are among it."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
@@ -77,19 +77,19 @@ def disagreements(
 
 def not_there(
     task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: Claims | None = None
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     """What steps, conditions and expectations speak of and that is not there; of steps also what no controller could
     carry out, where it is known who `claims` what."""
     spec, kept = task.spec, task.source.kept
     known = tuple(step.id for step in spec.steps if step.id is not None)
     ids = intended_ids(task.source, STEPS.names) if kept else known
-    setting = Setting(robot, scene, ids, in_order=not kept)
-    of_steps = [*_of_steps(spec, setting, claims)]
-    for number, loc, p in (*of_steps, *_of_expectations(spec, setting)):
+    context = CheckContext(robot, scene, ids, in_order=not kept)
+    of_steps = [*_of_steps(spec, context, claims)]
+    for number, loc, p in (*of_steps, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
     for k in range(0 if kept else len(spec.steps)):
         told = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
-        yield from _tried_again(task, k, setting, told)
+        yield from _tried_again(task, k, context, told)
     poses = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
@@ -100,12 +100,12 @@ def not_there(
         yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
 
 
-def _of_steps(spec: TaskSpec, setting: Setting, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
+def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
     """What is wrong with each step, and with what it waits for; after a switch of controllers others claim."""
-    robot = setting.robot
+    robot = context.robot
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
-        unknown = member.check(step.body, robot, setting.scene)
+        unknown = member.check(step.body, robot, context.scene)
         if claims is not None and not claims.hand and any(isinstance(p, UnknownPosture) for p in unknown):
             unknown = (no_hand(robot), *(p for p in unknown if not isinstance(p, UnknownPosture)))
         yield from ((ABSENT, at, p) for p in unknown)
@@ -117,7 +117,7 @@ def _of_steps(spec: TaskSpec, setting: Setting, claims: Claims | None) -> Iterat
                 misfits, claims = foreseen(switch, claims, robot)
                 yield from ((NOT_SWITCHED, at, p) for p in misfits)
         if step.until is not None:
-            for p in until_problems(step.until, step.id, setting, CONDITIONS):
+            for p in until_problems(step.until, step.id, context, CONDITIONS):
                 yield ABSENT, ("steps", k, "until"), p
         if member.guarded(step.body):
             yield from ((GUARDED, at, p) for p in _unguarded(step, spec))
@@ -133,7 +133,7 @@ def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:
         yield Problem(("guarded",), message, "leave `replan` out")
 
 
-def _unfelt(task: Located[TaskSpec]) -> Iterator[Finding]:
+def _unfelt(task: Located[TaskSpec]) -> Iterator[Diagnostic]:
     """Moves that may touch something, wait for its force, and look for that only when they have gone all their way."""
     for k, step in enumerate(task.spec.steps):
         body = step.body
@@ -159,14 +159,14 @@ def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
     return False
 
 
-def _of_expectations(spec: TaskSpec, setting: Setting) -> Iterator[tuple[int, Loc, Problem]]:
+def _of_expectations(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[int, Loc, Problem]]:
     for key, expectations in (("expect", spec.expect), ("watch", spec.watch)):
         for k, expected in enumerate(expectations):
-            for p in expectation_problems(expected, setting, CONDITIONS):
+            for p in expectation_problems(expected, context, CONDITIONS):
                 yield ABSENT, (key, k), p
 
 
-def _tried_again(task: Located[TaskSpec], k: int, setting: Setting, told: Collection[str]) -> Iterator[Finding]:
+def _tried_again(task: Located[TaskSpec], k: int, context: CheckContext, told: Collection[str]) -> Iterator[Diagnostic]:
     """What is wrong with a step only when it is tried again with other values: not what was `told` of it already."""
     step = task.spec.steps[k]
     try:
@@ -176,14 +176,14 @@ def _tried_again(task: Located[TaskSpec], k: int, setting: Setting, told: Collec
         return
     if again is step:
         return
-    wrong = STEPS[again.verb].check(again.body, setting.robot, setting.scene)
-    wrong += () if again.until is None else until_problems(again.until, step.id, setting, CONDITIONS)
+    wrong = STEPS[again.verb].check(again.body, context.robot, context.scene)
+    wrong += () if again.until is None else until_problems(again.until, step.id, context, CONDITIONS)
     for p in wrong:
         if p.message not in told:
             yield task.source.finding(ABSENT, ("steps", k, "on_fail", "with"), p.message, hint=p.hint)
 
 
-def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
+def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Diagnostic]:
     """Bodies and frames that have the name of a link."""
     links = {link.name for link in robot.links} - {*RESERVED}  # which are told without a robot
     for number, key, named in ((220, "scene", scene.bodies), (227, "frames", scene.frames)):
@@ -193,7 +193,7 @@ def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) ->
         )
 
 
-def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
+def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Diagnostic, ...]:
     """Why the robot can do no task, or the engine cannot hold it: told at the link, or where the task names it."""
     if not robot.moving_joints:
         message = f"robot '{robot.name}' has no joint that moves"
@@ -207,7 +207,7 @@ def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Finding, ...]:
     )
 
 
-def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Finding, ...]:
+def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Diagnostic, ...]:
     """What is wrong with who commands what, and what is only to be told; of a file from which something was left out
     nothing but names."""
     period = task.simulation.control_period

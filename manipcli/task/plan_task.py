@@ -12,7 +12,7 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
 from manipcli.judge.expectation import labels
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
-from manipcli.model.configuration import posture
+from manipcli.model.configuration import configuration
 from manipcli.plan.claims import Claims
 from manipcli.plan.grasp_backtracking import GraspBacktracking
 from manipcli.plan.hand import SPEED, closing_speed
@@ -138,7 +138,7 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 
 def start_position(task: Task) -> Array:
     """(n) where the robot starts: the task's `start` pose, else `home` if there is one, else zero within the limits."""
-    return posture(task.robot, task.spec.start)
+    return configuration(task.robot, task.spec.start)
 
 
 def _steps(task: Task, planner: Planner, start: PlanningState, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:

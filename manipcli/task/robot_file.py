@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
 from manipcli.spec.load import load_robot
@@ -16,7 +16,7 @@ from manipcli.task.second_chances import every_robot_finding
 
 def read_robot(
     path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
-) -> tuple[Located[RobotSpec], RobotModel, tuple[Finding, ...]]:
+) -> tuple[Located[RobotSpec], RobotModel, tuple[Diagnostic, ...]]:
     """The file, the robot, and the warnings and notes of both.
 
     Args:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.packages import Packages
 from manipcli.judge.drawn import Drawn
 from manipcli.model.build_robot import build_robot
@@ -24,7 +24,7 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.task import TaskSpec
 from manipcli.task.changed_files import Changes, Files
 from manipcli.task.named_file import named_file
-from manipcli.task.task import Task, Truth
+from manipcli.task.task import GroundTruth, Task
 from manipcli.task.vary import Varied, draw
 
 RobotOf = Callable[[Located[RobotSpec]], RobotModel]
@@ -54,10 +54,10 @@ def draw_sample(
     """
     if number < 0:
         message = f"there is no sample {number}: they count from 0"
-        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
+        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
     if not varied:
         message = f"there is no sample {number}: task '{task.name}' has no `vary:`"
-        raise InvalidInput([Finding("TASK235", message, task.file.place("task"))])
+        raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
     robot_path = named_file(task.file, path, "robot")
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     drawn = _but_for(draw(varied, task.spec.simulation.seed, number), varied, read_overrides(overrides))
@@ -96,7 +96,7 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
         true = written.changed(changes)
         robot = task.robot if planned.robot is written.robot else robot_of(planned.robot)
         scene = task.scene if planned.task is written.task else scene_of(planned.task)
-        truth = Truth(
+        truth = GroundTruth(
             robot=robot if _same(changes, seen, "ROBOT") else robot_of(true.robot),
             scene=scene if _same(changes, seen, "TASK") else scene_of(true.task),
             controllers=true.controllers,

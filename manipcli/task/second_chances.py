@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.description.packages import Packages
 from manipcli.model.build_robot import build_robot
 from manipcli.model.robot import RobotModel
@@ -96,7 +96,7 @@ class _Errors:
     """Findings of several stages. `unknown`: places whose value is not known, as of `Source`."""
 
     def __init__(self) -> None:
-        self.found: list[Finding] = []
+        self.found: list[Diagnostic] = []
         self.unknown: frozenset[Place] = frozenset()
 
     def of(self, stage: Callable[[], T]) -> T | None:
@@ -113,7 +113,7 @@ class _Errors:
             return first
         files = list(dict.fromkeys(finding.place.file for finding in self.found if finding.place is not None))
 
-        def position(finding: Finding) -> tuple[int, int, int]:
+        def position(finding: Diagnostic) -> tuple[int, int, int]:
             place = finding.place
             return (-1, 0, 0) if place is None else (files.index(place.file), place.line, place.column)
 

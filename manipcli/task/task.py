@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.judge.drawn import Drawn
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
@@ -17,7 +17,7 @@ from manipcli.spec.task import TaskSpec
 
 
 @dataclass(frozen=True, slots=True)
-class Truth:
+class GroundTruth:
     """What is simulated, where planning knows something else: robot and scene of the engine, controllers and gains."""
 
     robot: RobotModel
@@ -38,18 +38,18 @@ class Task:
     controllers_file: Located[ControllersSpec]
     robot: RobotModel
     scene: Scene
-    findings: tuple[Finding, ...]
+    findings: tuple[Diagnostic, ...]
     places: Mapping[Loc, str] = field(default_factory=dict)
     drawn: Drawn | None = None
-    truth: Truth | None = None
+    truth: GroundTruth | None = None
 
     @property
-    def true(self) -> Truth:
+    def true(self) -> GroundTruth:
         """What is simulated."""
-        return self.truth or Truth(self.robot, self.scene, self.controllers_file)
+        return self.truth or GroundTruth(self.robot, self.scene, self.controllers_file)
 
     @property
-    def warnings(self) -> tuple[Finding, ...]:
+    def warnings(self) -> tuple[Diagnostic, ...]:
         """Its findings without notes."""
         return tuple(finding for finding in self.findings if finding.severity == "warning")
 

@@ -10,7 +10,7 @@ import numpy as np
 from manipcli.conditions.condition import Seen, World
 from manipcli.conditions.formula import absent
 from manipcli.conditions.members import CONDITIONS
-from manipcli.core.errors import Finding, Severity
+from manipcli.core.errors import Diagnostic, Severity
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
 from manipcli.plan.steps import STEPS
@@ -23,7 +23,7 @@ TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "refer
 """The words of `record: {topics: ...}` without which nothing is known of each."""
 
 
-def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Finding]:
+def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Diagnostic]:
     """A warning for each expectation and watch that needs a topic which `record:` leaves out, and for each `until` that
     the engine cannot answer; an error where a move is guarded by it."""
     left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
@@ -38,7 +38,7 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
         for k, expected in enumerate(expectations):
             topic = absent(expected.condition, world, CONDITIONS)
             if topic in left_out.values():
-                yield Finding(
+                yield Diagnostic(
                     "TASK236",
                     f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
                     task.place(key, k),
@@ -52,4 +52,4 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
             guarded = STEPS[step.verb].guarded(step.body)
             message = f"`until` is not waited for{', by which this move is guarded' if guarded else ''}: {reason}"
             severity: Severity = "error" if guarded else "warning"  # it would go all its way, which nobody planned for
-            yield Finding("TASK237", message, task.place("steps", k, "until"), severity=severity)
+            yield Diagnostic("TASK237", message, task.place("steps", k, "until"), severity=severity)

@@ -20,7 +20,7 @@ from typing import Final
 
 from pydantic import BaseModel
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import did_you_mean, escape
 from manipcli.core.units import NUMBER, Dimension, UnitError, to_si
 from manipcli.judge.drawn import Drawn, Number
@@ -184,10 +184,10 @@ class _Leaf:
 
 def bind(
     task: Located[TaskSpec], robot: Located[RobotSpec], controllers: Located[ControllersSpec]
-) -> tuple[tuple[Varied, ...], tuple[Finding, ...]]:
+) -> tuple[tuple[Varied, ...], tuple[Diagnostic, ...]]:
     """Everything that the task varies, in the order of its file; and what cannot be meant."""
     found: list[Varied] = []
-    findings: list[Finding] = []
+    findings: list[Diagnostic] = []
     for key, spec in task.spec.vary.items():
         try:
             new = _bound(key, spec, task.spec, robot.spec, controllers.spec)

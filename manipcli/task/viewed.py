@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.geometry import Array
 from manipcli.description.lint.inspection import DESCRIPTIONS
 from manipcli.model.build_robot import build_robot
-from manipcli.model.configuration import posture
+from manipcli.model.configuration import configuration
 from manipcli.model.robot import RobotModel
 from manipcli.scene.scene import Scene
 from manipcli.spec import load
@@ -27,7 +27,7 @@ class Sight:
     robot: RobotModel
     scene: Scene | None
     q: Array
-    findings: tuple[Finding, ...]
+    findings: tuple[Diagnostic, ...]
 
 
 def load_sight(
@@ -52,11 +52,11 @@ def load_sight(
         spec = RobotSpec(robot=path.name.partition(".")[0], description=path.name, args=dict(arguments))
         robot, notes = build_robot(spec, file=path, package_path=package_path, allow_outside=allow_outside)
         # Acceleration limits are a matter of robot files.
-        return Sight(robot, None, posture(robot), tuple(note for note in notes if note.code != "ROBOT330"))
+        return Sight(robot, None, configuration(robot), tuple(note for note in notes if note.code != "ROBOT330"))
     if arguments:
         names = ", ".join(arguments)
         raise InvalidInput(
-            [Finding("VIEW002", f"only a description has arguments; given: {names}", Place(str(path), 0, 0))]
+            [Diagnostic("VIEW002", f"only a description has arguments; given: {names}", Place(str(path), 0, 0))]
         )
     kind = load.kind_of(path)
     if kind == "task":
@@ -64,6 +64,6 @@ def load_sight(
         return Sight(task.robot, task.scene, start_position(task), task.findings)
     if kind == "controllers":
         message = "a controllers file has nothing to look at; give a robot, a description or a task"
-        raise InvalidInput([Finding("VIEW003", message, Place(str(path), 0, 0))])
+        raise InvalidInput([Diagnostic("VIEW003", message, Place(str(path), 0, 0))])
     _, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
-    return Sight(robot, None, posture(robot), findings)
+    return Sight(robot, None, configuration(robot), findings)

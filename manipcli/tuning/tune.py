@@ -14,10 +14,10 @@ from manipcli.control.control_loop import InverseDynamicsLoop, NoLoop, PidLoop
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.joint_space_load import Configurations, JointSpaceLoad, load_of
 from manipcli.control.tuning import MARGIN, Tuned, Wish, least_margin, tightness, tune_efforts, tune_velocity
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean, listed, told_apart
-from manipcli.model.configuration import named_postures, posture, with_mimics
+from manipcli.model.configuration import configuration, named_configurations, with_mimics
 from manipcli.model.kinematics import Kinematics
 from manipcli.model.robot import RobotModel
 from manipcli.spec import load
@@ -86,10 +86,12 @@ def tune(
     for joint in joints:
         if joint not in there:
             hint = did_you_mean(joint, there, kind="joints with gains")
-            raise InvalidInput([Finding("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
+            raise InvalidInput([Diagnostic("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
     found = tuple(one for one in everything if not joints or one.joint in joints)
     if simulated:
-        found = simulated_answers(robot, file.spec, everything, [one.joint for one in found], wish, posture(robot))
+        found = simulated_answers(
+            robot, file.spec, everything, [one.joint for one in found], wish, configuration(robot)
+        )
     return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
 
 
@@ -128,7 +130,7 @@ class _Tuner:
         self.notes: tuple[str, ...] = ()
         known = {joint.name for joint in robot.moving_joints}
         missing = [
-            Finding("TUNE002", f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
+            Diagnostic("TUNE002", f"controller '{name}': joint '{joint}' is not in robot '{robot.name}'",
                     file.place("controllers", name, "joints", k), did_you_mean(joint, known, kind="joints"))
             for name, spec in file.spec.controllers.items() for k, joint in enumerate(spec.joints)
             if joint not in known
@@ -162,7 +164,7 @@ class _Tuner:
         if not efforts and not velocities:
             message = "no controller has a loop to propose gains for"
             hint = "; ".join(self.notes) or None
-            raise InvalidInput([Finding("TUNE001", message, self._file.place("controllers"), hint=hint)])
+            raise InvalidInput([Diagnostic("TUNE001", message, self._file.place("controllers"), hint=hint)])
         return self._of_efforts(efforts) + self._of_velocities(velocities)
 
     def _elsewhere(self) -> dict[str, str]:
@@ -222,7 +224,7 @@ class _Tuner:
         if margin < 1.0:
             hint = "a shorter `--period`, or less `--bandwidth`"
             message = f"no gains were found that are stable in all postures: these are unstable {there}"
-            raise InvalidInput([Finding("TUNE003", message, self._file.place("controllers"), hint)])
+            raise InvalidInput([Diagnostic("TUNE003", message, self._file.place("controllers"), hint)])
         left, wanted = told_apart(margin, MARGIN, form=".2g")
         self.notes += (f"But {there}, all of them together may grow by {left} alone, not by {wanted}.",)
 
@@ -244,7 +246,7 @@ class _Tuner:
                     f"{one.least:.2g} {unit} at least"
                 )
                 place = self._file.place("controllers", one.controller, "gains", one.joint)
-                hopeless.append(Finding("TUNE003", message, place, hint))
+                hopeless.append(Diagnostic("TUNE003", message, place, hint))
         if hopeless:
             raise InvalidInput(hopeless)
 
@@ -286,14 +288,14 @@ class _Tuner:
 
     def _postures(self) -> Configurations:
         """The named ones, and some from the whole range of the joints."""
-        start = posture(self._robot)
+        start = configuration(self._robot)
         rng = np.random.default_rng(0)
         spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
-        return Configurations.at_rest(np.vstack([named_postures(self._robot, start), *spread]))
+        return Configurations.at_rest(np.vstack([named_configurations(self._robot, start), *spread]))
 
     def _range(self) -> tuple[Array, Array]:
         """(n), (n) the least and the greatest of the joints."""
-        start = posture(self._robot)
+        start = configuration(self._robot)
         lower, upper = np.array([joint.limits.range for joint in self._robot.moving_joints]).reshape(-1, 2).T
         return np.where(np.isneginf(lower), start - WIDE, lower), np.where(np.isposinf(upper), start + WIDE, upper)
 

@@ -23,7 +23,7 @@ from manipcli.batch.child import _Beats, _end_of
 from manipcli.batch.job import Beat, End, Job, Settings, limit
 from manipcli.batch.process import Process, run_job
 from manipcli.cli.task_session import remove_empty
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.record.faults import RecordingFailed
 from manipcli.report.run_report import RunReport, Timing
@@ -188,8 +188,8 @@ def test_silence_is_a_hang_and_leaves_where_it_was(tmp_path: Path) -> None:
 def test_no_limit_is_none(tmp_path: Path, forever: float, watched: bool) -> None:
     (job,) = jobs(tmp_path, f"time.sleep(0.3); {END}", timeout=forever)
     job = replace(job, settings=replace(job.settings, silence=forever))
-    onlooker = (lambda _: None) if watched else None
-    report = run_job(job, onlooker=onlooker, command=(sys.executable, "-c", CHILD))
+    observer = (lambda _: None) if watched else None
+    report = run_job(job, observer=observer, command=(sys.executable, "-c", CHILD))
     assert report.outcome == "invalid"
 
 
@@ -228,7 +228,7 @@ def test_what_is_made_of_a_run_that_is_over_is_not_its_time(tmp_path: Path) -> N
 
 
 def test_warnings_arrive_with_the_end(tmp_path: Path) -> None:
-    doubt = Finding("CTRL153", "weak", Place("c.yaml", 1, 2), severity="warning")
+    doubt = Diagnostic("CTRL153", "weak", Place("c.yaml", 1, 2), severity="warning")
     end = pickle.dumps(End(None, warnings=(doubt,)))
     (report,) = run(jobs(tmp_path, f"import pickle; parent.send(pickle.loads({end!r}))"))
     assert report.warnings == (doubt,)
@@ -255,7 +255,7 @@ def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_job(jobs(tmp_path, code)[0], onlooker=interrupt, command=(sys.executable, "-c", CHILD))
+        run_job(jobs(tmp_path, code)[0], observer=interrupt, command=(sys.executable, "-c", CHILD))
     assert not list((tmp_path / "runs").iterdir())
     with pytest.raises(ProcessLookupError):
         os.kill(int(seen[-1]), 0)
@@ -378,8 +378,8 @@ def test_folders_that_hold_nothing_are_removed(tmp_path: Path) -> None:
 
 def test_a_file_that_cannot_be_read_starts_no_process(tmp_path: Path) -> None:
     (job,) = jobs(tmp_path, "never")
-    finding = Finding("YAML100", "quotes", Place("t0.yaml", 3, 4), hint="close them")
-    note = Finding("YAML105", "tabs", Place("t0.yaml", 1, 1), severity="note")
+    finding = Diagnostic("YAML100", "quotes", Place("t0.yaml", 3, 4), hint="close them")
+    note = Diagnostic("YAML105", "tabs", Place("t0.yaml", 1, 1), severity="note")
     (report,) = run([replace(job, case=replace(job.case, findings=(note, finding)))])
     assert (report.outcome, report.troubles) == (
         "invalid",

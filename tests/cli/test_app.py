@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 import manipcli
 from manipcli.cli.app import COMMANDS, main
 from manipcli.core import collector
-from manipcli.core.errors import Finding, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
+from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, NotPlannable, Place, SimulationFailed
 from manipcli.core.geometry import Transform
 from manipcli.description.elements import Joint, JointLimits
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
@@ -68,8 +68,8 @@ def _raising(error: BaseException) -> Callable[..., NoReturn]:
     [
         (PASSED, 0),
         (replace(PASSED, verdict="failed"), 1),
-        (replace(PASSED, verdict="error", errors=(Finding("RUN101", "stopped"),)), 2),
-        (replace(PASSED, verdict="error", errors=(Finding("SIM100", "gone"),)), 3),
+        (replace(PASSED, verdict="error", errors=(Diagnostic("RUN101", "stopped"),)), 2),
+        (replace(PASSED, verdict="error", errors=(Diagnostic("SIM100", "gone"),)), 3),
     ],
 )
 def test_the_verdict_decides_the_exit_code(
@@ -85,7 +85,11 @@ IN_A_CLASS = RuntimeError("Error calling __set_name__ on 'cached_property' insta
 IN_A_CLASS.__cause__ = KeyboardInterrupt()
 IN_A_MODEL = SchemaError("Error building `literal` serializer:\n  KeyboardInterrupt: ")
 ERRORS = [
-    (InvalidInput([Finding("TASK203", "no such joint", Place("t.yaml", 14, 9), hint="did you mean 'a'?")]), 4, "error"),
+    (
+        InvalidInput([Diagnostic("TASK203", "no such joint", Place("t.yaml", 14, 9), hint="did you mean 'a'?")]),
+        4,
+        "error",
+    ),
     (NotPlannable("out of reach", step="pick_1"), 1, "failed"),
     (SimulationFailed("cup exploded", time=1.0), 1, "failed"),
     (ManipcliError("odd"), 3, "error"),
@@ -264,7 +268,7 @@ def test_check_of_a_file_that_is_not_there_is_a_wrong_call(tmp_path: Path, capsy
 def test_check_fails_on_errors_only(
     pipeline: SimpleNamespace, capsys: pytest.CaptureFixture[str], severity: str, code: int
 ) -> None:
-    pipeline.check_files = lambda _, **__: (Finding("TASK1", "x", severity=severity),)
+    pipeline.check_files = lambda _, **__: (Diagnostic("TASK1", "x", severity=severity),)
     pipeline.kind_of = lambda path: None
     assert main(["check", "a.yaml", "b.yaml"]) == code
     assert "2 files checked" in capsys.readouterr().out

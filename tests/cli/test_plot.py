@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.logs.chart import open_chart
+from manipcli.logs.plot import open_chart
 
 ROOT = Path(__file__).parents[2]
 

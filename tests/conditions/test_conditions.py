@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from manipcli.conditions.condition import Condition, Setting, World
+from manipcli.conditions.condition import CheckContext, Condition, World
 from manipcli.conditions.members import CONDITIONS
-from manipcli.conditions.robustness import Reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, JointType, Link
 from manipcli.model.robot import Group, NamedPose, RobotModel, Tool
@@ -88,13 +88,13 @@ def state(
     )
 
 
-def moments(*states: WorldState) -> Moments:
+def window(*states: WorldState) -> StateWindow:
     """Successive states, of which the first is that before the first tick where there are several."""
     shown = states[1:] or states
     joined = WorldState(
         *(np.stack([getattr(one, name) for one in shown]) for name in WorldState.__slots__)  # type: ignore[attr-defined]
     )
-    return Moments(joined, states[0] if len(states) > 1 else None, (), (), ())
+    return StateWindow(joined, states[0] if len(states) > 1 else None, (), (), ())
 
 
 WORLD = World(robot=ROBOT, scene=SCENE, start=state())
@@ -103,13 +103,13 @@ WORLD = World(robot=ROBOT, scene=SCENE, start=state())
 def opened(name: str, **written: Any) -> Any:
     condition: Condition[Any] = CONDITIONS[name]
     spec = condition.spec.model_validate(written)
-    assert condition.check(spec, Setting(ROBOT, SCENE)) == ()
+    assert condition.check(spec, CheckContext(ROBOT, SCENE)) == ()
     assert condition.absent(spec, WORLD) is None
     return condition.open(spec, WORLD)
 
 
-def read(name: str, *states: WorldState, **written: Any) -> Reading:
-    found: Reading = opened(name, **written)(moments(*states))
+def read(name: str, *states: WorldState, **written: Any) -> Robustness:
+    found: Robustness = opened(name, **written)(window(*states))
     return found
 
 
@@ -300,7 +300,7 @@ def test_moved_and_unmoved_count_from_the_first_tick_that_is_shown() -> None:
     poses = [moved_by("cup", (0.01 * k, 0, 0)) for k in range(5)]
     states = [state(poses={"cup": X}, time=0.1 * k) for k, X in enumerate(poses)]
     moved = opened("moved", object="cup", by=0.025)
-    both = [moved(moments(states[1], states[1], states[2])), moved(moments(*states[2:]))]
+    both = [moved(window(states[1], states[1], states[2])), moved(window(*states[2:]))]
     assert np.concatenate([one.margins for one in both]) == pytest.approx([-0.025, -0.015, -0.005, 0.005])
     unmoved = read("unmoved", states[0], *states[2:], object="cup", within=0.015)
     assert unmoved.margins == pytest.approx([0.015, 0.005, -0.005])
@@ -333,7 +333,7 @@ def test_at_pose_counts_what_slides_and_carries_the_tool() -> None:
     scara = replace(ROBOT, tool=Tool("finger", Transform.identity()))
     look = CONDITIONS["at_pose"].open(CONDITIONS["at_pose"].spec(pose="all"), replace(WORLD, robot=scara))
     near, far = (state(position=(0.5, -1.0, slide)) for slide in (0.001, 0.006))
-    found = look(moments(far, near, far))
+    found = look(window(far, near, far))
     assert found.margins == pytest.approx([0.004, -0.001])
     assert found.found(1).text == "joint 'slide' is 6 mm from pose 'all'; within 5 mm"
 
@@ -343,7 +343,7 @@ def test_at_pose_takes_a_joint_without_limits_the_short_way_round() -> None:
     endless = replace(ROBOT, joints=(replace(first, type="continuous"), *others))
     look = CONDITIONS["at_pose"].open(CONDITIONS["at_pose"].spec(pose="home"), replace(WORLD, robot=endless))
     around = state(position=(0.51 + 2 * np.pi, -1.0, 0.0))
-    assert look(moments(around)).margins == pytest.approx([0.01])
+    assert look(window(around)).margins == pytest.approx([0.01])
 
 
 SPECS: list[tuple[str, dict[str, Any]]] = [
@@ -386,11 +386,11 @@ def test_all_ticks_at_once_give_what_pieces_of_them_give(
         body_linear=nothing,
         body_angular=nothing,
     )
-    whole = Moments(many, None, (), (), ())
+    whole = StateWindow(many, None, (), (), ())
     together = opened(name, **written)(whole)
     assert together.margins.shape == (T,)
-    gauge = opened(name, **written)
-    pieces = [gauge(whole.part(a, b)) for a, b in pairwise((0, *cuts, T))]
+    monitor = opened(name, **written)
+    pieces = [monitor(whole.part(a, b)) for a, b in pairwise((0, *cuts, T))]
     np.testing.assert_array_equal(np.concatenate([one.margins for one in pieces]), together.margins)
     assert [pieces[0].found(0), pieces[-1].found(-1)] == [together.found(0), together.found(T - 1)]
 
@@ -423,7 +423,7 @@ def test_what_robot_and_scene_do_not_know_is_told(
     name: str, written: dict[str, Any], loc: tuple[str, ...], hint: str | None
 ) -> None:
     condition: Condition[Any] = CONDITIONS[name]
-    (problem,) = condition.check(condition.spec.model_validate(written), Setting(ROBOT, SCENE))
+    (problem,) = condition.check(condition.spec.model_validate(written), CheckContext(ROBOT, SCENE))
     assert problem.loc == loc
     assert hint is None or problem.hint == hint
 

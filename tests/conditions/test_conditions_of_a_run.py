@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from manipcli.conditions.condition import Condition, Setting, World
+from manipcli.conditions.condition import CheckContext, Condition, World
 from manipcli.conditions.members import CONDITIONS
-from manipcli.conditions.robustness import Reading
-from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
+from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
 from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, JointType, Link
 from manipcli.model.robot import Group, RobotModel, Tool
@@ -60,7 +60,7 @@ SCENE = build_scene(
 CUBE = SCENE.body("cube")
 
 
-def still(**changes: Array) -> Moments:
+def still(**changes: Array) -> StateWindow:
     """One second of nothing, in which all that can be followed is."""
     states = WorldState(
         time=TIMES,
@@ -74,7 +74,7 @@ def still(**changes: Array) -> Moments:
     )
     steps = (StepTime("go", 0.2, 0.5, "done"), StepTime("then", 0.5, 0.8, "failed"), StepTime("last", None, None, ""))
     reference = Reference(ROBOT.joint_names, np.zeros((T, 3)))
-    return Moments(replace(states, **changes), None, (reference,), (), steps)
+    return StateWindow(replace(states, **changes), None, (reference,), (), steps)
 
 
 WORLD = World(
@@ -86,24 +86,24 @@ WORLD = World(
 )
 
 
-def touching(*changes: tuple[float, list[tuple[str, str, float]]]) -> Moments:
+def touching(*changes: tuple[float, list[tuple[str, str, float]]]) -> StateWindow:
     return replace(
         still(),
         contacts=tuple(Touching(t, tuple(Contact(a, b, f, -1e-4) for a, b, f in pairs)) for t, pairs in changes),
     )
 
 
-def read(name: str, moments: Moments, **written: Any) -> Reading:
+def read(name: str, moments: StateWindow, **written: Any) -> Robustness:
     """The whole at once, after it gave the same in pieces, with a tick alone and without regard of where it is cut."""
     condition: Condition[Any] = CONDITIONS[name]
     spec = condition.spec.model_validate(written)
-    assert condition.check(spec, Setting(ROBOT, SCENE, WORLD.steps)) == ()
+    assert condition.check(spec, CheckContext(ROBOT, SCENE, WORLD.steps)) == ()
     assert condition.absent(spec, WORLD) is None
-    whole: Reading = condition.open(spec, WORLD)(moments)
+    whole: Robustness = condition.open(spec, WORLD)(moments)
     assert whole.margins.shape == whole.relative.shape == whole.applies.shape == (T,)
     assert set(whole.units) <= set(condition.units)
-    gauge = condition.open(spec, WORLD)
-    pieces: list[Reading] = [gauge(moments.part(a, b)) for a, b in ((0, 1), (1, 37), (37, 38), (38, 90), (90, T))]
+    monitor = condition.open(spec, WORLD)
+    pieces: list[Robustness] = [monitor(moments.part(a, b)) for a, b in ((0, 1), (1, 37), (37, 38), (38, 90), (90, T))]
     for field in ("margins", "relative", "applies"):
         np.testing.assert_array_equal(np.concatenate([getattr(one, field) for one in pieces]), getattr(whole, field))
     assert pieces[3].found(20) == whole.found(58)
@@ -185,11 +185,11 @@ def test_a_mean_force_is_that_of_its_window_however_the_ticks_come() -> None:
         found = read("contact_force", moments, **window).margins
         assert found == pytest.approx(np.array(means) - 1.0)
         for cuts in ([0, 1, 4, 30, 31, T], [*range(T + 1)]):
-            gauge = condition.open(condition.spec.model_validate(window), WORLD)
-            parts = [gauge(moments.part(first, last)).margins for first, last in pairwise(cuts)]
+            monitor = condition.open(condition.spec.model_validate(window), WORLD)
+            parts = [monitor(moments.part(first, last)).margins for first, last in pairwise(cuts)]
             assert np.array_equal(np.concatenate(parts), found)
-        gauge = condition.open(condition.spec.model_validate(window), WORLD)
-        thinned = gauge(replace(moments, states=moments.states.map(lambda a: a[::7])))
+        monitor = condition.open(condition.spec.model_validate(window), WORLD)
+        thinned = monitor(replace(moments, states=moments.states.map(lambda a: a[::7])))
         assert thinned.margins == pytest.approx(found[::7])
     text = read("contact_force", moments, of="cube", above=1, mean_over="50 ms").found(0).text
     assert text.startswith("the mean force over 50 ms on 'cube' is ")
@@ -207,7 +207,7 @@ def test_collision_and_its_absence_name_the_hardest_touch() -> None:
     assert (short.pairs, short.above) == ((("robot", "desk"),), 0.01)
 
 
-def carried(slide: Array, turn: Array) -> Moments:
+def carried(slide: Array, turn: Array) -> StateWindow:
     """The arm turns by a radian with the cube in its hand, in which the cube slides along x and turns about z."""
     q = np.zeros((T, 3))
     q[:, 0] = TIMES
@@ -414,7 +414,7 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
     name: str, written: Any, loc: tuple[str | int, ...], hint: str | None
 ) -> None:
     condition: Condition[Any] = CONDITIONS[name]
-    (problem,) = condition.check(condition.spec.model_validate(written), Setting(ROBOT, SCENE, WORLD.steps))
+    (problem,) = condition.check(condition.spec.model_validate(written), CheckContext(ROBOT, SCENE, WORLD.steps))
     assert problem.loc == loc
     assert hint is None or problem.hint == hint
 
@@ -433,12 +433,12 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
 @pytest.mark.parametrize("name", ["collision", "no_collision", "contact_force"])
 def test_parts_that_never_touch_are_refused(name: str, pair: list[str], told: str) -> None:
     shelf = replace(SCENE.body("desk"), name="shelf")
-    setting = Setting(ROBOT, replace(SCENE, bodies=(*SCENE.bodies, shelf)))
+    context = CheckContext(ROBOT, replace(SCENE, bodies=(*SCENE.bodies, shelf)))
     written, loc = (
         ({"pair": pair, "below": 1}, ("pair",)) if name == "contact_force" else ({"pairs": [pair]}, ("pairs", 0))
     )
     condition: Condition[Any] = CONDITIONS[name]
-    (problem,) = condition.check(condition.spec.model_validate(written), setting)
+    (problem,) = condition.check(condition.spec.model_validate(written), context)
     assert problem.loc == loc
     assert problem.message.startswith(told)
 
@@ -465,7 +465,7 @@ def test_a_range_of_forces_in_which_no_force_is_is_refused(above: float) -> None
 def test_without_a_tool_the_link_must_be_named(name: str) -> None:
     condition: Condition[Any] = CONDITIONS[name]
     written = {"slip": {"object": "cube", "within": 1}, "tool_speed": {"below": 1}}[name]
-    (problem,) = condition.check(condition.spec.model_validate(written), Setting(replace(ROBOT, tool=None), SCENE))
+    (problem,) = condition.check(condition.spec.model_validate(written), CheckContext(replace(ROBOT, tool=None), SCENE))
     assert "link" in (problem.hint or "")
 
 

@@ -20,7 +20,7 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, PidLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import Array
@@ -54,7 +54,7 @@ class HoldPosition:
     interfaces: tuple[Interface, ...] = ("effort",)
     feed_forward: FeedForward = "gravity"
 
-    def __init__(self, name: str, spec: HoldPositionSpec, fit: Fit) -> None:
+    def __init__(self, name: str, spec: HoldPositionSpec, context: BuildContext) -> None:
         self.name, self.joints, self._p, self._d = name, spec.joints, spec.p, spec.d
         self.output = ControllerOutput.of(len(spec.joints), 1)
         self._held: Array | None = None

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.control_loop import NoLoop, PidLoop
-from manipcli.control.controller import Controller, ControllerMember, Fit, JointState
+from manipcli.control.controller import BuildContext, Controller, ControllerMember, JointState
 from manipcli.control.controllers import CONTROLLERS
 from manipcli.control.factory import build_controllers, controller_findings
 from manipcli.control.manager import ControllerManager
@@ -53,7 +53,7 @@ def example(member: ControllerMember[ControllerSpec]) -> ControllersSpec:
 
 def built(member: ControllerMember[ControllerSpec]) -> Controller:
     ((name, spec),) = example(member).controllers.items()
-    return CONTROLLERS[spec.type].build(name, spec, Fit(robot(), kinematics, "ros2"))
+    return CONTROLLERS[spec.type].build(name, spec, BuildContext(robot(), kinematics, "ros2"))
 
 
 def resting(controller: Controller, offset: float = 0.2) -> JointState:

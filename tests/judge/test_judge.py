@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manipcli.conditions.condition import Setting
+from manipcli.conditions.condition import CheckContext
 from manipcli.conditions.members import CONDITIONS
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
@@ -124,7 +124,7 @@ def run(**metadata: str) -> dict[str, dict[str, str]]:
     return {"run": recording().metadata["run"] | metadata}
 
 
-SETTING = Setting(ROBOT, SCENE, ("go", "wait_1"))
+SETTING = CheckContext(ROBOT, SCENE, ("go", "wait_1"))
 
 
 def expectations(*expect: dict[str, Any]) -> tuple[ExpectationSpec, ...]:

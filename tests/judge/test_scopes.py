@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manipcli.conditions.condition import Setting
+from manipcli.conditions.condition import CheckContext
 from manipcli.conditions.members import CONDITIONS
 from manipcli.core.geometry import Array, Transform
 from manipcli.description.elements import Link
@@ -269,7 +269,7 @@ def test_what_an_expectation_speaks_of_and_is_not_there_is_told(
     expect: dict[str, Any], loc: tuple[str | int, ...], message: str, hint: str | None
 ) -> None:
     (spec,) = expectations(expect)
-    (problem,) = expectation_problems(spec, Setting(ROBOT, SCENE, ("a", "b", "lift_1")), CONDITIONS)
+    (problem,) = expectation_problems(spec, CheckContext(ROBOT, SCENE, ("a", "b", "lift_1")), CONDITIONS)
     assert problem.loc == loc
     assert message in problem.message
     assert hint is None or hint in (problem.hint or "")
@@ -277,7 +277,7 @@ def test_what_an_expectation_speaks_of_and_is_not_there_is_told(
 
 def test_where_the_steps_are_not_known_none_is_missed() -> None:
     (spec,) = expectations({**NEAR, "at": "bb"})
-    assert expectation_problems(spec, Setting(ROBOT, SCENE), CONDITIONS) == ()
+    assert expectation_problems(spec, CheckContext(ROBOT, SCENE), CONDITIONS) == ()
 
 
 def test_the_condition_itself_is_a_value_of_a_model() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.logs.judge_log import judge_log
 from manipcli.logs.log_info import log_info
 from manipcli.pipeline import run_task
@@ -24,11 +24,11 @@ class Listener:
     """Keeps what is told before the first step."""
 
     def __init__(self) -> None:
-        self.doubts: list[Finding] = []
+        self.doubts: list[Diagnostic] = []
 
     def doing(self, what: str) -> None: ...
 
-    def warned(self, findings: Sequence[Finding]) -> None:
+    def warned(self, findings: Sequence[Diagnostic]) -> None:
         self.doubts += findings
 
     def step_started(self, *_: Any) -> None: ...

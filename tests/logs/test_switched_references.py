@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.logs.moment import moment
 from manipcli.logs.replay import open_playback
+from manipcli.logs.snapshot import moment
 from manipcli.pipeline import run_task
 
 REACHER = Path(__file__).parents[2] / "examples/04_own_robot"

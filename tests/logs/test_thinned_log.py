@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from manipcli.logs.log_info import log_info
-from manipcli.logs.moment import moment
 from manipcli.logs.replay import open_playback
+from manipcli.logs.snapshot import moment
 from manipcli.pipeline import judge_log, run_task
 from manipcli.record.faults import Thinned
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.logs.moment import moment
+from manipcli.logs.snapshot import moment
 from manipcli.pipeline import run_task
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.elements import TransmissionTag
 from manipcli.description.transmissions.differential import DifferentialTransmission
 from manipcli.description.transmissions.four_bar import FourBarLinkageTransmission
@@ -50,7 +50,7 @@ def built(folder: Path, drives: str) -> RobotModel:
     return read(folder, drives)[0]
 
 
-def read(folder: Path, drives: str, more: str = "") -> tuple[RobotModel, tuple[Finding, ...]]:
+def read(folder: Path, drives: str, more: str = "") -> tuple[RobotModel, tuple[Diagnostic, ...]]:
     (folder / "r.urdf").write_text(arm(drives), encoding="utf-8")
     located = load_robot_text(f"robot: r\ndescription: r.urdf\n{more}", "robot.yaml")
     return build_robot(located.spec, file=folder / "robot.yaml", source=located.source)

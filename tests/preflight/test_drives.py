@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
@@ -20,14 +20,14 @@ tool: {link: arm}
 limits: {hinge: {acceleration: 10}}
 actuators: {motor: {effort: 1, MORE}}
 """
-Found = Callable[..., tuple[Finding, ...]]
+Found = Callable[..., tuple[Diagnostic, ...]]
 NEEDED = 9.81 * 0.25 * 0.932
 """[N m] that hold 1 kg at 0.25 m, turned by 1.2 rad."""
 
 
 @pytest.fixture
 def found(pendulum: Callable[..., Path]) -> Found:
-    def of(controller: str, *overrides: str, more: str = "rotor_inertia: 2e-5") -> tuple[Finding, ...]:
+    def of(controller: str, *overrides: str, more: str = "rotor_inertia: 2e-5") -> tuple[Diagnostic, ...]:
         folder = pendulum(ROBOT.replace("MORE", more), urdf=TRANSMISSION)
         (folder / "c.yaml").write_text(
             f"controllers:\n  c: {{type: joint_trajectory, joints: [hinge], {controller}}}\n"

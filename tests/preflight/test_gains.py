@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.model.kinematics import Kinematics
 from manipcli.preflight.check_files import check_files
 from manipcli.preflight.findings import preflight_findings
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 HOME = ROOT / "tasks" / "home.yaml"
 
 
-def findings(*overrides: str, task: Path = HOME) -> tuple[Finding, ...]:
+def findings(*overrides: str, task: Path = HOME) -> tuple[Diagnostic, ...]:
     return preflight_findings(load_task(task, overrides=overrides))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
@@ -24,7 +24,7 @@ CONTROLLER = """controllers:
   c: {type: joint_trajectory, joints: [shoulder, elbow], command_interface: effort,
       gains: {shoulder: {GAINS}, elbow: {p: 40, d: 4}}}
 """
-Found = Callable[[str], tuple[Finding, ...]]
+Found = Callable[[str], tuple[Diagnostic, ...]]
 
 
 def masses(elbow: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -35,7 +35,7 @@ def masses(elbow: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @pytest.fixture
 def found(tmp_path: Path) -> Found:
-    def of(gains: str) -> tuple[Finding, ...]:
+    def of(gains: str) -> tuple[Diagnostic, ...]:
         links = '<link name="base"/>' + LINK.format("upper", L / 2, M_1) + LINK.format("fore", C, M_2)
         hinges = HINGE.format("shoulder", "base", "upper", 0) + HINGE.format("elbow", "upper", "fore", L)
         (tmp_path / "two.urdf").write_text(f'<robot name="two">{links}{hinges}</robot>')

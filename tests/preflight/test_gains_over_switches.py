@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.findings import preflight_findings
 from manipcli.task.load_task import load_task
 
@@ -22,7 +22,7 @@ groups: {all: {joints: [hinge, other]}}
 poses: {zero: {all: [0, 0]}, up: {all: [1.2, 0]}}
 limits: {hinge: {acceleration: 10}, other: {acceleration: 10}}
 """
-Found = Callable[..., tuple[Finding, ...]]
+Found = Callable[..., tuple[Diagnostic, ...]]
 BOUND = 2.0 * (0.02 + 1.0 * 0.25**2) / 1e-3
 """[N m s/rad] 2 I / h."""
 PLACED = "  a: {type: joint_trajectory, joints: [hinge], command_interface: position}\n"
@@ -32,7 +32,7 @@ OTHER = "  c: {type: joint_trajectory, joints: [other], command_interface: effor
 
 @pytest.fixture
 def found(tmp_path: Path) -> Found:
-    def of(*controllers: str, steps: str) -> tuple[Finding, ...]:
+    def of(*controllers: str, steps: str) -> tuple[Diagnostic, ...]:
         (tmp_path / "two.urdf").write_text(URDF)
         (tmp_path / "robot.yaml").write_text(ROBOT)
         (tmp_path / "c.yaml").write_text("controllers:\n" + "".join(controllers))

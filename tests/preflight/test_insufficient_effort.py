@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.pipeline import run_task
 from manipcli.preflight.findings import preflight_findings
 from manipcli.record.read.reading import read_recording
@@ -34,7 +34,7 @@ def written(pendulum: Written) -> Written:
     return of
 
 
-def told(task: Path) -> list[Finding]:
+def told(task: Path) -> list[Diagnostic]:
     return list(preflight_findings(load_task(task)))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.check_files import check_files
 
 TRANSMISSION = """<transmission name="t"><type>transmission_interface/SimpleTransmission</type>
@@ -20,7 +20,7 @@ tool: {link: arm}
 limits: {hinge: {acceleration: 30, k_velocity: THROTTLE}}
 actuators: {motor: {effort: EFFORT, LATENCY}}
 """
-Found = Callable[..., tuple[Finding, ...]]
+Found = Callable[..., tuple[Diagnostic, ...]]
 COMPUTED = "type: computed_torque"
 SOFT = "type: cartesian_impedance, stiffness: {translation: 100, rotation: 10}"
 WEIGHT = 9.81 * 0.25 * math.sin(1.2)
@@ -36,7 +36,7 @@ def found(pendulum: Callable[..., Path]) -> Found:
         latency: int = 0,
         k_velocity: float = 0.0,
         step: str = "move: {to: up}",
-    ) -> tuple[Finding, ...]:
+    ) -> tuple[Diagnostic, ...]:
         robot = ROBOT.replace("EFFORT", f"{effort} N m").replace("LATENCY", f"latency: {latency}")
         robot = robot.replace("THROTTLE", str(k_velocity))
         folder = pendulum(robot, urdf=TRANSMISSION)

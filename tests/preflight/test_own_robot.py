@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.preflight.check_files import check_files
 from manipcli.task.load_task import load_task
 
@@ -79,7 +79,7 @@ def write(folder: Path, steps: str, *, fore: str = INERTIAL, can: str = "can") -
     return task
 
 
-def errors(task: Path) -> list[tuple[str, Finding]]:
+def errors(task: Path) -> list[tuple[str, Diagnostic]]:
     """Where each error that `check` tells is, and the error."""
     found = [finding for finding in check_files([task]) if finding.severity == "error"]
     return [(str(finding.place).removeprefix(f"{task.parent}/"), finding) for finding in found]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from manipcli.core.geometry import Transform, frozen
 from manipcli.description.elements import Inertial
-from manipcli.model.configuration import posture, with_mimics, zero_posture
+from manipcli.model.configuration import configuration, with_mimics, zero_configuration
 from manipcli.model.kinematics import Kinematics
 from manipcli.replay.drawing import COLLISION, PLAIN, draw, inertia_box, shape_surfaces
 from manipcli.replay.placing import Placing
@@ -107,16 +107,16 @@ def test_a_mimic_joint_follows_with_its_multiplier_and_offset(two: Sight) -> Non
         "mimic": pytest.approx(-2 * 0.05 + 0.5),
     }
     # Zero lies outside of the limits: the nearest position inside, and the follower with it.
-    assert zero_posture(robot) == pytest.approx([0.01, 0.48])
+    assert zero_configuration(robot) == pytest.approx([0.01, 0.48])
     placed = Placing(robot).start(with_mimics(robot, [0.1, 0.0]))
     assert placed.position[draw(robot).frames.index("robot/follower")] == pytest.approx([0.3, 0.0, 0.0])
 
 
 def test_a_named_pose_is_taken_and_home_is_the_default(pour: Sight) -> None:
     home = pour.robot.pose("home")
-    q = posture(pour.robot)
+    q = configuration(pour.robot)
     assert q[pour.robot.indices(home.joints)] == pytest.approx(home.positions)
-    assert q == pytest.approx(posture(pour.robot, "home"))
+    assert q == pytest.approx(configuration(pour.robot, "home"))
 
 
 def _box_inertia(mass: float, size: tuple[float, float, float]) -> np.ndarray:

@@ -16,10 +16,10 @@ from rosbags.typesys import Stores, get_typestore
 from manipcli.core.errors import InvalidInput
 from manipcli.core.geometry import matrix_from_quat
 from manipcli.judge.verdict import StepOutcome, Verdict
-from manipcli.logs.chart import open_chart
 from manipcli.logs.mesh_search import MeshSearch
-from manipcli.logs.moment import moment
+from manipcli.logs.plot import open_chart
 from manipcli.logs.replay import open_playback
+from manipcli.logs.snapshot import moment
 from manipcli.model.state import Contact
 from manipcli.pipeline import run_task
 from manipcli.record.read.reading import read_recording

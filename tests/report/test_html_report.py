@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import frozen
-from manipcli.judge.cuts import Cuts
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.measures.facts import JointFacts, Peak, RunFacts, StepFacts, Use
-from manipcli.judge.measures.holds import Hold, HoldFacts, Slip, Spread
+from manipcli.judge.measures.grasp_intervals import GraspFacts, Hold, Slip, Spread
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
 from manipcli.pipeline import load_task
 from manipcli.report.html import render_page
@@ -73,7 +73,7 @@ def _facts(name: str = "joint_1") -> RunFacts:
         name, "rad", Peak(0.01, 1.2), 0.004, use, None, Use(1.1, 44.0, 40.0, 1.0), 7.66, 1.0, Peak(15, 0.9), 7
     )
     step = StepFacts("a", 0.0, frozen([7.66]), frozen([1.0]), frozen([15.0]), Peak(15.0, 0.9))
-    hold = HoldFacts(
+    hold = GraspFacts(
         Hold("cup", 1.0, 1.1, 2.0, "lost"), Spread(4.0, 5.5, 6.0), Spread(1, 1.7, 2), ("thumb", name),
         Slip(0.0042, 1.5, 0.001), Slip(0.1, 2.0, 0.1),
     )  # fmt: skip
@@ -156,7 +156,7 @@ def test_many_causes_are_folded_where_the_page_tells_them_again() -> None:
 
 
 def test_what_was_doubted_before_the_run_is_told() -> None:
-    doubt = Finding("CTRL150", "the gains of 'j' are weak", Place("a/c.yaml", 3, 5), "raise p", "warning")
+    doubt = Diagnostic("CTRL150", "the gains of 'j' are weak", Place("a/c.yaml", 3, 5), "raise p", "warning")
     told = _Page(render_page(replace(_page(), warnings=(doubt,))))
     assert "the gains of 'j' are weak a/c.yaml:3:5" in told.words
     assert "hint: raise p" in told.words
@@ -166,7 +166,7 @@ def test_what_was_doubted_before_the_run_is_told() -> None:
 
 def test_what_was_cut_at_its_limits_stands_with_the_causes() -> None:
     page = replace(_page(), causes=(Cause("expectation 'near' fails by 2 mm", "", 1.5),))
-    cut = replace(page, verdict=replace(page.verdict, cuts=Cuts({"b": 7}, {}, 150)))
+    cut = replace(page, verdict=replace(page.verdict, cuts=Saturations({"b": 7}, {}, 150)))
     told = "In this run: cut at its limits: joint 'b' in 7 of 150 ticks."
     words = _Page(render_page(cut)).words
     assert words.index("fails by 2 mm") < words.index(told) < words.index("Tracking and limits")
@@ -384,7 +384,7 @@ def test_attempts_and_what_may_fail_are_told() -> None:
 
 
 def test_an_error_of_a_run_is_told_like_any_cause() -> None:
-    finding = Finding("RUN101", "the run was interrupted")
+    finding = Diagnostic("RUN101", "the run was interrupted")
     verdict = replace(_page().verdict, verdict="error", errors=(finding,))
     page = replace(_page(), verdict=verdict, causes=(Cause(finding.message, "", 2.0),))
     words = _Page(render_page(page)).words

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from manipcli.cli.app import main
-from manipcli.core.errors import Finding, Place
-from manipcli.judge.cuts import Cuts
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.drawn import Drawn
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import Attempt, ExpectationOutcome, StepOutcome, Verdict
-from manipcli.logs import chart
+from manipcli.logs import plot as chart
 from manipcli.report.json import render_findings, render_run
 from manipcli.report.run_report import RunReport, Timing
 from manipcli.report.suite import Case, CaseReport, Suite, Trouble
@@ -24,10 +24,10 @@ from manipcli.report.suite_json import render_suite
 DOCS = Path(__file__).parents[2] / "docs" / "json.md"
 STEP = StepOutcome("pick_1", "pick", "done", 0.0, 6.1, 5.9, attempts=(Attempt("done", 0.0, 6.1),))
 NEAR = ExpectationOutcome("near", "failed", -0.01, "m", 20.1, relative=-0.5)
-WRONG = Finding("TASK201", "unknown key", Place("a.yaml", 3, 5))
+WRONG = Diagnostic("TASK201", "unknown key", Place("a.yaml", 3, 5))
 VERDICT = Verdict(
     "pour", "failed", 7, "pybullet", 0.3, (STEP,), (NEAR,), errors=(WRONG,),
-    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), cuts=Cuts({"joint_1": 3}, {"motor_1": 2}),
+    drawn=Drawn(3, (("scene.cup.mass", 0.25),)), cuts=Saturations({"joint_1": 3}, {"motor_1": 2}),
 )  # fmt: skip
 RUN = RunReport(VERDICT, Timing(0.1, 0.2, 2.5, 0.2), "runs/pour.mcap")
 CASE = CaseReport(

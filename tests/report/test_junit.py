@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, fromstring
 
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.junit import render_junit
 from manipcli.report.run_page import Written
@@ -121,7 +121,7 @@ def test_a_step_that_may_fail_does_not_fail_the_suite() -> None:
 
 
 def test_an_interruption_is_an_error() -> None:
-    finding = Finding("RUN101", "the run was interrupted", hint="run it again")
+    finding = Diagnostic("RUN101", "the run was interrupted", hint="run it again")
     suite = _read(replace(FAILED, verdict="error", errors=(finding,), text="the run was interrupted"))
     error = _case(suite, "run").find("error")
     assert error is not None and error.get("type") == "RUN101" and "hint: run it again" in str(error.text)

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import fromstring
 import numpy as np
 import pytest
 
-from manipcli.conditions.robustness import EDGE, Measured, Reading, never, opposite, reading
+from manipcli.conditions.robustness import EDGE, Measured, Robustness, never, opposite, robustness
 from manipcli.judge.expectation import outcome
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.html_parts import signed
@@ -22,8 +22,8 @@ from manipcli.run.run_log import verdict_metadata
 NEAR_TO_0 = (0.0, -0.0, 5e-324, -5e-324, 4e-10, -4e-10, EDGE, -EDGE, 1.4e-9, -1.4e-9, -0.01)
 
 
-def of(margin: float) -> Reading:
-    return reading(np.full(1, margin), np.zeros(1), unit="N", scale=1.0, say=lambda k: "free")
+def of(margin: float) -> Robustness:
+    return robustness(np.full(1, margin), np.zeros(1), unit="N", scale=1.0, say=lambda k: "free")
 
 
 def told(one: ExpectationOutcome) -> dict[str, float]:

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.json import render_errors, render_run, render_verdict
 from manipcli.report.run_report import RunReport, Timing
@@ -41,7 +41,7 @@ def test_the_documented_names_are_there() -> None:
 
 
 def test_run_judge_and_error_have_the_same_keys() -> None:
-    error = Finding("TASK1", "bad \x1b", Place("a.yaml", 3, 5), hint="h")
+    error = Diagnostic("TASK1", "bad \x1b", Place("a.yaml", 3, 5), hint="h")
     objects = [
         json.loads(text) for text in (render_run(REPORT), render_verdict(VERDICT, "x.mcap"), render_errors([error]))
     ]
@@ -67,12 +67,12 @@ def test_what_is_no_number_is_null(margin: float) -> None:
 
 
 def test_of_a_file_as_a_whole_line_and_column_are_unknown() -> None:
-    finding = Finding("USE101", "there is no such file", Place("a.yaml", 0, 0))
+    finding = Diagnostic("USE101", "there is no such file", Place("a.yaml", 0, 0))
     (error,) = json.loads(render_errors([finding]))["errors"]
     assert (error["file"], error["line"], error["column"]) == ("a.yaml", None, None)
 
 
 def test_a_warning_among_the_errors_says_so() -> None:
-    findings = [Finding("A", "x"), Finding("B", "y", severity="warning"), Finding("C", "z", severity="note")]
+    findings = [Diagnostic("A", "x"), Diagnostic("B", "y", severity="warning"), Diagnostic("C", "z", severity="note")]
     told = json.loads(render_errors(findings))["errors"]
     assert [(each["code"], each["severity"]) for each in told] == [("A", "error"), ("B", "warning"), ("C", "note")]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from manipcli.conditions.robustness import EDGE
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.units import readable
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report.quantity import quantity
@@ -97,7 +97,7 @@ def test_a_run_says_how_fast_it_was() -> None:
 
 
 def test_findings_are_counted() -> None:
-    findings = [Finding("A1", "x"), Finding("A2", "y", severity="warning", hint="z")]
+    findings = [Diagnostic("A1", "x"), Diagnostic("A2", "y", severity="warning", hint="z")]
     assert render_findings(findings, ["a", "b"]).splitlines() == [
         "error[A1]: x",
         "warning[A2]: y",
@@ -115,7 +115,7 @@ def test_columns_line_up_also_for_wide_characters_and_nothing_is_cut() -> None:
 
 def test_no_name_forges_a_line_and_none_fills_the_screen() -> None:
     forged = "a\nx.urdf:1:1: error[URDF999]: forged"
-    finding = Finding("URDF331", f"link '{forged}' and '\u200b'", Place(f"{'d' * 5000}\n.urdf", 1, 2), hint=forged)
+    finding = Diagnostic("URDF331", f"link '{forged}' and '\u200b'", Place(f"{'d' * 5000}\n.urdf", 1, 2), hint=forged)
     lines = describe(finding).splitlines()
     assert len(lines) == 2 and lines[1].startswith("  hint: a\\nx.urdf")
     assert ":1:2: error[URDF331]: link 'a\\nx.urdf" in lines[0] and "'\\u200b'" in lines[0]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.judge.drawn import Drawn
 from manipcli.judge.verdict import ExpectationOutcome, StepOutcome, Verdict
 from manipcli.report import suite_json
@@ -129,7 +129,7 @@ def test_annotations_are_what_github_reads(tmp_path: Path) -> None:
 
 
 def test_what_a_word_of_the_command_line_does_is_told_with_the_task() -> None:
-    wrong = [Finding("TASK212", "there is no 'nope'", Place("--set scene.nope.x=1", 0, 0))]
+    wrong = [Diagnostic("TASK212", "there is no 'nope'", Place("--set scene.nope.x=1", 0, 0))]
     odd = report("invalid", troubles=troubles_of(wrong))
     assert render_annotations([odd]) == (
         "::error file=tasks/pour.yaml,line=1,col=1,title=pour invalid::"
@@ -149,7 +149,7 @@ def test_what_was_not_run_is_named() -> None:
 
 
 def test_a_failure_tells_what_was_drawn_and_what_was_doubted_before_it_began() -> None:
-    weak = Finding("CTRL153", "joint_4: p 5", Place("weak.yaml", 12, 16), hint="d 3 gives 0.7", severity="warning")
+    weak = Diagnostic("CTRL153", "joint_4: p 5", Place("weak.yaml", 12, 16), hint="d 3 gives 0.7", severity="warning")
     assert FAILED.run is not None
     drawn = replace(FAILED.run, verdict=replace(FAILED.run.verdict, drawn=Drawn(3, (("scene.cup.mass", 0.25),))))
     odd = replace(FAILED, run=drawn, warnings=(weak,))
@@ -177,8 +177,8 @@ def test_a_page_tells_all_that_was_drawn_and_a_line_the_first_of_it() -> None:
 
 
 def test_what_is_wrong_with_a_file_is_told_once_for_all_samples() -> None:
-    wrong = (Finding("TASK201", "unknown key", Place("tasks/pour.yaml", 3, 4)),)
-    own = (Finding("SCN101", "too heavy (sample 2)", Place("tasks/pour.yaml", 3, 4)),)
+    wrong = (Diagnostic("TASK201", "unknown key", Place("tasks/pour.yaml", 3, 4)),)
+    own = (Diagnostic("SCN101", "too heavy (sample 2)", Place("tasks/pour.yaml", 3, 4)),)
     invalid = tuple(
         report("invalid", sample=k, findings=why, troubles=troubles_of(why))
         for k, why in enumerate([wrong, wrong, own])
@@ -225,20 +225,22 @@ def test_the_page_leads_to_a_file_whose_name_is_no_text(tmp_path: Path) -> None:
 
 def test_findings_become_troubles_with_places_and_hints() -> None:
     place = Place("a.yaml", 2, 3)
-    assert troubles_of([Finding("TASK203", "no joint 'x'", place, hint="did you mean 'y'?")]) == (
+    assert troubles_of([Diagnostic("TASK203", "no joint 'x'", place, hint="did you mean 'y'?")]) == (
         Trouble("error[TASK203]: no joint 'x' (hint: did you mean 'y'?)", place),
     )
 
 
 def test_what_ends_nothing_is_no_trouble() -> None:
-    note = Finding("URDF031", "link 'tip' has mass 0", Place("arm.urdf", 2, 3), severity="note")
-    wrong = Finding("ROBOT306", "no link 'x'", Place("robot.yaml", 6, 3))
+    note = Diagnostic("URDF031", "link 'tip' has mass 0", Place("arm.urdf", 2, 3), severity="note")
+    wrong = Diagnostic("ROBOT306", "no link 'x'", Place("robot.yaml", 6, 3))
     assert [one.message for one in troubles_of([note, wrong])] == ["error[ROBOT306]: no link 'x'"]
     assert doubts_of([note, wrong]) == (note,)
 
 
 def test_the_page_tells_all_that_is_wrong_with_what_has_no_page_of_its_own() -> None:
-    wrong = [Finding("TASK201", text, Place("a.yaml", k, 1)) for k, text in enumerate(("unknown key", "no number"), 1)]
+    wrong = [
+        Diagnostic("TASK201", text, Place("a.yaml", k, 1)) for k, text in enumerate(("unknown key", "no number"), 1)
+    ]
     page = render_page(Suite((report("invalid", troubles=troubles_of(wrong)),), 1, 1, 1.0), Path())
     assert page.index("unknown key") < page.index("no number")
 

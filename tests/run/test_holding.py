@@ -7,19 +7,19 @@ from pathlib import Path
 import pytest
 
 from manipcli.model.state import Contact
-from manipcli.run.holding import Holding
+from manipcli.run.grasp_margin import GraspMargin
 from manipcli.task.load_task import load_task
 
 POUR = Path(__file__).resolve().parents[2] / "tasks" / "pour.yaml"
 
 
 @pytest.fixture(scope="module")
-def holding() -> Holding:
+def holding() -> GraspMargin:
     task = load_task(POUR)
-    return Holding(task.robot, task.scene)
+    return GraspMargin(task.robot, task.scene)
 
 
-def told(holding: Holding, *forces: float) -> str:
+def told(holding: GraspMargin, *forces: float) -> str:
     """Of the cup of 150 g (1.47 N) with friction 1, pressed by one link after the other."""
     links = ("palm", "finger_1_distal_link", "finger_3_proximal_link")
     contacts = [Contact("cup", f"robot/{link}", force, 0.0) for link, force in zip(links, forces, strict=False)]
@@ -27,12 +27,12 @@ def told(holding: Holding, *forces: float) -> str:
     return holding.told("cup")
 
 
-def test_force_that_hardly_carries_is_compared_to_the_weight(holding: Holding) -> None:
+def test_force_that_hardly_carries_is_compared_to_the_weight(holding: GraspMargin) -> None:
     assert told(holding, 1.0, 0.2).endswith("carries 1.2 N; it alone weighs 1.47 N")
     assert told(holding, 1.5, 1.5).endswith("weighs 1.47 N, which leaves 10 m/s2 to accelerate it with")
 
 
-def test_force_that_is_ample_is_not_the_cause_and_the_links_are_named(holding: Holding) -> None:
+def test_force_that_is_ample_is_not_the_cause_and_the_links_are_named(holding: GraspMargin) -> None:
     """More than three times the weight, 4.41 N."""
     assert "accelerate" in told(holding, 2.2, 2.2)
     assert told(holding, 8.0, 9.0).endswith(

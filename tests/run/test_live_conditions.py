@@ -12,8 +12,8 @@ from manipcli import pipeline
 from manipcli.conditions.condition import World
 from manipcli.conditions.formula import leaves
 from manipcli.conditions.members import CONDITIONS
-from manipcli.conditions.robustness import Reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.robustness import Robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.judge import expectation
 from manipcli.logs.judge_log import judge_recording
 from manipcli.record.read.reading import open_recording
@@ -83,8 +83,8 @@ class Answers:
     applies: list[bool] = field(default_factory=list)
     texts: list[str] = field(default_factory=list)
 
-    def told(self, moments: Moments, answer: Reading) -> None:
-        for k, time in enumerate(moments.times):
+    def told(self, window: StateWindow, answer: Robustness) -> None:
+        for k, time in enumerate(window.times):
             applies = bool(answer.applies[k])
             self.times.append(float(time))
             self.applies.append(applies)
@@ -92,7 +92,7 @@ class Answers:
             self.texts.append(answer.found(k).text if applies and k % 7 == 0 else "")
 
 
-class Watching(Live):
+class Monitors(Live):
     """Opens a probe for everything that the task expects of the whole run, and one with the step."""
 
     opened: list[Answers]
@@ -133,19 +133,19 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Answers]:
     EXPECT[:] = [one.condition for one in expect if not one.steps]
     OF_STEP[:] = [one.condition for one in expect if one.steps]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(execute, "Live", Watching)
+        patch.setattr(execute, "Live", Monitors)
         report = pipeline.run_task(file, log=folder / "small.mcap", sample=0)
     assert [step.outcome for step in report.verdict.steps] == ["done"] * 3
     found: list[Answers] = []
     plain = expectation.opened
 
     def kept(spec: ConditionSpec, world: World, seam: expectation.Seams) -> object:
-        gauge, answers = plain(spec, world, seam), Answers()
+        monitor, answers = plain(spec, world, seam), Answers()
         found.append(answers)
 
-        def look(moments: Moments) -> Reading:
-            answer = gauge(moments)
-            answers.told(moments, answer)
+        def look(window: StateWindow) -> Robustness:
+            answer = monitor(window)
+            answers.told(window, answer)
             return answer
 
         return look
@@ -163,7 +163,7 @@ def test_every_condition_is_among_them(judged: list[Answers]) -> None:
 
 
 def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> None:
-    for spec, live, later in zip(EXPECT, Watching.opened, judged[: len(EXPECT)], strict=True):
+    for spec, live, later in zip(EXPECT, Monitors.opened, judged[: len(EXPECT)], strict=True):
         count = len(live.times)  # the last block may not have been full
         assert 0 <= len(later.times) - count < 10, spec.name
         assert count > 3000
@@ -176,10 +176,10 @@ def test_live_and_judged_answers_agree_on_every_tick(judged: list[Answers]) -> N
 
 
 def test_what_counts_from_the_start_of_a_step_does_so_live_too(judged: list[Answers]) -> None:
-    for live, later in zip(Watching.of_step, judged[len(EXPECT) :], strict=True):
+    for live, later in zip(Monitors.of_step, judged[len(EXPECT) :], strict=True):
         assert live.times == later.times
         np.testing.assert_allclose(live.margins, later.margins, rtol=1e-12, atol=1e-12)
-    moved, taken = Watching.of_step
+    moved, taken = Monitors.of_step
     assert moved.margins[0] == -0.01
     assert moved.margins[-1] >= 0.05
     assert taken.margins[0] == 9.0 - 0.001

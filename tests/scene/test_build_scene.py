@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.geometry import Transform
 from manipcli.description.packages import Packages
 from manipcli.scene.build_scene import build_scene
@@ -39,13 +39,13 @@ def built(scene: dict[str, Any], **more: Any) -> Scene:
     return build_scene(task(scene, **more))
 
 
-def findings(scene: dict[str, Any], **more: Any) -> tuple[Finding, ...]:
+def findings(scene: dict[str, Any], **more: Any) -> tuple[Diagnostic, ...]:
     with pytest.raises(InvalidInput) as caught:
         built(scene, **more)
     return caught.value.findings
 
 
-def only(scene: dict[str, Any], **more: Any) -> Finding:
+def only(scene: dict[str, Any], **more: Any) -> Diagnostic:
     (found,) = findings(scene, **more)
     return found
 

@@ -70,11 +70,11 @@ def test_a_command_that_is_no_finite_number_never_reaches_the_engine(
 ) -> None:
     written = []
 
-    class Watching(scripted):  # type: ignore[misc]
+    class Monitors(scripted):  # type: ignore[misc]
         def write(self, command: Any) -> None:
             written.append((command.modes, command.effort.copy()))
 
-    session = session_of(Watching())
+    session = session_of(Monitors())
     breaks(session, "arm", at=50, value=value)
     end = Executor(session).run(move(0.05), until=None, deadline=None)
     assert end.outcome == "failed"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.spec.controllers import GainsSpec
 from manipcli.spec.load import load_task_text
 from manipcli.task.vocabulary import task_spec
@@ -26,7 +26,7 @@ steps:
 """
 
 
-def refused(written: str, instead: str) -> Finding:
+def refused(written: str, instead: str) -> Diagnostic:
     with pytest.raises(InvalidInput) as told:
         load_task_text(TASK.replace(written, instead), "t.yaml", model=task_spec())
     (finding,) = told.value.findings

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from manipcli.conditions.members import CONDITIONS
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.plan.steps import STEPS
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_controllers_text, load_robot_text, load_task_text
@@ -17,7 +17,7 @@ from manipcli.task.vocabulary import controllers_spec, task_spec
 ROBOT = "robot: r\ndescription: r.urdf\n"
 
 
-def refused(text: str, *overrides: str) -> Finding:
+def refused(text: str, *overrides: str) -> Diagnostic:
     with pytest.raises(InvalidInput) as error:
         load_robot_text(text, "r.yaml", overrides=overrides)
     (finding,) = error.value.findings
@@ -98,7 +98,7 @@ TASK = "task: t\nrobot: r.yaml\ncontrollers: c.yaml\n"
 TASK += "scene: {cup: {cup: {radius: 4 cm, height: 8 cm}, mass: 1, pose: {}}}\n"
 
 
-def told(block: str) -> Finding:
+def told(block: str) -> Diagnostic:
     with pytest.raises(InvalidInput) as error:
         load_task_text(TASK + block, "t.yaml", model=task_spec())
     (finding,) = error.value.findings

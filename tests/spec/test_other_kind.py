@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.task.load_task import load_task
 
 ROOT = Path(__file__).parents[2]
@@ -14,7 +14,7 @@ TASK = ROOT / "tasks" / "pick_place.yaml"
 URDF = ROOT / "examples" / "04_own_robot" / "reacher.urdf"
 
 
-def refused(path: Path) -> tuple[Finding, ...]:
+def refused(path: Path) -> tuple[Diagnostic, ...]:
     with pytest.raises(InvalidInput) as caught:
         load_task(path)
     return caught.value.findings

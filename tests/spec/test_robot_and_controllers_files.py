@@ -7,7 +7,7 @@ import json
 import pytest
 
 from manipcli.control.controllers.joint_trajectory import JointTrajectorySpec
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.spec.load import load_controllers_text, load_robot_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.schema import controllers_schema, robot_schema
@@ -46,7 +46,7 @@ hand: {type: gripper, joints: [f], speed: 60 deg/s}
 """
 
 
-def lines(findings: tuple[Finding, ...]) -> list[str]:
+def lines(findings: tuple[Diagnostic, ...]) -> list[str]:
     return [str(finding) for finding in findings]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.spec.load import kind_of, load_controllers_text
 from manipcli.spec.resolved import resolved
 from manipcli.spec.ros.table import Block, Table
@@ -15,7 +15,7 @@ from manipcli.spec.ros.tables import TABLES, UNSERVED_TYPES
 from manipcli.task.vocabulary import controllers_spec
 
 
-def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
+def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Diagnostic, ...]]:
     """What was said of each controller, and what was told."""
     located = load_controllers_text(text, "c.yaml", model=controllers_spec())
     spec = located.spec
@@ -29,7 +29,7 @@ def refused(text: str) -> list[str]:
     return [f"{finding} | {finding.hint}" for finding in caught.value.findings if finding.severity == "error"]
 
 
-def told(findings: tuple[Finding, ...]) -> list[str]:
+def told(findings: tuple[Diagnostic, ...]) -> list[str]:
     return [str(finding) for finding in findings]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.spec.load import kind_of, load_controllers_text
 from manipcli.task.vocabulary import controllers_spec
 
@@ -16,7 +16,7 @@ STATES = "type: joint_state_broadcaster/JointStateBroadcaster"
 POSITION = {"type": "joint_trajectory", "command_interfaces": ("position",)}
 
 
-def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Finding, ...]]:
+def loaded(text: str) -> tuple[dict[str, dict[str, Any]], tuple[Diagnostic, ...]]:
     located = load_controllers_text(text, "c.yaml", model=controllers_spec())
     return {name: one.model_dump(exclude_unset=True) for name, one in located.spec.controllers.items()}, (
         located.findings

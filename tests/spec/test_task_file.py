@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.registry import Seam
 from manipcli.spec.base import Model
 from manipcli.spec.load import load_task, load_task_text
@@ -106,13 +106,13 @@ def load(text: str, *overrides: str, seed: int | None = None) -> Located[TaskSpe
     return load_task_text(text, "t.yaml", model=MODEL, overrides=overrides, seed=seed)
 
 
-def findings(text: str, *overrides: str) -> tuple[Finding, ...]:
+def findings(text: str, *overrides: str) -> tuple[Diagnostic, ...]:
     with pytest.raises(InvalidInput) as caught:
         load(text, *overrides)
     return caught.value.findings
 
 
-def only(text: str, *overrides: str) -> Finding:
+def only(text: str, *overrides: str) -> Diagnostic:
     (finding,) = findings(text, *overrides)
     return finding
 
@@ -792,7 +792,7 @@ def test_any_override_applies_or_is_refused(path: str, value: str) -> None:
 def test_a_file_that_is_not_there_names_its_neighbour(tmp_path: Path) -> None:
     (tmp_path / "pour.yaml").write_text(TASK)
 
-    def refused(path: Path) -> Finding:
+    def refused(path: Path) -> Diagnostic:
         with pytest.raises(InvalidInput) as caught:
             load_task(path, model=MODEL)
         (finding,) = caught.value.findings

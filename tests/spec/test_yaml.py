@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.spec.source import yaml as ours
 from manipcli.spec.source.tree import MappingNode, key_place_at, node_at, plain
 from manipcli.spec.source.yaml import parse
@@ -20,13 +20,13 @@ def read(text: str | bytes) -> object:
     return None if root is None else plain(root)
 
 
-def refused(text: str | bytes) -> tuple[Finding, ...]:
+def refused(text: str | bytes) -> tuple[Diagnostic, ...]:
     with pytest.raises(InvalidInput) as caught:
         parse(text, "f")
     return caught.value.findings
 
 
-def spot(finding: Finding) -> tuple[str, int, int]:
+def spot(finding: Diagnostic) -> tuple[str, int, int]:
     assert finding.place is not None
     return finding.code, finding.place.line, finding.place.column
 
@@ -205,7 +205,7 @@ def test_a_tree_can_be_copied_with_a_change() -> None:
 
 
 def test_a_reader_that_goes_on_gets_the_first_of_two_keys_and_nothing_for_no_number() -> None:
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     root = parse("a: 1\na: 2\nb: .nan\nc: [-.inf, 1e999, !!str x]\n? [k]\n: 3\n", "f", told=told)
     assert root is not None
     assert plain(root) == {"a": 1, "b": None, "c": [None, None, "x"]}
@@ -227,7 +227,7 @@ def test_bytes_that_are_no_text_are_told_from_those_of_another_encoding(data: by
 
 @pytest.mark.parametrize("text", ["a: .nan\nb: [\n", "a: .nan\nb: *c\n", "a: .nan\n---\nb: 1\n"])
 def test_a_reader_that_goes_on_stops_where_the_text_is_no_yaml(text: str) -> None:
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     with pytest.raises(InvalidInput) as caught:
         parse(text, "f", told=told)
     first, second = caught.value.findings

@@ -9,7 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import Format, LogFile, seconds
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
 
 
@@ -30,8 +30,8 @@ def at(
 
     Any ROS 2 log will do, as far as it goes.
     """
-    from manipcli.logs.moment import moment
-    from manipcli.report.moment import render_json, render_text
+    from manipcli.logs.snapshot import moment
+    from manipcli.report.snapshot import render_json, render_text
 
     found = moment(log, _when(log, time))
     console.result(render_json(found) if format_ == "json" else render_text(found))
@@ -47,7 +47,7 @@ def _when(log: Path, word: str) -> float:
     try:
         return seconds(word)
     except InvalidInput:
-        from manipcli.logs.moment import step_ends
+        from manipcli.logs.snapshot import step_ends
 
         ends = step_ends(log)
         if word in ends:
@@ -56,4 +56,4 @@ def _when(log: Path, word: str) -> float:
         if hint is None:
             raise
         message = f"'{shorten(word)}' is neither a time nor a step of this log"
-        raise InvalidInput([Finding("USE050", message, hint=hint)]) from None
+        raise InvalidInput([Diagnostic("USE050", message, hint=hint)]) from None

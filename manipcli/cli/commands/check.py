@@ -9,7 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Sample, Seed
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 UNREADABLE: Final = {"USE101", "USE102", "USE103"}
 """Findings that say that a file is not there, or cannot be read."""
@@ -50,7 +50,7 @@ def check(
     kinds = () if failed else [pipeline.kind_of(file) for file in files]
     if (overrides or seed is not None or sample is not None) and not failed and "task" not in kinds:
         raise InvalidInput(
-            [Finding("USE052", "--set, --seed and --sample are of a task; there is none among the files")]
+            [Diagnostic("USE052", "--set, --seed and --sample are of a task; there is none among the files")]
         )
     names = [str(file) for file in files]
     render = json.render_findings if format_ == "json" else text.render_findings

@@ -11,7 +11,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, PackagePath, XacroArguments, xacro_arguments
 from manipcli.cli.outputs import check_outputs, check_picture
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.description.lint.inspection import Inspection
@@ -69,11 +69,11 @@ def check_urdf(
         console.result(description.render_explanation(describe.explained(explain)))
         return ExitCode.PASSED
     if file is None:
-        raise InvalidInput([Finding("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
+        raise InvalidInput([Diagnostic("USE043", "no file is given", hint="`manipcli check-urdf FILE`")])
     if in_place and not fix:
-        raise InvalidInput([Finding("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
+        raise InvalidInput([Diagnostic("USE044", "--in-place says where --fix writes", hint="give --fix, too")])
     if force and not fix:
-        raise InvalidInput([Finding("USE044", "--force lets --fix replace a file", hint="give --fix, too")])
+        raise InvalidInput([Diagnostic("USE044", "--force lets --fix replace a file", hint="give --fix, too")])
     check_picture(picture)
     path = describe.located(file, package_path=tuple(package_path or ()))
     check_outputs(("--picture", picture), reads=(path,))
@@ -122,7 +122,7 @@ def _mended(
 
 def _rendered(
     inspection: Inspection,
-    told: Sequence[Finding],
+    told: Sequence[Diagnostic],
     codes: Collection[str],
     format_: str,
     *,

@@ -11,7 +11,7 @@ from typing import Annotated, Final
 import typer
 
 from manipcli.cli import console
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import listed
 
 TEMPLATES: Final = Path(__file__).parents[1] / "project"
@@ -48,11 +48,11 @@ def init(
         are = "is" if len(there) == 1 else "are"
         message = f"{listed(there)} {are} there already; nothing was written"
         raise InvalidInput(
-            [Finding("USE088", message, hint="give another folder, or --force to replace what is there")]
+            [Diagnostic("USE088", message, hint="give another folder, or --force to replace what is there")]
         )
     wrong = sorted({told for path in files if path not in kept for told in _in_the_way(path)})
     if wrong:
-        raise InvalidInput([Finding("USE088", f"{listed(wrong)}; nothing was written", hint="give another folder")])
+        raise InvalidInput([Diagnostic("USE088", f"{listed(wrong)}; nothing was written", hint="give another folder")])
     from manipcli.core.whole_file import write_whole
 
     for path, data in files.items():

@@ -9,7 +9,7 @@ import typer
 
 from manipcli.cli import console
 from manipcli.cli.options import Format, OutputFormat
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 Kind = Literal["robots", "tasks", "controllers", "steps", "expectations", "conditions", "shapes", "engines", "checks"]
 FILES = {"robots": "robot", "tasks": "task", "controllers": "controllers"}
@@ -65,7 +65,7 @@ def _controllers(kind: Kind | None, task: Path, format_: OutputFormat) -> ExitCo
 
     if kind != "controllers":
         message = f"'list {kind}' takes no file; only `list controllers TASK` does"
-        raise InvalidInput([Finding("USE058", message)])
+        raise InvalidInput([Diagnostic("USE058", message)])
     rows = pipeline.controllers_of(task)
     console.result(render_json(str(task), rows) if format_ == "json" else render_text(rows))
     return ExitCode.PASSED

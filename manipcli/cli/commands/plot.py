@@ -10,7 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import Format, OutputFormat
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.replay.curves import Chart
@@ -54,23 +54,25 @@ def plot(
     asked = [word for word in words if not _is_log(word)]
     if not logs:
         hint = "`manipcli plot LOG.mcap [TOPIC.FIELD]...`"
-        raise InvalidInput([Finding("USE060", f"no log is given: '{words[0]}' is no file", hint=hint)])
+        raise InvalidInput([Diagnostic("USE060", f"no log is given: '{words[0]}' is no file", hint=hint)])
     if fields:
         _list_fields(logs, format_)
         return ExitCode.PASSED
     if format_ == "json":
         message = "--format json is for --fields alone"
-        raise InvalidInput([Finding("USE064", message, hint="`--csv -` gives the numbers")])
+        raise InvalidInput([Diagnostic("USE064", message, hint="`--csv -` gives the numbers")])
     if output is None and csv is None:
         hint = "-o FILE.svg writes a figure, --csv - prints a table, --fields lists what can be plotted"
-        raise InvalidInput([Finding("USE065", "no output is given: expected --output, --csv or --fields", hint=hint)])
+        raise InvalidInput(
+            [Diagnostic("USE065", "no output is given: expected --output, --csv or --fields", hint=hint)]
+        )
     check_outputs(("--output", output), ("--csv", Path(csv) if csv not in (None, "-") else None), reads=logs)
     kind = None
     if output is not None:
         from manipcli.replay.figure import kind_of
 
         kind = kind_of(output)
-    from manipcli.logs.chart import open_chart
+    from manipcli.logs.plot import open_chart
 
     chart = open_chart(logs, asked, start=start, end=end)
     for note in chart.notes:
@@ -108,7 +110,7 @@ def _write_table(chart: Chart, csv: str) -> None:
 
 
 def _list_fields(logs: list[Path], format_: OutputFormat) -> None:
-    from manipcli.logs.chart import field_lines
+    from manipcli.logs.plot import field_lines
     from manipcli.report.json import Json, dumps
     from manipcli.report.table import table
 

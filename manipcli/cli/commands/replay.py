@@ -12,7 +12,7 @@ from manipcli.cli import console
 from manipcli.cli.interrupts import Interrupts
 from manipcli.cli.options import AllowOutside, Format, OpenPage, PackagePath, PagePort
 from manipcli.cli.serving import stay
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 from manipcli.core.text import listed
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def _refuse(options: Sequence[tuple[str, object]], *, verify: bool) -> None:
     given = [option for option, value in options if value is not None]
     if given:
         reason = "with" if verify else "without"
-        raise InvalidInput([Finding("USE080", f"{listed(given)}: no effect {reason} --verify")])
+        raise InvalidInput([Diagnostic("USE080", f"{listed(given)}: no effect {reason} --verify")])
 
 
 def _show(playback: Playback, pictures: Pictures, html: Path | None, *, port: int | None, open_: bool) -> None:

@@ -14,7 +14,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, Overrides, PackagePath, Seed, seconds
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.cli.task_session import TaskSession
@@ -187,7 +187,7 @@ def _time(option: str, word: str) -> float:
     value = seconds(word)
     if value < 0.0:
         message = f"{option} {word}: this is below 0"
-        raise InvalidInput([Finding("USE049", message, hint="write '10 min', 90, or 0 for never")])
+        raise InvalidInput([Diagnostic("USE049", message, hint="write '10 min', 90, or 0 for never")])
     return value
 
 
@@ -202,7 +202,7 @@ def _check_replaced(junit: Path | None) -> None:
             head = file.read(4096)
         if head and b"<testsuite" not in head:
             message = f"--junit '{junit}': there is a file that is no JUnit XML; it is not replaced"
-            raise InvalidInput([Finding("USE089", message)])
+            raise InvalidInput([Diagnostic("USE089", message)])
 
 
 def _check_folder(option: str, folder: Path | None, *, hint: str | None = None) -> None:
@@ -214,13 +214,15 @@ def _check_folder(option: str, folder: Path | None, *, hint: str | None = None) 
     if folder is None:
         return
     if str(folder) == "-":
-        raise InvalidInput([Finding("USE083", f"{option} '-': expected the name of a folder")])
+        raise InvalidInput([Diagnostic("USE083", f"{option} '-': expected the name of a folder")])
     there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
     if not there.is_dir():
         message = f"{option} '{folder}': '{there}' is a file; a folder was expected"
-        raise InvalidInput([Finding("USE086", message, hint=hint)])
+        raise InvalidInput([Diagnostic("USE086", message, hint=hint)])
     if not os.access(there, os.W_OK):
-        raise InvalidInput([Finding("USE086", f"{option} '{folder}': nothing can be written in '{there}'", hint=hint)])
+        raise InvalidInput(
+            [Diagnostic("USE086", f"{option} '{folder}': nothing can be written in '{there}'", hint=hint)]
+        )
 
 
 def _cores() -> int:

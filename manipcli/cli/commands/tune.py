@@ -10,7 +10,7 @@ import typer
 from manipcli.cli import console
 from manipcli.cli.options import AllowOutside, Format, PackagePath, hertz, seconds
 from manipcli.cli.outputs import check_outputs
-from manipcli.core.errors import ExitCode, Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, ExitCode, InvalidInput
 
 if TYPE_CHECKING:
     from manipcli.replay.figure import Kind
@@ -72,7 +72,7 @@ def tune(
     """  # fmt: skip
     kind, control_period = _checked(robot, output, write, force=force), seconds(period)
     if not 1e-6 <= control_period <= 1.0:
-        raise InvalidInput([Finding("USE071", f"a control period of {period}; expected 1 us to 1 s")])
+        raise InvalidInput([Diagnostic("USE071", f"a control period of {period}; expected 1 us to 1 s")])
     from manipcli.control.tuning import Wish
     from manipcli.core.whole_file import write_whole
     from manipcli.report.tuning import render_json, render_text
@@ -109,7 +109,7 @@ def _checked(robot: Path, output: Path | None, write: Path | None, *, force: boo
     """
     if write is not None and write.exists() and not force:
         message = f"'{write}' exists"
-        raise InvalidInput([Finding("USE070", message, hint="--force replaces it; or say another name")])
+        raise InvalidInput([Diagnostic("USE070", message, hint="--force replaces it; or say another name")])
     check_outputs(("--write", write), ("--output", output), reads=(robot,))
     if output is None:
         return None

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import centres, highest, lowest
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, least, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, least, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate_inverse
 from manipcli.core.units import readable
 from manipcli.model.state import body_pose
@@ -30,7 +30,7 @@ class AboveSpec(Model):
     )
 
 
-def gauge(spec: AboveSpec, world: World) -> Gauge:
+def monitor(spec: AboveSpec, world: World) -> Gauge:
     """The lesser of two lengths [m]: how much the gap exceeds `by`, and how far inside the edge the centre is.
 
     The gap is from the highest corner of the bounding box of `of` to the lowest of the object's. The edge is that of
@@ -42,8 +42,8 @@ def gauge(spec: AboveSpec, world: World) -> Gauge:
     half = np.array(body.size[:2]) / 2.0
     scale = float(np.min(half))
 
-    def look(moments: Moments) -> Reading:
-        states, T = moments.states, np.shape(moments.times)
+    def look(window: StateWindow) -> Robustness:
+        states, T = window.states, np.shape(window.times)
         gap = np.broadcast_to(lowest(scene, states, spec.object) - highest(scene, states, spec.of), T)
         X_WB = body_pose(scene, states, spec.of)
         p_B = rotate_inverse(X_WB.quat_xyzw, centres(scene, states, spec.object) - X_WB.position) - body.centre
@@ -62,19 +62,19 @@ def gauge(spec: AboveSpec, world: World) -> Gauge:
 
         return least(
             [
-                reading(gap - spec.by, moments.times, unit="m", scale=scale, say=high),
-                reading(over, moments.times, unit="m", scale=scale, say=within),
+                robustness(gap - spec.by, window.times, unit="m", scale=scale, say=high),
+                robustness(over, window.times, unit="m", scale=scale, say=within),
             ]
         )
 
     return look
 
 
-def check(spec: AboveSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: AboveSpec, context: CheckContext) -> tuple[Problem, ...]:
     """Both bodies exist and differ."""
     problems = (
-        *unknown_body(setting.scene, spec.object, ("object",)),
-        *unknown_body(setting.scene, spec.of, ("of",)),
+        *unknown_body(context.scene, spec.object, ("object",)),
+        *unknown_body(context.scene, spec.of, ("of",)),
     )
     if not problems and spec.object == spec.of:
         return (Problem(("of",), f"'{spec.of}' cannot be above itself"),)
@@ -85,7 +85,7 @@ ABOVE = Condition(
     name="above",
     spec=AboveSpec,
     units=("m",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
     example="above: {object: cup, of: tray, by: 5 cm}",

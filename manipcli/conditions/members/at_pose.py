@@ -8,9 +8,9 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_group
-from manipcli.conditions.robustness import Reading, least, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_group
+from manipcli.conditions.robustness import Robustness, least, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import wrapped
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -37,7 +37,7 @@ class AtPoseSpec(Model):
     )
 
 
-def gauge(spec: AtPoseSpec, world: World) -> Gauge:
+def monitor(spec: AtPoseSpec, world: World) -> Gauge:
     """`within` minus the largest |q - q_pose| [rad], or `slide` minus that of the joints that slide [m]; the lesser.
 
     A joint without limits is off by the short way round.
@@ -46,8 +46,8 @@ def gauge(spec: AtPoseSpec, world: World) -> Gauge:
     bounds = (("rad", spec.within, turning), ("m", spec.slide or SLIDE, sliding))
     parts = [_part(spec.pose, world.robot, *bound) for bound in bounds if bound[-1]]
 
-    def look(moments: Moments) -> Reading:
-        return least([part(moments) for part in parts])
+    def look(window: StateWindow) -> Robustness:
+        return least([part(window) for part in parts])
 
     return look
 
@@ -58,8 +58,8 @@ def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[
     columns = robot.indices(joints)
     endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
 
-    def look(moments: Moments) -> Reading:
-        off = moments.states.position[:, columns] - goal
+    def look(window: StateWindow) -> Robustness:
+        off = window.states.position[:, columns] - goal
         off[:, endless] = wrapped(off[:, endless])
         away = np.abs(off)
 
@@ -68,7 +68,7 @@ def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[
             far = readable(float(away[k, worst]), unit)
             return f"joint '{joints[worst]}' is {far} from pose '{pose}'; within {readable(most, unit)}"
 
-        return reading(most - np.max(away, axis=-1), moments.times, unit=unit, scale=most, say=say)
+        return robustness(most - np.max(away, axis=-1), window.times, unit=unit, scale=most, say=say)
 
     return look
 
@@ -91,9 +91,9 @@ def _carries_tool(robot: RobotModel, joint: Joint) -> bool:
     return robot.tool is not None and robot.tool.link in robot.descendants(joint.child)
 
 
-def check(spec: AtPoseSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: AtPoseSpec, context: CheckContext) -> tuple[Problem, ...]:
     """Pose and group exist, and have joints in common."""
-    robot = setting.robot
+    robot = context.robot
     problems = []
     poses = [pose.name for pose in robot.poses]
     if spec.pose not in poses:
@@ -115,7 +115,7 @@ AT_POSE = Condition(
     name="at_pose",
     spec=AtPoseSpec,
     units=("rad", "m"),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: None,
     example="at_pose: {pose: home, within: 2 deg}",

@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import cross, rotate
 from manipcli.core.units import readable
 from manipcli.model.state import body_pose
@@ -24,35 +24,35 @@ class AtRestSpec(Model):
     below: Annotated[Speed, Field(gt=0)] = Field(default=0.001, description="Speed [m/s]. Default 1 mm/s.")
 
 
-def gauge(spec: AtRestSpec, world: World) -> Gauge:
+def monitor(spec: AtRestSpec, world: World) -> Gauge:
     """`below` minus the speed [m/s] of the object's centre C over the last tick: |v_O + w x R_WO p_OC|."""
     body = world.scene.body(spec.object)
 
-    def look(moments: Moments) -> Reading:
-        speed = np.zeros(len(moments.times))
+    def look(window: StateWindow) -> Robustness:
+        speed = np.zeros(len(window.times))
         if not body.fixed:
-            linear, angular = moments.body_velocity(world.scene.movable.index(body))
-            arm = rotate(body_pose(world.scene, moments.states, spec.object).quat_xyzw, body.centre)
+            linear, angular = window.body_velocity(world.scene.movable.index(body))
+            arm = rotate(body_pose(world.scene, window.states, spec.object).quat_xyzw, body.centre)
             speed = np.linalg.norm(linear + cross(angular, arm), axis=-1)
 
         def say(k: int) -> str:
             return f"'{spec.object}' moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
 
-        return reading(spec.below - speed, moments.times, unit="m/s", scale=spec.below, say=say)
+        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, say=say)
 
     return look
 
 
-def check(spec: AtRestSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: AtRestSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(setting.scene, spec.object, ("object",))
+    return unknown_body(context.scene, spec.object, ("object",))
 
 
 AT_REST = Condition(
     name="at_rest",
     spec=AtRestSpec,
     units=("m/s",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     example="at_rest: {object: cup}",

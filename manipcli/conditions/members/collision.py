@@ -9,9 +9,9 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, untouchable
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair
 from manipcli.core.units import readable
 from manipcli.model.state import Contact
@@ -64,15 +64,15 @@ def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
     A pair that does not press has the margin `below`: 0 N to spare when any touch counts, which still passes; where
     units differ, it is then compared to 1 N.
     """
-    return _gauge(spec.pairs, spec.below, -1.0)
+    return _monitor(spec.pairs, spec.below, -1.0)
 
 
 def gauge_some(spec: CollisionSpec, world: World) -> Gauge:
     """The largest normal force between any of the pairs, minus `above` [N]."""
-    return _gauge(spec.pairs, spec.above, 1.0)
+    return _monitor(spec.pairs, spec.above, 1.0)
 
 
-def _gauge(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
+def _monitor(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
     def hardest(contacts: Sequence[Contact]) -> Contact | None:
         hits = [contact for contact in contacts if any(between(pair, contact) for pair in pairs)]
         return max(hits, key=lambda contact: contact.force, default=None)
@@ -81,27 +81,27 @@ def _gauge(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
         hit = hardest(contacts)
         return 0.0 if hit is None else hit.force
 
-    def look(moments: Moments) -> Reading:
-        force = moments.of_contacts(largest)
+    def look(window: StateWindow) -> Robustness:
+        force = window.of_contacts(largest)
 
         def say(k: int) -> str:
-            hit = hardest(moments.touching(k))
+            hit = hardest(window.touching(k))
             if hit is None or not hit.force:
                 return "never touched" if sign < 0.0 else "nothing touches"
             asked = f"; {'at most' if sign < 0.0 else 'at least'} {readable(limit, 'N')}" if limit else ""
             return f"'{hit.a}' and '{hit.b}' press with {readable(hit.force, 'N')}{asked}"
 
         def at(k: int) -> float | None:
-            return float(moments.times[k]) if force[k] else None
+            return float(window.times[k]) if force[k] else None
 
-        return reading(sign * (force - limit), moments.times, unit="N", scale=limit or 1.0, say=say, at=at)
+        return robustness(sign * (force - limit), window.times, unit="N", scale=limit or 1.0, say=say, at=at)
 
     return look
 
 
-def check(spec: NoCollisionSpec | CollisionSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: NoCollisionSpec | CollisionSpec, context: CheckContext) -> tuple[Problem, ...]:
     """Every part is a body, the robot, or one of its links, and can touch the other of its pair."""
-    return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(setting, pair, ("pairs", k)))
+    return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(context, pair, ("pairs", k)))
 
 
 NO_COLLISION = Condition(

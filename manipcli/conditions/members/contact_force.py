@@ -8,9 +8,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, untouchable
-from manipcli.conditions.robustness import Reading, least, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, untouchable
+from manipcli.conditions.robustness import Robustness, least, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between, impossible_pair, is_part, unknown_part
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
@@ -45,7 +45,7 @@ class ContactForceSpec(Model):
         return self
 
 
-def gauge(spec: ContactForceSpec, world: World) -> Gauge:
+def monitor(spec: ContactForceSpec, world: World) -> Gauge:
     """`below` minus the force, and the force minus `above` [N]; the lesser where both are given.
 
     Bodies are rigid: where they meet, a force of one physics step brings them to rest, mass times speed over that step.
@@ -66,7 +66,7 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
     kind = "force" if spec.mean_over is None else f"mean force over {readable(spec.mean_over, 's')}"
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
-    def look(moments: Moments) -> Reading:
+    def look(moments: StateWindow) -> Robustness:
         force = moments.of_contacts(pressed) if mean is None else mean.of(moments)
 
         def say(k: int) -> str:
@@ -76,9 +76,9 @@ def gauge(spec: ContactForceSpec, world: World) -> Gauge:
 
         readings = []
         if spec.below is not None:
-            readings.append(reading(spec.below - force, moments.times, unit="N", scale=spec.below, say=say))
+            readings.append(robustness(spec.below - force, moments.times, unit="N", scale=spec.below, say=say))
         if spec.above is not None:
-            readings.append(reading(force - spec.above, moments.times, unit="N", scale=spec.above, say=say))
+            readings.append(robustness(force - spec.above, moments.times, unit="N", scale=spec.above, say=say))
         return least(readings)
 
     return look
@@ -98,7 +98,7 @@ class _Mean:
         self._values: list[float] = []
         self._sums: list[float] = []
 
-    def of(self, moments: Moments) -> Array:
+    def of(self, moments: StateWindow) -> Array:
         """(T,) at each of the next ticks."""
         ticks = moments.times
         if not self._times:
@@ -128,18 +128,18 @@ class _Mean:
         self._sums.append(before)
 
 
-def check(spec: ContactForceSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: ContactForceSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The parts exist, and those of a pair can touch each other."""
     if spec.pair is not None:
-        return impossible_pair(setting, spec.pair, ("pair",))
-    return unknown_part(setting, spec.of or "", ("of",))
+        return impossible_pair(context, spec.pair, ("pair",))
+    return unknown_part(context, spec.of or "", ("of",))
 
 
 CONTACT_FORCE = Condition(
     name="contact_force",
     spec=ContactForceSpec,
     units=("N",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: untouchable(world),
     scope="always",

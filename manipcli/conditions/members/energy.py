@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, effortless, unknown_group
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
@@ -23,7 +23,7 @@ class EnergySpec(Model):
     group: str | None = Field(default=None, description="Only this group's joints. Default: all that move.")
 
 
-def gauge(spec: EnergySpec, world: World) -> Gauge:
+def monitor(spec: EnergySpec, world: World) -> Gauge:
     """`below` minus W [J], the work that the joints have done.
 
         W = sum over joints of the integral of max(tau_j qd_j, 0) dt
@@ -36,8 +36,8 @@ def gauge(spec: EnergySpec, world: World) -> Gauge:
     done: list[tuple[float, float, float]] = []
     """Time, power and work at the last tick."""
 
-    def look(moments: Moments) -> Reading:
-        states = moments.states
+    def look(window: StateWindow) -> Robustness:
+        states = window.states
         power = np.maximum(states.effort[:, columns] * states.velocity[:, columns], 0.0).sum(axis=-1)
         work = _work(states.time, power, *(done[-1] if done else (float(states.time[0]), 0.0, 0.0)))
         done[:] = [(float(states.time[-1]), float(power[-1]), float(work[-1]))]
@@ -45,7 +45,7 @@ def gauge(spec: EnergySpec, world: World) -> Gauge:
         def say(k: int) -> str:
             return f"{readable(float(work[k]), 'J')} of {readable(spec.below, 'J')}"
 
-        return reading(spec.below - work, moments.times, unit="J", scale=spec.below, say=say)
+        return robustness(spec.below - work, window.times, unit="J", scale=spec.below, say=say)
 
     return look
 
@@ -60,16 +60,16 @@ def _work(times: Array, power: Array, time: float, last_power: float, work: floa
     return np.cumsum(np.concatenate([[work], passed * mean]))[1:]
 
 
-def check(spec: EnergySpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: EnergySpec, context: CheckContext) -> tuple[Problem, ...]:
     """The robot has the group."""
-    return unknown_group(setting.robot, spec.group, ("group",))
+    return unknown_group(context.robot, spec.group, ("group",))
 
 
 ENERGY = Condition(
     name="energy",
     spec=EnergySpec,
     units=("J",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: effortless(world),
     example="energy: {below: 50 J}",

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import centres, point_text
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate_inverse
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -37,7 +37,7 @@ class OutsideSpec(Model):
 Spec = InsideSpec | OutsideSpec
 
 
-def gauge(spec: Spec, world: World, *, sign: float) -> Gauge:
+def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
     """Depth [m] of the object's centre in the hollow: the distance to its nearest face, negative outside.
 
     The faces are the hollow's walls, its floor and the plane of its rim. Outside it is minus the distance to the
@@ -48,19 +48,19 @@ def gauge(spec: Spec, world: World, *, sign: float) -> Gauge:
     shape = _interior(world.scene, spec.of).shape
     deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
 
-    def look(moments: Moments) -> Reading:
-        p_S = _in_hollow(world.scene, moments.states, spec)
-        depth = np.broadcast_to(_depth(shape, p_S), np.shape(moments.states.time))
+    def look(window: StateWindow) -> Robustness:
+        p_S = _in_hollow(world.scene, window.states, spec)
+        depth = np.broadcast_to(_depth(shape, p_S), np.shape(window.states.time))
 
         def say(k: int) -> str:
             far = readable(abs(float(depth[k])), "m")
             where = f"{far} deep in '{spec.of}'" if depth[k] >= 0.0 else f"{far} outside '{spec.of}'"
             if depth[k] < 0.0 and _over(shape, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
                 where += ", above its rim"
-            at = point_text(centres(world.scene, moments.states, spec.object), k)
+            at = point_text(centres(world.scene, window.states, spec.object), k)
             return f"'{spec.object}' is {where}, its centre at {at}"
 
-        return reading(sign * depth, moments.times, unit="m", scale=deepest, say=say)
+        return robustness(sign * depth, window.times, unit="m", scale=deepest, say=say)
 
     return look
 
@@ -103,9 +103,9 @@ def _over(shape: Cylinder | Box, p_S: Array) -> bool:
     return bool(p_S[2] > 0.0 and (_beyond(shape, p_S)[:-1] <= 0.0).all())
 
 
-def check(spec: Spec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: Spec, context: CheckContext) -> tuple[Problem, ...]:
     """Both bodies exist, differ, and the container has a hollow."""
-    scene = setting.scene
+    scene = context.scene
     problems = [*unknown_body(scene, spec.object, ("object",)), *unknown_body(scene, spec.of, ("of",))]
     if problems:
         return tuple(problems)
@@ -123,7 +123,7 @@ INSIDE = Condition(
     name="inside",
     spec=InsideSpec,
     units=("m",),
-    open=partial(gauge, sign=1.0),
+    open=partial(monitor, sign=1.0),
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
     example="inside: {object: ball, of: tray}",
@@ -132,7 +132,7 @@ OUTSIDE = Condition(
     name="outside",
     spec=OutsideSpec,
     units=("m",),
-    open=partial(gauge, sign=-1.0),
+    open=partial(monitor, sign=-1.0),
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object, spec.of)),
     example="outside: {object: ball, of: cup}",

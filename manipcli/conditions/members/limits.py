@@ -8,9 +8,9 @@ from typing import Annotated, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, effortless, unknown_group
-from manipcli.conditions.robustness import Measured, Reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, effortless, unknown_group
+from manipcli.conditions.robustness import Measured, Robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.units import readable
 from manipcli.model.robot import RobotModel
 from manipcli.spec.base import Model
@@ -55,7 +55,7 @@ class _Bound:
     half: float
 
 
-def gauge(spec: LimitsSpec, world: World) -> Gauge:
+def monitor(spec: LimitsSpec, world: World) -> Gauge:
     """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
 
     The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
@@ -70,8 +70,8 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
     slack = np.array([SLACK if bound.what == "position" and not spec.spare else 0.0 for bound in bounds])
     units = tuple(sorted({bound.unit for bound in bounds}))
 
-    def look(moments: Moments) -> Reading:
-        states = moments.states
+    def look(window: StateWindow) -> Robustness:
+        states = window.states
         values = np.concatenate((states.position, states.velocity, states.effort), axis=1)[:, columns]
         margins = allowed - np.abs(values - middle)
         margins[(margins < 0.0) & (margins >= -slack)] = 0.0
@@ -85,10 +85,10 @@ def gauge(spec: LimitsSpec, world: World) -> Gauge:
             least, most = one.middle - float(allowed[j]), one.middle + float(allowed[j])
             value, low, high = _apart((float(values[k, j]), least, most), one.unit)
             text = f"{one.what} of joint '{one.joint}' is {value}; allowed {low} to {high}"
-            return Measured(float(margins[k, j]), one.unit, float(moments.times[k]), text)
+            return Measured(float(margins[k, j]), one.unit, float(window.times[k]), text)
 
         everywhere = np.ones(len(ticks), dtype=bool)
-        return Reading(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
+        return Robustness(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
 
     return look
 
@@ -124,10 +124,10 @@ def _bounds(spec: LimitsSpec, robot: RobotModel) -> list[_Bound]:
     return found
 
 
-def check(spec: LimitsSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: LimitsSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The group exists, and one of its joints has a limit."""
-    unknown = unknown_group(setting.robot, spec.group, ("group",))
-    if not unknown and not _bounds(spec, setting.robot):
+    unknown = unknown_group(context.robot, spec.group, ("group",))
+    if not unknown and not _bounds(spec, context.robot):
         return (Problem((), f"no joint has a limit of its {' or '.join(spec.of)}"),)
     return unknown
 
@@ -145,7 +145,7 @@ LIMITS = Condition(
     name="limits",
     spec=LimitsSpec,
     units=("rad", "m", "rad/s", "m/s", "N m", "N"),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=absent,
     scope="always",

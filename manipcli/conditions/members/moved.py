@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from manipcli.conditions.body_poses import centres
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, least, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, least, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotation_between
 from manipcli.core.units import readable
 from manipcli.spec.base import Model, problem
@@ -49,14 +49,14 @@ Change = tuple[Array, Array]
 """(T,) how far the centre moved [m], and by how much the body rotated [rad]."""
 
 
-def since_first(world: World, name: str) -> Callable[[Moments], Change]:
+def since_first(world: World, name: str) -> Callable[[StateWindow], Change]:
     """How a body was displaced since the first tick that is shown."""
     scene = world.scene
     k = scene.movable.index(scene.body(name))
     first: list[Change] = []
 
-    def changed(moments: Moments) -> Change:
-        centre, quat = centres(scene, moments.states, name), moments.states.body_quat_xyzw[:, k]
+    def changed(window: StateWindow) -> Change:
+        centre, quat = centres(scene, window.states, name), window.states.body_quat_xyzw[:, k]
         if not first:
             first.append((centre[0].copy(), quat[0].copy()))
         p, q = first[0]
@@ -69,17 +69,17 @@ def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
     """How far the centre is from where it was, minus `by` [m]; its rotation minus `rotation` [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
-    def look(moments: Moments) -> Reading:
-        far, rotated = changed(moments)
+    def look(window: StateWindow) -> Robustness:
+        far, rotated = changed(window)
         readings = []
         if spec.by is not None:
             text = f"at least {readable(spec.by, 'm')}"
             say = _say(spec.object, "moved by", far, "m", text)
-            readings.append(reading(far - spec.by, moments.times, unit="m", scale=spec.by, say=say))
+            readings.append(robustness(far - spec.by, window.times, unit="m", scale=spec.by, say=say))
         if spec.rotation is not None:
             text = f"at least {readable(spec.rotation, 'rad')}"
             say = _say(spec.object, "rotated by", rotated, "rad", text)
-            readings.append(reading(rotated - spec.rotation, moments.times, unit="rad", scale=spec.rotation, say=say))
+            readings.append(robustness(rotated - spec.rotation, window.times, unit="rad", scale=spec.rotation, say=say))
         return least(readings)
 
     return look
@@ -89,13 +89,13 @@ def gauge_unmoved(spec: UnmovedSpec, world: World) -> Gauge:
     """`within` minus the distance of the centre from where it was [m]; `rotation` minus its rotation [rad]."""
     changed = since_first(world, spec.object)
 
-    def look(moments: Moments) -> Reading:
-        far, rotated = changed(moments)
+    def look(window: StateWindow) -> Robustness:
+        far, rotated = changed(window)
         say = _say(spec.object, "moved by", far, "m", f"at most {readable(spec.within, 'm')}")
-        readings = [reading(spec.within - far, moments.times, unit="m", scale=spec.within, say=say)]
+        readings = [robustness(spec.within - far, window.times, unit="m", scale=spec.within, say=say)]
         if spec.rotation is not None:
             say = _say(spec.object, "rotated by", rotated, "rad", f"at most {readable(spec.rotation, 'rad')}")
-            readings.append(reading(spec.rotation - rotated, moments.times, unit="rad", scale=spec.rotation, say=say))
+            readings.append(robustness(spec.rotation - rotated, window.times, unit="rad", scale=spec.rotation, say=say))
         return least(readings)
 
     return look
@@ -105,9 +105,9 @@ def _say(name: str, verb: str, values: Array, unit: str, limit: str) -> Callable
     return lambda k: f"'{name}' {verb} {readable(float(values[k]), unit)}; {limit}"
 
 
-def check(spec: MovedSpec | UnmovedSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: MovedSpec | UnmovedSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The body exists and can move."""
-    return unknown_body(setting.scene, spec.object, ("object",), movable=True)
+    return unknown_body(context.scene, spec.object, ("object",), movable=True)
 
 
 MOVED = Condition(

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from manipcli.conditions.body_poses import point_text
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, rotate
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -34,21 +34,21 @@ class NearSpec(Model):
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
 
 
-def gauge(spec: NearSpec, world: World) -> Gauge:
+def monitor(spec: NearSpec, world: World) -> Gauge:
     """`within` minus the distance [m] between the origin of the object's frame and the target."""
     called = "its start" if spec.to == START else f"'{spec.to}'" if isinstance(spec.to, str) else "the point"
 
-    def look(moments: Moments) -> Reading:
-        p_WO = body_pose(world.scene, moments.states, spec.object).position
-        target = _target(spec, world, moments.states)
-        distance = np.broadcast_to(np.linalg.norm(p_WO - target, axis=-1), np.shape(moments.times))
+    def look(window: StateWindow) -> Robustness:
+        p_WO = body_pose(world.scene, window.states, spec.object).position
+        target = _target(spec, world, window.states)
+        distance = np.broadcast_to(np.linalg.norm(p_WO - target, axis=-1), np.shape(window.times))
 
         def say(k: int) -> str:
             away = readable(float(distance[k]), "m")
             where = f"'{spec.object}' is at {point_text(p_WO, k)}, {away} from {called} at {point_text(target, k)}"
             return f"{where}; within {readable(spec.within, 'm')}"
 
-        return reading(spec.within - distance, moments.times, unit="m", scale=spec.within, say=say)
+        return robustness(spec.within - distance, window.times, unit="m", scale=spec.within, say=say)
 
     return look
 
@@ -68,9 +68,9 @@ def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
     return body_pose(world.scene, state, spec.to).position
 
 
-def check(spec: NearSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: NearSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The body exists, and so does the target, which is another."""
-    scene = setting.scene
+    scene = context.scene
     problems = unknown_body(scene, spec.object, ("object",))
     if isinstance(spec.to, str):
         known = (START, *(frame.name for frame in scene.frames), *(body.name for body in scene.bodies))
@@ -94,7 +94,7 @@ NEAR = Condition(
     name="near",
     spec=NearSpec,
     units=("m",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, bodies(spec, world.scene)),
     example="near: {object: cup, to: start, within: 2 cm}",

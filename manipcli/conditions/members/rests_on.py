@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, untouchable
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, untouchable
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.conditions.touch import between
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
@@ -24,7 +24,7 @@ class RestsOnSpec(Model):
     share: Annotated[Share, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
 
 
-def gauge(spec: RestsOnSpec, world: World) -> Gauge:
+def monitor(spec: RestsOnSpec, world: World) -> Gauge:
     """The normal force between the two minus `share` m g [N], g the scene's gravity.
 
     Contacts are known by their normal force alone: what is pressed against a wall hard enough rests on it, too.
@@ -34,27 +34,27 @@ def gauge(spec: RestsOnSpec, world: World) -> Gauge:
     wanted = spec.share * weight
     pair = (spec.object, spec.of)
 
-    def look(moments: Moments) -> Reading:
-        force = moments.of_contacts(lambda contacts: sum(c.force for c in contacts if between(pair, c)))
+    def look(window: StateWindow) -> Robustness:
+        force = window.of_contacts(lambda contacts: sum(c.force for c in contacts if between(pair, c)))
 
         def say(k: int) -> str:
             presses = f"'{spec.object}' presses on '{spec.of}' with {readable(float(force[k]), 'N')}"
             return f"{presses}; at least {readable(wanted, 'N')} of its weight of {readable(weight, 'N')}"
 
-        return reading(force - wanted, moments.times, unit="N", scale=wanted or 1.0, say=say)
+        return robustness(force - wanted, window.times, unit="N", scale=wanted or 1.0, say=say)
 
     return look
 
 
-def check(spec: RestsOnSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: RestsOnSpec, context: CheckContext) -> tuple[Problem, ...]:
     """Both bodies exist and differ, and the first can move."""
     problems = (
-        *unknown_body(setting.scene, spec.object, ("object",), movable=True),
-        *unknown_body(setting.scene, spec.of, ("of",)),
+        *unknown_body(context.scene, spec.object, ("object",), movable=True),
+        *unknown_body(context.scene, spec.of, ("of",)),
     )
     if not problems and spec.object == spec.of:
         return (Problem(("of",), f"'{spec.of}' cannot rest on itself"),)
-    if not problems and not setting.scene.gravity.any():
+    if not problems and not context.scene.gravity.any():
         return (Problem(("object",), f"'{spec.object}' has no weight: the scene has no gravity"),)
     return problems
 
@@ -63,7 +63,7 @@ RESTS_ON = Condition(
     name="rests_on",
     spec=RestsOnSpec,
     units=("N",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: untouchable(world),
     example="rests_on: {object: cup, of: desk}",

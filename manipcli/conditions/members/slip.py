@@ -11,17 +11,17 @@ from pydantic import Field
 
 from manipcli.conditions.body_poses import centres
 from manipcli.conditions.condition import (
+    CheckContext,
     Condition,
     Gauge,
     Problem,
-    Setting,
     World,
     unknown_body,
     unmoving,
     untouchable,
 )
-from manipcli.conditions.robustness import Mask, Reading, least, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.robustness import Mask, Robustness, least, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, matrix_from_quat
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -59,14 +59,14 @@ class _Hold:
         self._taken: tuple[Array, Array] | None = None
         self._last = -np.inf
 
-    def slipped(self, moments: Moments, held: Mask) -> tuple[Array, Array]:
+    def slipped(self, window: StateWindow, held: Mask) -> tuple[Array, Array]:
         """(T,) motion [m] and rotation [rad] since it was taken; zero where it is not held."""
         far, rotated = np.zeros(len(held)), np.zeros(len(held))
         ticks = np.flatnonzero(held)
         if not len(ticks):
             return far, rotated
-        p, R = self._in_hand(moments, ticks)
-        times = moments.times[ticks]
+        p, R = self._in_hand(window, ticks)
+        times = window.times[ticks]
         anew = np.flatnonzero(np.diff(times, prepend=self._last) > LET_GO)
         self._last = float(times[-1])
         for first, last in pairwise([*([] if len(anew) and anew[0] == 0 else [0]), *anew, len(ticks)]):
@@ -77,9 +77,9 @@ class _Hold:
             rotated[one] = _angle(self._taken[1].T @ R[first:last])
         return far, rotated
 
-    def _in_hand(self, moments: Moments, ticks: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+    def _in_hand(self, window: StateWindow, ticks: npt.NDArray[np.intp]) -> tuple[Array, Array]:
         """p_LC (T, 3) of the object's centre C, and R_LO (T, 3, 3)."""
-        states = moments.states.map(lambda a: a[ticks])
+        states = window.states.map(lambda a: a[ticks])
         X = [self._world.kinematics.forward(q, self._link) for q in states.position]
         R_LW = np.stack([one.R.T for one in X])
         p_WC = centres(self._world.scene, states, self._spec.object) - np.stack([one.p for one in X])
@@ -98,7 +98,7 @@ def hand(spec: SlipSpec, robot: RobotModel) -> str:
     return spec.link or (robot.tool.link if robot.tool is not None else robot.root)
 
 
-def gauge(spec: SlipSpec, world: World) -> Gauge:
+def monitor(spec: SlipSpec, world: World) -> Gauge:
     """`within` minus the motion of the object's centre in the hand [m]; `rotation` minus its rotation there [rad]; the
     lesser.
 
@@ -107,17 +107,17 @@ def gauge(spec: SlipSpec, world: World) -> Gauge:
     """
     hold = _Hold(spec, world)
 
-    def look(moments: Moments) -> Reading:
-        held = moments.of_contacts(lambda contacts: pinch_force(contacts, spec.object)) >= spec.grip
-        far, rotated = hold.slipped(moments, held)
+    def look(window: StateWindow) -> Robustness:
+        held = window.of_contacts(lambda contacts: pinch_force(contacts, spec.object)) >= spec.grip
+        far, rotated = hold.slipped(window, held)
         idle = f"the robot never held '{spec.object}' between two links with {readable(spec.grip, 'N')}"
 
         def moved(k: int) -> str:
             return f"'{spec.object}' slipped by {readable(float(far[k]), 'm')}; within {readable(spec.within, 'm')}"
 
         readings = [
-            reading(
-                spec.within - far, moments.times, unit="m", scale=spec.within, say=moved, applies=held, idle=idle
+            robustness(
+                spec.within - far, window.times, unit="m", scale=spec.within, say=moved, applies=held, idle=idle
             )
         ]  # fmt: skip
         if spec.rotation is not None:
@@ -128,22 +128,22 @@ def gauge(spec: SlipSpec, world: World) -> Gauge:
                 return f"'{spec.object}' rotated in the hand by {angle}; within {readable(limit, 'rad')}"
 
             readings.append(
-                reading(limit - rotated, moments.times, unit="rad", scale=limit, say=twisted, applies=held, idle=idle)
+                robustness(limit - rotated, window.times, unit="rad", scale=limit, say=twisted, applies=held, idle=idle)
             )
         return least(readings)
 
     return look
 
 
-def check(spec: SlipSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: SlipSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The body exists and can move; the hand is known."""
-    problems = unknown_body(setting.scene, spec.object, ("object",), movable=True)
-    links = [link.name for link in setting.robot.links]
+    problems = unknown_body(context.scene, spec.object, ("object",), movable=True)
+    links = [link.name for link in context.robot.links]
     if spec.link is not None and spec.link not in links:
-        message = f"'{spec.link}' is not a link of robot '{setting.robot.name}'"
+        message = f"'{spec.link}' is not a link of robot '{context.robot.name}'"
         return (*problems, Problem(("link",), message, did_you_mean(spec.link, links)))
-    if spec.link is None and setting.robot.tool is None:
-        message = f"robot '{setting.robot.name}' has no tool to measure in"
+    if spec.link is None and context.robot.tool is None:
+        message = f"robot '{context.robot.name}' has no tool to measure in"
         return (*problems, Problem((), message, "name the hand's `link` here, or a `tool` in the robot file"))
     return problems
 
@@ -152,7 +152,7 @@ SLIP = Condition(
     name="slip",
     spec=SlipSpec,
     units=("m", "rad"),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: untouchable(world) or unmoving(world, (spec.object,)),
     scope="always",

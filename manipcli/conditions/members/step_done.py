@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import ROUNDING, Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import ROUNDING, StateWindow
 from manipcli.core.text import did_you_mean
 from manipcli.spec.base import Model
 
@@ -18,18 +18,18 @@ class StepDoneSpec(Model):
     step: str = Field(description="Id of a step of the task.")
 
 
-def gauge(spec: StepDoneSpec, world: World) -> Gauge:
+def monitor(spec: StepDoneSpec, world: World) -> Gauge:
     """1 from the moment on at which the step is done, -1 otherwise; there is no half a step."""
 
-    def look(moments: Moments) -> Reading:
-        step = next(one for one in moments.steps if one.id == spec.step)
+    def look(window: StateWindow) -> Robustness:
+        step = next(one for one in window.steps if one.id == spec.step)
         done = step.outcome == "done" and step.ended is not None
         since = step.ended if done and step.ended is not None else np.inf
-        margins = np.where(moments.times >= since - ROUNDING, 1.0, -1.0)
+        margins = np.where(window.times >= since - ROUNDING, 1.0, -1.0)
 
         def ahead(k: int) -> bool:
             """Whether it ended, and after this tick."""
-            return step.ended is not None and step.ended - ROUNDING > moments.times[k]
+            return step.ended is not None and step.ended - ROUNDING > window.times[k]
 
         def say(k: int) -> str:
             ran = step.outcome or ("not run" if step.started is None else "not ended")
@@ -38,25 +38,25 @@ def gauge(spec: StepDoneSpec, world: World) -> Gauge:
             return f"step '{step.id}': {ran.replace('_', ' ')}"
 
         def at(k: int) -> float | None:
-            return float(moments.times[k]) if ahead(k) else step.ended
+            return float(window.times[k]) if ahead(k) else step.ended
 
-        return reading(margins, moments.times, unit="", scale=1.0, say=say, at=at)
+        return robustness(margins, window.times, unit="", scale=1.0, say=say, at=at)
 
     return look
 
 
-def check(spec: StepDoneSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The task has the step."""
-    if setting.steps is None or spec.step in setting.steps:
+    if context.steps is None or spec.step in context.steps:
         return ()
-    return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, setting.steps)),)
+    return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
 
 
 STEP_DONE = Condition(
     name="step_done",
     spec=StepDoneSpec,
     units=("",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: None if spec.step in world.steps else f"the recording knows no step '{spec.step}'",
     example="step_done: {step: lift_1}",

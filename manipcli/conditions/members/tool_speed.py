@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Transform
 from manipcli.core.text import did_you_mean
 from manipcli.core.units import readable
@@ -25,20 +25,20 @@ class ToolSpeedSpec(Model):
     link: str | None = Field(default=None, description="Another link than the tool's; its origin counts.")
 
 
-def gauge(spec: ToolSpeedSpec, world: World) -> Gauge:
+def monitor(spec: ToolSpeedSpec, world: World) -> Gauge:
     """`below` minus the speed [m/s] of the point in the world, from measured positions and velocities of the joints."""
     link, X_LT = _frame(spec, world.robot)
     name = "the tool" if spec.link is None else f"link '{link}'"
 
-    def look(moments: Moments) -> Reading:
-        q, v = moments.states.position, moments.states.velocity
+    def look(window: StateWindow) -> Robustness:
+        q, v = window.states.position, window.states.velocity
         velocity = world.kinematics.point_velocity
         speed = np.linalg.norm([velocity(q[k], v[k], link, X_LT) for k in range(len(q))], axis=-1)
 
         def say(k: int) -> str:
             return f"{name} moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
 
-        return reading(spec.below - speed, moments.times, unit="m/s", scale=spec.below, say=say)
+        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, say=say)
 
     return look
 
@@ -50,9 +50,9 @@ def _frame(spec: ToolSpeedSpec, robot: RobotModel) -> tuple[str, Transform | Non
     return (robot.root, None) if robot.tool is None else (robot.tool.link, robot.tool.X_LT)
 
 
-def check(spec: ToolSpeedSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: ToolSpeedSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The link exists; without one, the robot has a tool."""
-    robot = setting.robot
+    robot = context.robot
     links = [link.name for link in robot.links]
     if spec.link is not None and spec.link not in links:
         message = f"'{spec.link}' is not a link of robot '{robot.name}'"
@@ -67,7 +67,7 @@ TOOL_SPEED = Condition(
     name="tool_speed",
     spec=ToolSpeedSpec,
     units=("m/s",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: None,
     scope="always",

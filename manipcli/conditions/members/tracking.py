@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_group
-from manipcli.conditions.robustness import Measured, Reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_group
+from manipcli.conditions.robustness import Measured, Robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import Array, wrapped
 from manipcli.core.units import readable
 from manipcli.spec.base import Model
@@ -21,7 +21,7 @@ class TrackingSpec(Model):
     within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
 
 
-def gauge(spec: TrackingSpec, world: World) -> Gauge:
+def monitor(spec: TrackingSpec, world: World) -> Gauge:
     """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of the joints.
 
     A joint without limits errs the short way round. While no controller of a joint is active, nothing is said.
@@ -33,9 +33,9 @@ def gauge(spec: TrackingSpec, world: World) -> Gauge:
     unit_of = [robot.joint(name).unit for name in joints]
     units = tuple(sorted(set(unit_of)))
 
-    def look(moments: Moments) -> Reading:
-        reference = _references(moments, joints)
-        error = reference - moments.states.position[:, columns]
+    def look(window: StateWindow) -> Robustness:
+        reference = _references(window, joints)
+        error = reference - window.states.position[:, columns]
         error[:, endless] = wrapped(error[:, endless])
         error = np.abs(error)
         known = ~np.isnan(reference)
@@ -46,19 +46,21 @@ def gauge(spec: TrackingSpec, world: World) -> Gauge:
             name, unit = joints[worst[k]], unit_of[worst[k]]
             off, within = readable(float(error[k, worst[k]]), unit), readable(spec.within, unit)
             text = f"joint '{name}' is {off} from its reference; within {within}"
-            return Measured(float(margins[k]), unit, float(moments.times[k]), text)
+            return Measured(float(margins[k]), unit, float(window.times[k]), text)
 
         idle = [f"no controller of joint '{name}' was active" for name, there in zip(joints, known.T, strict=True)
                 if not there.all()]  # fmt: skip
-        return Reading(margins, margins / spec.within, units, np.asarray(known.all(axis=1)), "".join(idle[:1]), found)
+        return Robustness(
+            margins, margins / spec.within, units, np.asarray(known.all(axis=1)), "".join(idle[:1]), found
+        )
 
     return look
 
 
-def _references(moments: Moments, joints: tuple[str, ...]) -> Array:
+def _references(window: StateWindow, joints: tuple[str, ...]) -> Array:
     """(T, k) what the joints should follow: of each, that of the controller that is active."""
-    found = np.full((len(moments.times), len(joints)), np.nan)
-    for one in moments.references:
+    found = np.full((len(window.times), len(joints)), np.nan)
+    for one in window.references:
         for k, name in enumerate(joints):
             if name in one.joints:
                 position = one.position[:, one.joints.index(name)]
@@ -66,10 +68,10 @@ def _references(moments: Moments, joints: tuple[str, ...]) -> Array:
     return found
 
 
-def check(spec: TrackingSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: TrackingSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The robot has the group, and the group has joints."""
-    unknown = unknown_group(setting.robot, spec.group, ("group",))
-    if not unknown and not setting.robot.group(spec.group).joints:
+    unknown = unknown_group(context.robot, spec.group, ("group",))
+    if not unknown and not context.robot.group(spec.group).joints:
         return (Problem(("group",), f"group '{spec.group}' has no joints"),)
     return unknown
 
@@ -88,7 +90,7 @@ TRACKING = Condition(
     name="tracking",
     spec=TrackingSpec,
     units=("rad", "m"),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=absent,
     scope="always",

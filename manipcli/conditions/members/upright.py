@@ -7,9 +7,9 @@ import math
 import numpy as np
 from pydantic import Field
 
-from manipcli.conditions.condition import Condition, Gauge, Problem, Setting, World, unknown_body, unmoving
-from manipcli.conditions.robustness import Reading, reading
-from manipcli.conditions.state_window import Moments
+from manipcli.conditions.condition import CheckContext, Condition, Gauge, Problem, World, unknown_body, unmoving
+from manipcli.conditions.robustness import Robustness, robustness
+from manipcli.conditions.state_window import StateWindow
 from manipcli.core.geometry import rotate
 from manipcli.core.text import told_apart
 from manipcli.model.state import body_pose
@@ -24,34 +24,34 @@ class UprightSpec(Model):
     within: AngleTolerance = Field(description="Largest tilt [rad], to pi.")
 
 
-def gauge(spec: UprightSpec, world: World) -> Gauge:
+def monitor(spec: UprightSpec, world: World) -> Gauge:
     """`within` minus the tilt [rad], the angle between the object's z axis and the world's, 0 to pi."""
 
-    def look(moments: Moments) -> Reading:
-        z_W = rotate(body_pose(world.scene, moments.states, spec.object).quat_xyzw, np.array([0.0, 0.0, 1.0]))
+    def look(window: StateWindow) -> Robustness:
+        z_W = rotate(body_pose(world.scene, window.states, spec.object).quat_xyzw, np.array([0.0, 0.0, 1.0]))
         # atan2 and not arccos: exact near 0, where the margin is judged.
         tilt = np.arctan2(np.hypot(z_W[..., 0], z_W[..., 1]), z_W[..., 2])
-        tilts = np.broadcast_to(tilt, np.shape(moments.times))
+        tilts = np.broadcast_to(tilt, np.shape(window.times))
 
         def say(k: int) -> str:
             leans, within = told_apart(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
             return f"'{spec.object}' leans {leans} deg; within {within} deg"
 
-        return reading(spec.within - tilts, moments.times, unit="rad", scale=spec.within, say=say)
+        return robustness(spec.within - tilts, window.times, unit="rad", scale=spec.within, say=say)
 
     return look
 
 
-def check(spec: UprightSpec, setting: Setting) -> tuple[Problem, ...]:
+def check(spec: UprightSpec, context: CheckContext) -> tuple[Problem, ...]:
     """The body exists."""
-    return unknown_body(setting.scene, spec.object, ("object",))
+    return unknown_body(context.scene, spec.object, ("object",))
 
 
 UPRIGHT = Condition(
     name="upright",
     spec=UprightSpec,
     units=("rad",),
-    open=gauge,
+    open=monitor,
     check=check,
     absent=lambda spec, world: unmoving(world, (spec.object,)),
     example="upright: {object: cup, within: 5 deg}",

@@ -36,7 +36,7 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
 from manipcli.control.trajectory_goal import TrajectoryGoal
@@ -283,14 +283,14 @@ class CartesianImpedanceController:
             self._task_damping = self._scale / np.sqrt(np.maximum(mobility, LIGHTEST))
 
 
-def build(name: str, spec: CartesianImpedanceSpec, fit: Fit) -> CartesianImpedanceController:
+def build(name: str, spec: CartesianImpedanceSpec, context: BuildContext) -> CartesianImpedanceController:
     """The controller of a spec."""
-    joints = [fit.robot.joint(joint) for joint in spec.joints]
-    link, offset = _frame(spec, fit.robot)
+    joints = [context.robot.joint(joint) for joint in spec.joints]
+    link, offset = _frame(spec, context.robot)
     return CartesianImpedanceController(
         name=name,
         joints=spec.joints,
-        kinematics=fit.kinematics(),
+        kinematics=context.kinematics(),
         link=link,
         offset=offset,
         stiffness=_six(spec.stiffness),
@@ -303,7 +303,7 @@ def build(name: str, spec: CartesianImpedanceSpec, fit: Fit) -> CartesianImpedan
         constraints=spec.constraints,
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
-        compat=fit.compat,
+        compat=context.compat,
     )
 
 

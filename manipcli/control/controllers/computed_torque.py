@@ -27,7 +27,7 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GoalHandle
 from manipcli.control.control_loop import ControlLoop, InverseDynamicsLoop, error_gains
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.control.controllers.joint_trajectory import JointTrajectoryController
 from manipcli.control.gains import strangers
 from manipcli.core.errors import InvalidArgument
@@ -150,9 +150,9 @@ class ComputedTorqueController:
         return self.output
 
 
-def build(name: str, spec: ComputedTorqueSpec, fit: Fit) -> ComputedTorqueController:
+def build(name: str, spec: ComputedTorqueSpec, context: BuildContext) -> ComputedTorqueController:
     """The controller of a spec."""
-    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    joints = [context.robot.joint(joint) for joint in spec.joints]
     return ComputedTorqueController(
         name=name,
         joints=spec.joints,
@@ -162,7 +162,7 @@ def build(name: str, spec: ComputedTorqueSpec, fit: Fit) -> ComputedTorqueContro
         constraints=spec.constraints,
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
-        compat=fit.compat,
+        compat=context.compat,
     )
 
 

@@ -26,7 +26,14 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, SensorRequest
+from manipcli.control.controller import (
+    BuildContext,
+    ControllerMember,
+    ControllerOutput,
+    FeedForward,
+    JointState,
+    SensorRequest,
+)
 from manipcli.core.geometry import Array, frozen
 from manipcli.core.text import did_you_mean
 from manipcli.model.robot import RobotModel
@@ -102,9 +109,9 @@ class ForceTorqueBroadcaster:
         return self.output
 
 
-def build(name: str, spec: ForceTorqueBroadcasterSpec, fit: Fit) -> ForceTorqueBroadcaster:
+def build(name: str, spec: ForceTorqueBroadcasterSpec, context: BuildContext) -> ForceTorqueBroadcaster:
     """The controller of a spec."""
-    joint = next(joint.name for joint in fit.robot.joints if joint.child == spec.link)
+    joint = next(joint.name for joint in context.robot.joints if joint.child == spec.link)
     return ForceTorqueBroadcaster(name=name, link=spec.link, joint=joint)
 
 

@@ -24,7 +24,14 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState, distinct
+from manipcli.control.controller import (
+    BuildContext,
+    ControllerMember,
+    ControllerOutput,
+    FeedForward,
+    JointState,
+    distinct,
+)
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
@@ -134,7 +141,7 @@ def finite_values(name: str, joints: Sequence[str], values: npt.ArrayLike) -> Ar
     return given
 
 
-def build(name: str, spec: ForwardCommandSpec, fit: Fit) -> ForwardCommandController:
+def build(name: str, spec: ForwardCommandSpec, context: BuildContext) -> ForwardCommandController:
     """The controller of a spec."""
     wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
     return ForwardCommandController(name=name, joints=spec.joints, interface=spec.command_interface, feed_forward=wants)

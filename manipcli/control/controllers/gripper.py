@@ -31,7 +31,7 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.control.action import GripperGoal
 from manipcli.control.control_loop import ControlLoop, HandSettings, NoLoop, PidLoop
-from manipcli.control.controller import ControllerMember, Fit
+from manipcli.control.controller import BuildContext, ControllerMember
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.gripper_controller import GripperController
 from manipcli.core.geometry import Array
@@ -84,9 +84,9 @@ class GripperSpec(ControllerSpec):
         return (self.command_interface,)
 
 
-def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
+def build(name: str, spec: GripperSpec, context: BuildContext) -> GripperController:
     """The controller of a spec."""
-    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    joints = [context.robot.joint(joint) for joint in spec.joints]
     own = math.inf if spec.max_effort is None else spec.max_effort
     effort = np.array([min(own, math.inf if j.limits.effort is None else j.limits.effort) for j in joints])
     return GripperController(
@@ -95,15 +95,15 @@ def build(name: str, spec: GripperSpec, fit: Fit) -> GripperController:
         gains=spec.gains,
         interface=spec.command_interface,
         types=[joint.type for joint in joints],
-        fingers=fingers(fit.robot, spec.joints),
-        speed=closing_speed(fit.robot, spec.joints, spec.speed),
+        fingers=fingers(context.robot, spec.joints),
+        speed=closing_speed(context.robot, spec.joints, spec.speed),
         max_effort=effort if spec.command_interface == "effort" else None,
         stall_velocity=_each(joints, spec.stall_velocity, turning=STALL_VELOCITY, sliding=STALL_SPEED),
         stall_time=spec.stall_time,
         allow_stalling=spec.allow_stalling,
         goal_tolerance=_each(joints, spec.goal_tolerance, turning=GOAL_ANGLE, sliding=GOAL_DISTANCE),
         feed_forward="gravity" if spec.gravity_compensation and spec.command_interface == "effort" else "none",
-        compat=fit.compat,
+        compat=context.compat,
     )
 
 

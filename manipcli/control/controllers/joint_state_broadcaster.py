@@ -21,7 +21,7 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, NoLoop
-from manipcli.control.controller import ControllerMember, ControllerOutput, FeedForward, Fit, JointState
+from manipcli.control.controller import BuildContext, ControllerMember, ControllerOutput, FeedForward, JointState
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array, frozen
 from manipcli.model.robot import RobotModel
@@ -110,9 +110,9 @@ class JointStateBroadcaster:
         return self.output
 
 
-def build(name: str, spec: JointStateBroadcasterSpec, fit: Fit) -> JointStateBroadcaster:
+def build(name: str, spec: JointStateBroadcasterSpec, context: BuildContext) -> JointStateBroadcaster:
     """The controller of a spec."""
-    joints = spec.joints or fit.robot.joint_names
+    joints = spec.joints or context.robot.joint_names
     return JointStateBroadcaster(name=name, joints=joints, state_interfaces=spec.state_interfaces)
 
 

@@ -29,7 +29,7 @@ from pydantic import Field
 
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, NoLoop, PidLoop
-from manipcli.control.controller import ControllerMember, FeedForward, Fit
+from manipcli.control.controller import BuildContext, ControllerMember, FeedForward
 from manipcli.control.gains import idle_gains, strangers
 from manipcli.control.trajectory_controller import JointTrajectoryController
 from manipcli.control.trajectory_goal import controlled_by_error, refused
@@ -110,9 +110,9 @@ class JointTrajectorySpec(ControllerSpec):
         return ("effort",) if self.command_interface is None else (self.command_interface,)
 
 
-def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryController:
+def build(name: str, spec: JointTrajectorySpec, context: BuildContext) -> JointTrajectoryController:
     """The controller of a spec."""
-    joints = [fit.robot.joint(joint) for joint in spec.joints]
+    joints = [context.robot.joint(joint) for joint in spec.joints]
     wants: FeedForward = "gravity" if spec.gravity_compensation else "none"
     return JointTrajectoryController(
         name=name,
@@ -124,7 +124,7 @@ def build(name: str, spec: JointTrajectorySpec, fit: Fit) -> JointTrajectoryCont
         limits=[joint.limits for joint in joints],
         types=[joint.type for joint in joints],
         feed_forward="inverse_dynamics" if spec.inverse_dynamics else wants,
-        compat=fit.compat,
+        compat=context.compat,
         allow_partial_joints_goal=spec.allow_partial_joints_goal,
         allow_nonzero_velocity_at_trajectory_end=spec.allow_nonzero_velocity_at_trajectory_end,
         allow_integration_in_goal_trajectories=spec.allow_integration_in_goal_trajectories,

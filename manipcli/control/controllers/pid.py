@@ -30,10 +30,10 @@ from pydantic import Field
 from manipcli.conditions.condition import Problem
 from manipcli.control.control_loop import ControlLoop, NoLoop, PidLoop
 from manipcli.control.controller import (
+    BuildContext,
     ControllerMember,
     ControllerOutput,
     FeedForward,
-    Fit,
     JointState,
     distinct,
     refuse_not_finite,
@@ -225,7 +225,7 @@ class PidController:
         return output
 
 
-def build(name: str, spec: PidSpec, fit: Fit) -> PidController:
+def build(name: str, spec: PidSpec, context: BuildContext) -> PidController:
     """The controller of a spec."""
     return PidController(
         name=name,
@@ -233,10 +233,10 @@ def build(name: str, spec: PidSpec, fit: Fit) -> PidController:
         gains=spec.gains,
         interface=spec.command_interface,
         led=spec.reference_and_state_interfaces,
-        types=[fit.robot.joint(joint).type for joint in spec.joints],
+        types=[context.robot.joint(joint).type for joint in spec.joints],
         hold_first=spec.set_current_state_as_first_setpoint,
         feed_forward="gravity" if spec.gravity_compensation else "none",
-        compat=fit.compat,
+        compat=context.compat,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from manipcli.core.errors import Finding, Severity
+from manipcli.core.errors import Diagnostic, Severity
 from manipcli.description.description import Description
 from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts
@@ -30,7 +30,7 @@ class Subject:
     packages: Packages
 
 
-Find = Callable[[Subject], Iterable[Finding]]
+Find = Callable[[Subject], Iterable[Diagnostic]]
 
 
 @dataclass(frozen=True, slots=True)

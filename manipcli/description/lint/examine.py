@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from manipcli.core.errors import Finding, InvalidInput, Place, Severity
+from manipcli.core.errors import Diagnostic, InvalidInput, Place, Severity
 from manipcli.description.description import Description, read_description
 from manipcli.description.lint.check import Check, Subject
 from manipcli.description.lint.checks import CHECKS
@@ -33,13 +33,13 @@ class Examination:
         parts: links, joints and transmissions as far as they could be read; None where there is no tree.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[Diagnostic, ...]
     left_out: tuple[tuple[str, int], ...]
     description: Description | None
     parts: Parts | None
 
     @property
-    def errors(self) -> tuple[Finding, ...]:
+    def errors(self) -> tuple[Diagnostic, ...]:
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
@@ -67,7 +67,7 @@ def examine(
         return _examination(error.findings, None, None)
     except (RecursionError, MemoryError):
         message = "the description is nested too deep, or too large, for this machine; this cannot be raised"
-        return _examination([Finding("URDF052", message, Place(shown_path(path), 0, 0))], None, None)
+        return _examination([Diagnostic("URDF052", message, Place(shown_path(path), 0, 0))], None, None)
     subject = Subject(description, parts, packages)
     found = list(parts.findings)
     for check in checks:
@@ -75,23 +75,23 @@ def examine(
     return _examination(found, description, parts)
 
 
-def _made(check: Check, subject: Subject) -> list[Finding]:
+def _made(check: Check, subject: Subject) -> list[Diagnostic]:
     """What a check finds. One that fails on what it is given has not let it pass."""
-    found: list[Finding] = []
+    found: list[Diagnostic] = []
     try:
         found.extend(islice(check.find(subject), MOST))
     except InvalidInput as error:
         found += error.findings
     except Exception as error:  # noqa: BLE001  (a check that breaks must not let the file pass)
         message = f"the check '{check.name}' came to no end: {type(error).__name__}: {error}"
-        found.append(Finding(check.code, message.replace("\n", " "), severity="error"))
+        found.append(Diagnostic(check.code, message.replace("\n", " "), severity="error"))
     return found
 
 
-def _examination(found: Iterable[Finding], description: Description | None, parts: Parts | None) -> Examination:
+def _examination(found: Iterable[Diagnostic], description: Description | None, parts: Parts | None) -> Examination:
     """Each finding once, in the order of the file, and not more than somebody reads; errors are kept first."""
     unique = list({(finding.code, finding.message, finding.place): finding for finding in found}.values())
-    kept: list[Finding] = []
+    kept: list[Diagnostic] = []
     of_code: Counter[str] = Counter()
     for finding in sorted(unique, key=lambda each: _RANK[each.severity]):
         of_code[finding.code] += 1
@@ -104,7 +104,7 @@ def _examination(found: Iterable[Finding], description: Description | None, part
     return Examination(tuple(kept), left_out, description, parts)
 
 
-def _order(finding: Finding, main: str) -> tuple[bool, bool, str, int, int, int, str]:
+def _order(finding: Diagnostic, main: str) -> tuple[bool, bool, str, int, int, int, str]:
     """The file itself first, then those it includes; what has no place, before all."""
     place = finding.place
     rank = _RANK[finding.severity]

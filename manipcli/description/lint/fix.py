@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import shorten
 from manipcli.description.description import Description
 from manipcli.description.located_xml import Element
@@ -51,7 +51,7 @@ def mended(path: Path, description: Description) -> tuple[bytes, tuple[Change, .
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        raise InvalidInput([Finding("USE042", f"'{path}' is not UTF-8; only such files are mended")]) from None
+        raise InvalidInput([Diagnostic("USE042", f"'{path}' is not UTF-8; only such files are mended")]) from None
     starts = [0, *(match.end() for match in _LINE_END.finditer(text))]
     changes = tuple(_changes(path, description))
     done = []

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.description.bounds import bounds
 from manipcli.description.lint.check import Check
@@ -32,7 +32,7 @@ class Inspection:
     summary: Summary | None
     tree: tuple[str, ...]
 
-    def told(self, codes: Collection[str]) -> tuple[Finding, ...]:
+    def told(self, codes: Collection[str]) -> tuple[Diagnostic, ...]:
         """The findings of these codes; all of them where the file could not be read: that cannot be ignored."""
         findings = self.examination.findings
         if self.examination.parts is None:
@@ -51,7 +51,7 @@ def located(word: str, *, package_path: Sequence[Path] = ()) -> Path:
     try:
         return Packages(Path("robot.yaml"), package_path=package_path).resolve(word)
     except NotFound as error:
-        raise InvalidInput([Finding("USE101", error.message, hint=error.hint)]) from error
+        raise InvalidInput([Diagnostic("USE101", error.message, hint=error.hint)]) from error
 
 
 def inspect(
@@ -70,7 +70,7 @@ def inspect(
     """
     bounds()
     if not os.path.lexists(path):
-        raise InvalidInput([Finding("USE101", "there is no such file", Place(str(path), 0, 0), hint=sibling(path))])
+        raise InvalidInput([Diagnostic("USE101", "there is no such file", Place(str(path), 0, 0), hint=sibling(path))])
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     examination = examine(path, packages=packages, arguments=arguments, allow_env=allow_env)
     if examination.description is None or examination.parts is None:
@@ -117,9 +117,9 @@ def explained(code: str) -> Check:
     raise InvalidInput([_unknown(code)])
 
 
-def _unknown(word: str) -> Finding:
+def _unknown(word: str) -> Diagnostic:
     hint = did_you_mean(word[:40].upper(), [check.code for check in CHECKS], kind="codes")
-    return Finding("USE046", f"no check has the code '{shorten(word)}'", hint=f"{hint}; `manipcli list checks`")
+    return Diagnostic("USE046", f"no check has the code '{shorten(word)}'", hint=f"{hint}; `manipcli list checks`")
 
 
 def mend(inspection: Inspection, *, in_place: bool, force: bool = False) -> tuple[Path, tuple[Change, ...]]:
@@ -138,17 +138,20 @@ def mend(inspection: Inspection, *, in_place: bool, force: bool = False) -> tupl
     path, description = inspection.path, inspection.examination.description
     if description is None:
         raise InvalidInput(
-            [*inspection.examination.findings, Finding("USE047", f"'{path}' cannot be read: there is nothing to mend")]
+            [
+                *inspection.examination.findings,
+                Diagnostic("USE047", f"'{path}' cannot be read: there is nothing to mend"),
+            ]
         )
     if description.expanded:
         message = f"'{path}' is xacro: what is mended there may be wrong where a macro is called elsewhere"
-        raise InvalidInput([Finding("USE047", message, hint="mend it by hand; each finding says where")])
+        raise InvalidInput([Diagnostic("USE047", message, hint="mend it by hand; each finding says where")])
     data, changes = mended(path, description)
     target = path if in_place else path.with_name(f"{path.name.removesuffix('.urdf')}.fixed.urdf")
     if changes:
         if not (in_place or force) and target.exists() and not _same(target, data):
             message = f"'{target}' is there already, and is not what would be written"
-            raise InvalidInput([Finding("USE084", message, hint="--force replaces it")])
+            raise InvalidInput([Diagnostic("USE084", message, hint="--force replaces it")])
         partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
         partial.write_bytes(data)
         if in_place:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection
 from typing import Final
 
-from manipcli.core.errors import Finding, Place, Severity
+from manipcli.core.errors import Diagnostic, Place, Severity
 from manipcli.core.geometry import Transform
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.description.located_xml import Element
@@ -34,7 +34,7 @@ class Reader:
     """Gathers findings while a description is read."""
 
     def __init__(self) -> None:
-        self.findings: list[Finding] = []
+        self.findings: list[Diagnostic] = []
         self._hints = 0
 
     def report(
@@ -46,7 +46,7 @@ class Reader:
         hint: str | None = None,
         severity: Severity = "error",
     ) -> None:
-        self.findings.append(Finding(code=code, message=message, place=place, hint=hint, severity=severity))
+        self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint, severity=severity))
 
     def near(self, name: str, known: Collection[str]) -> str | None:
         """The hint for an unknown name."""

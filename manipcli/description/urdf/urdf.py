@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.description.description import Description
 from manipcli.description.elements import Joint, Link, TransmissionTag
 from manipcli.description.located_xml import Element
@@ -33,10 +33,10 @@ class Parts:
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     transmissions: tuple[TransmissionTag, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[Diagnostic, ...]
 
     @property
-    def errors(self) -> tuple[Finding, ...]:
+    def errors(self) -> tuple[Diagnostic, ...]:
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from xml.dom.minidom import Document
 from xml.dom.minidom import Element as DomElement
 
-from manipcli.core.errors import EXPANDED, Finding, InvalidInput, Place
+from manipcli.core.errors import EXPANDED, Diagnostic, InvalidInput, Place
 from manipcli.description.bounds import bounds
 from manipcli.description.located_xml import called_from, invalid, place_of, read_document
 from manipcli.description.packages import Absent, NotFound, Packages
@@ -44,7 +44,7 @@ _DATA = "descriptions are data: expressions compute numbers and text and cannot 
 
 def expand(
     path: Path, arguments: Mapping[str, str], packages: Packages, *, allow_env: Collection[str] = ()
-) -> tuple[Document, tuple[Finding, ...]]:
+) -> tuple[Document, tuple[Diagnostic, ...]]:
     """The document of a xacro file with everything expanded; its elements know where they were written.
 
     Args:
@@ -89,7 +89,7 @@ class _Expansion:
         self._evaluate = Evaluator(self._clock)
         self._bounds = bounds()
         self._characters = 0
-        self._findings: list[Finding] = []
+        self._findings: list[Diagnostic] = []
         self._current: DomElement | None = None
         self._calls: list[DomElement] = []
         self._expansions = 0
@@ -125,7 +125,7 @@ class _Expansion:
         module.re_macro_arg = _MACRO_ARGUMENT  # type: ignore[attr-defined]
         module._global_symbols = self._symbols()  # type: ignore[attr-defined]
 
-    def run(self, path: Path, arguments: Mapping[str, str]) -> tuple[Document, tuple[Finding, ...]]:
+    def run(self, path: Path, arguments: Mapping[str, str]) -> tuple[Document, tuple[Diagnostic, ...]]:
         module = self._module
         document = read_document(path)
         self._current = document.documentElement
@@ -185,7 +185,7 @@ class _Expansion:
 
     def _warn(self, *words: object, **options: object) -> str:
         message = " ".join(str(word) for word in words)
-        self._findings.append(Finding("XACRO010", message, self._place(), severity="warning"))
+        self._findings.append(Diagnostic("XACRO010", message, self._place(), severity="warning"))
         return ""
 
     # --- the doors, in the library's signatures ---

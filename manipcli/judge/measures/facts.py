@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.core.geometry import Array, frozen, wrapped
-from manipcli.judge.cuts import Cuts
-from manipcli.judge.measures.holds import HoldFacts, HoldMeter, find_holds
+from manipcli.judge.measures.grasp_intervals import GraspFacts, GraspMeter, find_grasps
 from manipcli.judge.measures.reference import references
+from manipcli.judge.saturations import Saturations
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.record.recording import Recording, Span
@@ -112,7 +112,7 @@ class RunFacts:
 
     joints: tuple[JointFacts, ...]
     steps: tuple[StepFacts, ...]
-    holds: tuple[HoldFacts, ...]
+    holds: tuple[GraspFacts, ...]
     actuators: tuple[tuple[str, int], ...]
     times: Array
     errors: Array
@@ -131,8 +131,8 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
     """
     joints = [recording.joint_names.index(name) for name in robot.joint_names]
     bodies = {name: k for k, name in enumerate(recording.body_names)}
-    holds, end = find_holds(recording, scene)
-    meters = [HoldMeter(hold, robot, scene, joints) for hold in holds if hold.body in bodies]
+    holds, end = find_grasps(recording, scene)
+    meters = [GraspMeter(hold, robot, scene, joints) for hold in holds if hold.body in bodies]
     limits = _Limits(robot)
     errors = _Errors(robot, end)
     powers = _Powers(len(joints), steps, end)
@@ -146,7 +146,7 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
         powers.add(states.time, np.nan_to_num(effort * velocity))
         for meter in meters:
             meter.add(span, bodies)
-    cuts = Cuts.from_metadata(recording.metadata, end=end, period=recording.period)
+    cuts = Saturations.from_metadata(recording.metadata, end=end, period=recording.period)
     found = tuple(
         JointFacts(
             name,

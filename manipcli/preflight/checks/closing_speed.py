@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterator
 
 from manipcli.control.controllers import CONTROLLERS
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import told_apart
 from manipcli.preflight.preflight import Check, Subject
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Hands whose references are to move faster than a joint may; the default never is."""
     task = subject.task
     for name, spec in task.controllers.controllers.items():
@@ -26,7 +26,9 @@ def findings(subject: Subject) -> Iterator[Finding]:
             swift, most = told_apart(speed, limit, form=".3g")
             message = f"{joint}: its references move at {swift} {unit}, its velocity limit is {most} {unit}"
             place = task.controllers_file.place("controllers", name, "speed")
-            yield Finding("CTRL167", message, place, "without `speed` they move as fast as all joints may", "warning")
+            yield Diagnostic(
+                "CTRL167", message, place, "without `speed` they move as fast as all joints may", "warning"
+            )
 
 
 CHECK = Check(name="closing_speed", codes=("CTRL167",), findings=findings, needs_physics=False)

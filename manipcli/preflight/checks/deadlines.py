@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import told_apart
 from manipcli.plan.step import Motion
 from manipcli.preflight.preflight import Check, Subject
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Steps whose `timeout` is over before their motions can be."""
     task, plan = subject.task, subject.plan
     for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
@@ -19,7 +19,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
             takes, given = told_apart(least, step.timeout, form=".3g")
             message = f"step '{planned.id}' is planned to take {takes} s, and times out after {given} s"
             hint = f"give it more than {takes} s"
-            yield Finding("TASK243", message, task.file.place("steps", k, "timeout"), hint, "warning")
+            yield Diagnostic("TASK243", message, task.file.place("steps", k, "timeout"), hint, "warning")
 
 
 def _least(motion: Motion) -> float:

@@ -8,7 +8,7 @@ from typing import Final
 
 from manipcli.control.control_loop import InverseDynamicsLoop, error_gains
 from manipcli.control.stability import Loop, boundary, is_stable
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.preflight.preflight import Check, ControlledJoint, Subject
 from manipcli.spec.controllers import GainsSpec
@@ -18,7 +18,7 @@ SLOWEST: Final = 1e-6
 """[rad per tick] A natural frequency that is stable with any latency of a motor."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Errors that do not come to rest: one finding for a bandwidth, which all joints of a controller share."""
     reported = set()
     for shift in subject.shifts:
@@ -33,7 +33,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
                     yield finding
 
 
-def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, late: int) -> Finding | None:
+def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, late: int) -> Diagnostic | None:
     """`late`: control ticks from a command to its effort."""
     simulation = task.spec.simulation
     period = joint.ticks * simulation.control_period
@@ -54,11 +54,11 @@ def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, l
     if own is None:
         place = task.controllers_file.place("controllers", joint.controller, "bandwidth")
         message = f"{joint.controller}: a bandwidth of {digits(law.bandwidth)} Hz is {at}"
-        return Finding("CTRL150", message, place, f"stay below half of that: {digits(0.5 * most)} Hz", "warning")
+        return Diagnostic("CTRL150", message, place, f"stay below half of that: {digits(0.5 * most)} Hz", "warning")
     place = task.controllers_file.place("controllers", joint.controller, "gains", joint.name)
     message = f"{joint.name}: p {digits(own.p)}, i {digits(own.i)} and d {digits(own.d)}, of accelerations, are {at}"
     hint = f"leave them out: a `bandwidth` chooses them, {digits(0.5 * most)} Hz at most"
-    return Finding("CTRL150", message, place, hint, "warning")
+    return Diagnostic("CTRL150", message, place, hint, "warning")
 
 
 CHECK = Check(name="error_dynamics", codes=("CTRL150",), findings=findings)

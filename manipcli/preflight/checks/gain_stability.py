@@ -19,7 +19,7 @@ from manipcli.control.stability import (
     poles,
     unstable_share,
 )
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.preflight.preflight import Check, ControlledJoint, Shift, Subject, once
 from manipcli.spec.controllers import GainsSpec
@@ -30,12 +30,12 @@ SWINGING: Final = 0.1
 """The least damping ratio without a warning: it overshoots by 73 %."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Loops that diverge, ring, or swing with little damping."""
     yield from once(found for shift in subject.shifts for found in _of_shift(subject, shift))
 
 
-def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
+def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Diagnostic]]:
     joints = shift.pid_efforts
     if not joints:
         return
@@ -66,7 +66,7 @@ def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
             stable = False
         if found is not None:
             code, message, hint = found
-            yield joint.name, Finding(code, message, joint.place, hint, "warning")
+            yield joint.name, Diagnostic(code, message, joint.place, hint, "warning")
     if stable:
         yield from _together(joints, all_gains, load, simulation.control_period, substeps)
 
@@ -123,7 +123,7 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
 
 def _together(
     joints: tuple[ControlledJoint, ...], gains: list[GainsSpec], load: JointSpaceLoad, period: float, substeps: int
-) -> Iterator[tuple[str, Finding]]:
+) -> Iterator[tuple[str, Diagnostic]]:
     """Loops that are stable alone and not together, at the configurations in which they are tightest."""
     if any(joint.ticks != 1 for joint in joints):
         return  # loops of different rates have no common tick
@@ -141,7 +141,7 @@ def _together(
             f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
             f"mostly of {names}"
         )
-        yield "", Finding("CTRL154", message, joints[worst[0]].place, "lower their d", "warning")
+        yield "", Diagnostic("CTRL154", message, joints[worst[0]].place, "lower their d", "warning")
         return
 
 

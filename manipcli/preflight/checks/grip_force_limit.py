@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.grips import (
     grasps,
     largest_force,
@@ -13,7 +13,7 @@ from manipcli.preflight.grips import (
 from manipcli.preflight.preflight import Check, Subject
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Grasps with more force than a finger that slides can press with, also once it is reduced for a light object."""
     task, plan = subject.task, subject.plan
     for one in grasps(plan):
@@ -22,7 +22,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
             if sensible_force(task, one.end, one.force) > most:
                 message = f"step '{one.step}': a grasp with {one.force:.3g} N; {name} presses with {most:.3g} N at most"
                 hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
-                yield Finding("TASK238", message, task.file.place("steps", one.index), hint, "warning")
+                yield Diagnostic("TASK238", message, task.file.place("steps", one.index), hint, "warning")
 
 
 CHECK = Check(name="grip_force_limit", codes=("TASK238",), findings=findings, needs_plan=True)

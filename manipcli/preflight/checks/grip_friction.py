@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.configuration import with_mimics
@@ -32,7 +32,7 @@ LIFTED: Final = 5e-3
 """[m] from which on what is held no longer rests."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """What is lifted between two level fingers that slide, where their friction, 2 mu F, is not clearly more than its
     weight.
 
@@ -64,7 +64,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
                 hint = f"it may slip while it is accelerated, or turn: {twice}"
             elif friction:
                 hint += f", it takes more than {0.5 * weight / friction:.3g} N a finger or more friction"
-            yield Finding("TASK241", message, task.file.place("steps", one.index), hint, "warning")
+            yield Diagnostic("TASK241", message, task.file.place("steps", one.index), hint, "warning")
 
 
 def _held_force(subject: Subject, name: str, force: float) -> float:

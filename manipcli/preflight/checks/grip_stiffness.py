@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.plan.hand import fingers
 from manipcli.preflight.grips import (
@@ -21,7 +21,7 @@ ENOUGH: Final = 1.01
 """A force that is asked beyond this share of what there is is not met."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Grasps with more force than the spring of a finger's gain gives, all the way from the object to the posture.
 
     A finger of one joint, alone or with others that mimic it, gives p |q_posture - q_object| of effort, and by virtual
@@ -49,7 +49,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
             than = "that" if asked == one.force else f"{asked:.3g} N"
             hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
             place = task.controllers_file.place("controllers", hand.controller, "gains", name)
-            yield Finding("CTRL168", message, place, hint, "warning")
+            yield Diagnostic("CTRL168", message, place, hint, "warning")
 
 
 CHECK = Check(name="grip_stiffness", codes=("CTRL168",), findings=findings, needs_plan=True)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import listed
 from manipcli.model.drivetrain import Drivetrain
 from manipcli.model.robot import Actuator
@@ -19,12 +19,12 @@ FASTER: Final = 1.0 + 1e-6
 """From this share of an actuator's velocity limit on a plan is beyond it."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Actuators whose settings have no effect, by controller."""
     yield from once(found for shift in subject.shifts if shift.servos for found in _of_shift(subject.task, shift))
 
 
-def _of_shift(task: Task, shift: Shift) -> Iterator[tuple[str, Finding]]:
+def _of_shift(task: Task, shift: Shift) -> Iterator[tuple[str, Diagnostic]]:
     """One finding for each controller."""
     velocity = shift.configurations.velocity
     train = Drivetrain.of(task.robot)
@@ -54,7 +54,7 @@ def _of_shift(task: Task, shift: Shift) -> Iterator[tuple[str, Finding]]:
             message += f"; the plan turns {listed(fast, most=3)} per second"
             hint += ", or narrow the velocities of the joints (robot file, limits)"
         place = task.robot_file.place("actuators", own[0].name)
-        yield "", Finding("CTRL158", message, place, hint, "warning")
+        yield "", Diagnostic("CTRL158", message, place, hint, "warning")
 
 
 _WORDS: Final = ("velocity limit", "friction", "latency")

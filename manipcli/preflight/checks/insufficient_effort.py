@@ -13,7 +13,7 @@ import numpy as np
 
 from manipcli.control.control_loop import PidLoop
 from manipcli.control.joint_space_load import JointSpaceLoad
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.core.geometry import Array
 from manipcli.core.text import digits, told_apart
 from manipcli.description.elements import Joint
@@ -30,12 +30,12 @@ WEIGHTLESS: Final = 1e-6
 CARRY: Final = "gravity_compensation: true carries it"
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Joints of every controller that commands one, whatever its law; sag is examined of PID loops on efforts."""
     yield from once(found for shift in subject.shifts for found in _of_shift(subject, shift))
 
 
-def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
+def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Diagnostic]]:
     robot = subject.task.robot
     for joints in (shift.pid_efforts, shift.servos, shift.other_efforts):
         if not joints:
@@ -48,7 +48,7 @@ def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Finding]]:
 
 def _of_joint(
     robot: RobotModel, joint: ControlledJoint, load: JointSpaceLoad, k: int, velocity: Array, planned: bool
-) -> Iterator[Finding]:
+) -> Iterator[Diagnostic]:
     """Args: `k`: number of the joint in the load; `velocity`: (T,) its own there [rad/s or m/s]."""
     gravity, needed = load.gravity[:, k], load.needed[:, k]
     weight, limit = float(np.abs(gravity).max()), float(load.effort[k])
@@ -66,27 +66,27 @@ def _of_joint(
     found = _clamped(gains, gravity, own) or _sags(gains, tolerance, np.clip(gravity, -limit, limit), own)
     if found is not None:
         code, message, hint = found
-        yield Finding(code, f"{joint.name}: {message}", joint.place, hint, "warning")
+        yield Diagnostic(code, f"{joint.name}: {message}", joint.place, hint, "warning")
 
 
 def _too_weak(
     robot: RobotModel, joint: str, place: Place, *, weight: float, needed: float, limit: float
-) -> Finding | None:
+) -> Diagnostic | None:
     """Too little effort for gravity or for the plan, all three in N m or N; None where there is enough."""
     unit = robot.joint(joint).effort_unit
     if weight > limit:
         takes, most = told_apart(weight, limit, form=".3g")
         message = f"{joint}: holding against gravity takes up to {takes} {unit}, its limit is {most} {unit}"
-        return Finding("CTRL155", message, place, "it will sink; check the effort limit and the masses", "warning")
+        return Diagnostic("CTRL155", message, place, "it will sink; check the effort limit and the masses", "warning")
     if needed > limit:
         takes, most = told_apart(needed, limit, form=".3g")
         message = f"{joint}: the planned motions need up to {takes} {unit}, its limit is {most} {unit}"
         hint = f"it will lag behind; lower its acceleration limit (robot file, limits.{joint}.acceleration)"
-        return Finding("CTRL155", message, place, hint, "warning")
+        return Diagnostic("CTRL155", message, place, hint, "warning")
     return None
 
 
-def _throttled(joint: Joint, place: Place, needed: Array, velocity: Array) -> Finding | None:
+def _throttled(joint: Joint, place: Place, needed: Array, velocity: Array) -> Diagnostic | None:
     """Too little effort at the planned velocities (T,): a soft limit lets only k_velocity (v_max - v) through."""
     soft, fastest = joint.limits.soft, joint.limits.velocity
     if soft is None or soft.k_velocity == 0.0 or fastest is None:
@@ -100,7 +100,7 @@ def _throttled(joint: Joint, place: Place, needed: Array, velocity: Array) -> Fi
     message = f"{joint.name}: at {at} the planned motions need {abs(needed[worst]):.3g} {unit}; the "
     message += f"soft limit of its velocity (k_velocity {digits(soft.k_velocity)}) leaves {left[worst]:.3g} {unit}"
     hint = f"it will lag behind; a lower `speed` of the step, or limits.{joint.name}.k_velocity: 0 in the robot file"
-    return Finding("CTRL169", message, place, hint, "warning")
+    return Diagnostic("CTRL169", message, place, hint, "warning")
 
 
 def _clamped(gains: GainsSpec, gravity: Array, joint: Joint) -> tuple[str, str, str] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.core.units import readable
 from manipcli.preflight.grips import (
@@ -14,7 +14,7 @@ from manipcli.preflight.grips import (
 from manipcli.preflight.preflight import Check, Subject
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Grasps of objects of next to no mass beside the force, by which the engine lets them creep, whatever gravity is.
 
     Its solver stops after a number of iterations, each of which carries an impulse from one finger through the object
@@ -30,7 +30,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
             message += f"{readable(body.mass, 'kg')}: it may creep in the hand by millimetres"
             hint = f"a force below {digits(LIGHT * body.mass)} N, or more mass: the contact solver of the engine "
             hint += "leaves errors that move light things between heavy ones"
-            yield Finding("TASK239", message, task.file.place("steps", one.index), hint, "warning")
+            yield Diagnostic("TASK239", message, task.file.place("steps", one.index), hint, "warning")
 
 
 CHECK = Check(name="light_objects", codes=("TASK239",), findings=findings, needs_plan=True)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.plan.hand import fingers
 from manipcli.preflight.grips import (
@@ -24,7 +24,7 @@ MUCH: Final = 1.1
 """So many times the force that is asked, and a hand that cannot be told it is told of."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Hands that are commanded by position and asked for less force than their motors press with.
 
     Such a motor follows its reference with all the effort that it may have. The reference stops where a finger feels
@@ -48,7 +48,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
             least = f"limits.{name}.effort: {digits(1.05 * shared * one.force)}"
             hint = f"command it by effort, or limit that (robot file, {least})"
             place = task.controllers_file.place("controllers", hand.controller, "command_interface")
-            yield Finding("CTRL171", message, place, hint, "warning")
+            yield Diagnostic("CTRL171", message, place, hint, "warning")
 
 
 def _effort_each(task: Task, plan: Plan, grasp: Grasp, name: str) -> float:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.preflight.preflight import Check, Subject
 
 ROUND: Final = ("cylinder", "cup")
 """Kinds that are round and not the same from all sides."""
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Round things that two links hold by a point each, about which they turn.
 
     Measured with two flat fingers and 8 N: upright cylinders of 60 g turn by 28 to 180 degrees while they are carried,
@@ -32,7 +32,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
                 f"step '{step.id}': two fingers hold '{body.name}', a {body.kind}, by a point each: it may turn there"
             )
             hint = f"`spinning_friction: 0.01` of '{body.name}' stands for the area of real fingertips"
-            yield Finding("TASK240", message, task.file.place("steps", k), hint, "warning")
+            yield Diagnostic("TASK240", message, task.file.place("steps", k), hint, "warning")
 
 
 CHECK = Check(name="rotation_slip", codes=("TASK240",), findings=findings, needs_plan=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from manipcli.control.stability import RINGING, largest_velocity_gain, velocity_loop_poles
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.preflight.preflight import Check, ControlledJoint, Subject, once
 from manipcli.spec.controllers import GainsSpec
 
 
-def findings(subject: Subject) -> Iterator[Finding]:
+def findings(subject: Subject) -> Iterator[Diagnostic]:
     """Velocity loops that diverge or ring."""
     period = subject.task.spec.simulation.control_period
     yield from once(
@@ -23,7 +23,7 @@ def findings(subject: Subject) -> Iterator[Finding]:
     )
 
 
-def _unstable(joint: ControlledJoint, gains: GainsSpec, period: float) -> Iterator[Finding]:
+def _unstable(joint: ControlledJoint, gains: GainsSpec, period: float) -> Iterator[Diagnostic]:
     """A velocity loop that diverges, or turns round every tick."""
     if gains.p == 0.0:
         return
@@ -47,7 +47,7 @@ def _unstable(joint: ControlledJoint, gains: GainsSpec, period: float) -> Iterat
         hint = f"p is unstable above {digits(most)}; stay below half of that"
     else:
         return
-    yield Finding("CTRL157", message, joint.place, hint, "warning")
+    yield Diagnostic("CTRL157", message, joint.place, hint, "warning")
 
 
 CHECK = Check(name="velocity_gains", codes=("CTRL157",), findings=findings)

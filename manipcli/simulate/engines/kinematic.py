@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from manipcli.control.command import JointCommand
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.geometry import Array
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact, WorldState
@@ -87,7 +87,7 @@ def _version() -> str:
     return __version__
 
 
-def _refuses(robot: RobotModel) -> tuple[Finding, ...]:
+def _refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
     return ()
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Final
 
 from manipcli.control.command import JointCommand
-from manipcli.core.errors import Finding, InvalidInput, ManipcliError, SimulationFailed
+from manipcli.core.errors import Diagnostic, InvalidInput, ManipcliError, SimulationFailed
 from manipcli.core.geometry import Array
 from manipcli.description.lint.checks.joints import MAX_JOINTS
 from manipcli.model.batch_kinematics import still_links
@@ -233,12 +233,12 @@ def _version() -> str:
     return "unknown"
 
 
-def refuses(robot: RobotModel) -> tuple[Finding, ...]:
+def refuses(robot: RobotModel) -> tuple[Diagnostic, ...]:
     """More joints than Bullet reads the state of, and moving links without mass."""
     found = []
     if len(robot.joints) > MAX_JOINTS:
         message = f"robot '{robot.name}' has {len(robot.joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
-        found.append(Finding("SIM120", message, hint="join links that are fixed to each other"))
+        found.append(Diagnostic("SIM120", message, hint="join links that are fixed to each other"))
     return (*found, *massless_links(robot, "SIM121"))
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from pydantic import ValidationError
 
-from manipcli.core.errors import Finding, Loc
+from manipcli.core.errors import Diagnostic, Loc
 from manipcli.core.text import nearest
 from manipcli.spec.explain import explain
 from manipcli.spec.located import Located, Source
@@ -43,7 +43,7 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
     if not isinstance(root, MappingNode):
         return None
     kept: dict[str, tuple[int, ...]] = {}
-    late: list[Finding] = []
+    late: list[Diagnostic] = []
     for number in range(_ROUNDS):
         left = replace(source, root=root, kept=kept, whole=source.root)
         try:

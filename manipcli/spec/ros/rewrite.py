@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from pydantic import BaseModel
 
-from manipcli.core.errors import Finding, Place, Severity
+from manipcli.core.errors import Diagnostic, Place, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.spec.controllers import ControllerSpec, Role
 from manipcli.spec.ros.nodes import MANAGER, Found, at_nodes, has_type, in_namespaces, is_ros2, mapping, named
@@ -22,7 +22,7 @@ from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
 
-def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node, list[Finding]]:
+def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node, list[Diagnostic]]:
     """The tree in our form (`controllers: {NAME: ...}`) and findings; a tree in our form comes back as it is.
 
     `types`: the specs of our controllers, by the word under `type`.
@@ -63,7 +63,7 @@ class _Rewriting:
     """
 
     def __init__(self, types: Mapping[str, type[ControllerSpec]]) -> None:
-        self.findings: list[Finding] = []
+        self.findings: list[Diagnostic] = []
         self.models = types
         self.ros1 = False
         self.foreign: list[str] = []
@@ -71,7 +71,7 @@ class _Rewriting:
     def tell(
         self, code: str, place: Place, message: str, *, hint: str | None = None, severity: Severity = "error"
     ) -> None:
-        self.findings.append(Finding(code, message, place, hint=hint, severity=severity))
+        self.findings.append(Diagnostic(code, message, place, hint=hint, severity=severity))
 
     def of_blocks(self, root: MappingNode) -> list[Found]:
         """The controllers of ROS 1 or of our form without `controllers:`."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding, Place
+from manipcli.core.errors import Diagnostic, Place
 from manipcli.spec.source.tree import MappingNode, Node, ScalarNode, SequenceNode
 
 _SUBSTITUTION = re.compile(r"\$\([a-z][^()]*\)")
 
 
-def open_substitutions(root: Node) -> list[Finding]:
+def open_substitutions(root: Node) -> list[Diagnostic]:
     """An error for each one that stands in a controller (its name may hold one), at the first place of it.
 
     Args:
@@ -24,7 +24,7 @@ def open_substitutions(root: Node) -> list[Finding]:
         for word in _SUBSTITUTION.findall(text):
             places.setdefault(word, {}).setdefault((place.line, place.column), place)
     return [
-        Finding(
+        Diagnostic(
             "CTRL217",
             f"'{word}' is for a launch file to fill in, and none does here"
             + (f"; it stands in {len(at)} places" if len(at) > 1 else ""),

@@ -33,7 +33,7 @@ from typing import NoReturn
 
 import yaml
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import shorten
 from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNode, SequenceNode
 
@@ -53,7 +53,7 @@ _NOT_FINITE = re.compile(_INFINITE.pattern + r"|\.(nan|NaN|NAN)")
 _LONGEST_NUMBER = 400
 
 
-def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Finding] | None = None) -> Node | None:
+def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Diagnostic] | None = None) -> Node | None:
     """The tree of one YAML document; None when there is nothing but comments.
 
     Args:
@@ -90,7 +90,7 @@ def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Fi
 
 
 def _refusal(code: str, message: str, place: Place, hint: str | None = None) -> InvalidInput:
-    return InvalidInput([Finding(code, message, place, hint=hint)])
+    return InvalidInput([Diagnostic(code, message, place, hint=hint)])
 
 
 def _decode(data: bytes, name: str) -> str:
@@ -132,7 +132,7 @@ _CLEARER: tuple[tuple[str, str, str | None], ...] = (
 )
 
 
-def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Finding:
+def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Diagnostic:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     problem = getattr(error, "problem", None) or getattr(error, "context", None) or "not readable as YAML"
     line, column = (mark.line, mark.column) if mark is not None else (0, 0)
@@ -159,9 +159,9 @@ def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Finding:
     return _syntax(problem, None, excerpt, Place(name, line + 1, column + 1))
 
 
-def _syntax(message: str, hint: str | None, excerpt: str, place: Place) -> Finding:
+def _syntax(message: str, hint: str | None, excerpt: str, place: Place) -> Diagnostic:
     near = f", in: {shorten(excerpt.strip())}" if excerpt.strip() else ""
-    return Finding("YAML100", f"{message}{near}", place, hint=hint)
+    return Diagnostic("YAML100", f"{message}{near}", place, hint=hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +182,7 @@ class _Composer:
     name: str
     text: str
     infinite: bool
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[Diagnostic] = field(default_factory=list)
     anchors: dict[str, _Composed | None] = field(default_factory=dict)
     nodes: int = 0
 
@@ -335,10 +335,10 @@ class _Composer:
 
     def duplicate(self, key: str, second: Place, first: Place) -> None:
         message = f"the key '{shorten(key)}' stands twice in this mapping: lines {first.line} and {second.line}"
-        self.findings.append(Finding("YAML106", message, second, hint="remove one of them"))
+        self.findings.append(Diagnostic("YAML106", message, second, hint="remove one of them"))
 
     def tell(self, code: str, message: str, event: yaml.Event, hint: str | None = None) -> None:
-        self.findings.append(Finding(code, message, self.place(event), hint=hint))
+        self.findings.append(Diagnostic(code, message, self.place(event), hint=hint))
 
     def stop(self, code: str, message: str, event: yaml.Event, hint: str | None = None) -> NoReturn:
         self.tell(code, message, event, hint)

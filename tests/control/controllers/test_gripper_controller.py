@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.action import ErrorCode
-from manipcli.control.controller import Fit, JointState
+from manipcli.control.controller import BuildContext, JointState
 from manipcli.control.controllers.gripper import GripperController, GripperGoal, GripperSpec, build
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Transform, frozen
@@ -172,7 +172,7 @@ def test_a_stall_takes_its_time(settings, at, target, stalls):
 @pytest.mark.parametrize(("kind", "unit"), [("prismatic", "m"), ("revolute", "rad")])
 def test_a_stall_is_told_in_the_unit_of_its_joint(kind, unit):
     spec = GripperSpec(type="gripper", joints=JOINTS, gains={joint: GainsSpec(p=1.0) for joint in JOINTS})
-    controller = build("hand", spec, Fit(robot_of(kind), kinematics=None, compat=None))
+    controller = build("hand", spec, BuildContext(robot_of(kind), kinematics=None, compat=None))
     stuck = JointState(position=np.zeros(4), velocity=np.zeros(4), effort=np.zeros(4))
     handle = controller.send_goal(GripperGoal(target=0.5))
     for k in range(1000):
@@ -331,7 +331,9 @@ def test_gravity_is_asked_for_where_it_is_wanted_and_commanded_as_an_effort(inte
         type="gripper", joints=JOINTS, command_interface=interface, gravity_compensation=asked,
         gains={joint: GainsSpec(p=1.0) for joint in JOINTS},
     )  # fmt: skip
-    assert build("hand", spec, Fit(robot_of("revolute"), kinematics=None, compat=None)).feed_forward == expected
+    assert (
+        build("hand", spec, BuildContext(robot_of("revolute"), kinematics=None, compat=None)).feed_forward == expected
+    )
 
 
 def test_on_the_position_interface_it_commands_its_reference():

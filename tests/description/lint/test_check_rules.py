@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.description.lint.examine import examine
 from manipcli.description.lint.samples import (
     CUBE,
@@ -24,7 +24,7 @@ from manipcli.description.packages import Packages
 from manipcli.shapes.mesh_formats import binary_stl
 
 
-def findings(folder: Path, text: str, **files: bytes) -> tuple[Finding, ...]:
+def findings(folder: Path, text: str, **files: bytes) -> tuple[Diagnostic, ...]:
     path = folder / "robot.urdf"
     path.write_text(text, encoding="utf-8")
     for name, data in files.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.bounds import Bounds, bounds
 from manipcli.description.lint.check import Check
 from manipcli.description.lint.checks import CHECKS
@@ -148,7 +148,7 @@ def test_of_thousands_of_findings_some_are_told_and_the_rest_counted(tmp_path: P
 
 
 def test_a_check_that_breaks_lets_nothing_pass(tmp_path: Path) -> None:
-    def broken(_: object) -> list[Finding]:
+    def broken(_: object) -> list[Diagnostic]:
         raise ZeroDivisionError("oh")
 
     path = tmp_path / "r.urdf"

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.description.description import read_description
 from manipcli.description.elements import Mimic
 from manipcli.description.packages import Packages
@@ -45,7 +45,7 @@ def read(folder: Path, text: str) -> Parts:
     return read_parts(read_description(path, packages=Packages(path)))
 
 
-def errors(folder: Path, text: str) -> tuple[Finding, ...]:
+def errors(folder: Path, text: str) -> tuple[Diagnostic, ...]:
     return read(folder, text).errors
 
 

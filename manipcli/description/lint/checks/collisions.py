@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name, moved_bodies
 from manipcli.description.lint.samples import CUBE, INERTIAL, LIMIT, another, one_joint
@@ -12,7 +12,7 @@ from manipcli.description.lint.zero_overlap import overlaps_at_zero
 @check(
     "URDF300", "no-collision", "readiness", "warning", bad=one_joint(tip=INERTIAL + CUBE.replace("collision", "visual"))
 )
-def _no_collision(subject: Subject) -> Iterator[Finding]:
+def _no_collision(subject: Subject) -> Iterator[Diagnostic]:
     """A link that moves can be seen but has no collision shape.
 
     It passes through everything, in planning and in simulation.
@@ -27,7 +27,7 @@ def _no_collision(subject: Subject) -> Iterator[Finding]:
             seen = [joint.child]
         for name in seen:
             message = f"link '{name}' is moved by joint '{joint.name}' and has no <collision>"
-            yield Finding("URDF300", message, links[name].place, "a box or cylinder is enough", "warning")
+            yield Diagnostic("URDF300", message, links[name].place, "a box or cylinder is enough", "warning")
 
 
 @check(
@@ -41,7 +41,7 @@ def _no_collision(subject: Subject) -> Iterator[Finding]:
         + f'<parent link="other"/><child link="last"/>{LIMIT}</joint>'
     ),
 )
-def _self_collision(subject: Subject) -> Iterator[Finding]:
+def _self_collision(subject: Subject) -> Iterator[Diagnostic]:
     """Links that are not neighbours overlap with all joints at zero.
 
     Often a misplaced or oversized shape; planning then allows the pair everywhere, as the robot seems to be made
@@ -51,4 +51,4 @@ def _self_collision(subject: Subject) -> Iterator[Finding]:
     for a, b, depth in overlaps_at_zero(subject.parts):
         message = f"links '{a}' and '{b}' overlap (their hulls by {depth * 1000.0:.1f} mm) with all joints at zero"
         hint = "check their <origin> and sizes, or list the pair under collision_ignore in the robot file"
-        yield Finding("URDF333", message, links[a].place if a in links else None, hint, "warning")
+        yield Diagnostic("URDF333", message, links[a].place if a in links else None, hint, "warning")

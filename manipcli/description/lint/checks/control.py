@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import did_you_mean
 from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.control_tags import ControlledJoint, controlled_joints
@@ -33,7 +33,7 @@ PARTS: Final = ("command_interface", "state_interface", "param", "limits")
     "readiness",
     bad=one_joint(more=controlled('<joint name="k"><command_interface name="position"/></joint>')),
 )
-def _joint(subject: Subject) -> Iterator[Finding]:
+def _joint(subject: Subject) -> Iterator[Diagnostic]:
     """A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have.
 
     The controller manager refuses the whole description at start-up.
@@ -42,10 +42,10 @@ def _joint(subject: Subject) -> Iterator[Finding]:
     for joint in controlled_joints(subject):
         if joint.name not in written:
             message = f"ros2_control '{joint.component}': joint '{joint.name}' is not in the description"
-            yield Finding("URDF320", message, joint.element.place, did_you_mean(joint.name, list(written)))
+            yield Diagnostic("URDF320", message, joint.element.place, did_you_mean(joint.name, list(written)))
         elif written[joint.name].attributes.get("type") == "fixed":
             message = f"ros2_control '{joint.component}': joint '{joint.name}' is fixed"
-            yield Finding("URDF320", message, joint.element.place, "take it out, or make the joint move")
+            yield Diagnostic("URDF320", message, joint.element.place, "take it out, or make the joint move")
     for component in subject.description.root.all("ros2_control"):
         own = [joint.name for joint in component.all("joint")]
         for transmission in component.all("transmission"):
@@ -54,7 +54,7 @@ def _joint(subject: Subject) -> Iterator[Finding]:
                 if name not in own:
                     what = f"ros2_control '{component.attributes.get('name', '')}': joint '{name}' of transmission "
                     message = f"{what}'{transmission.attributes.get('name', '')}' is not one of its joints"
-                    yield Finding("URDF320", message, element.place, did_you_mean(name, own))
+                    yield Diagnostic("URDF320", message, element.place, did_you_mean(name, own))
 
 
 @check(
@@ -65,7 +65,7 @@ def _joint(subject: Subject) -> Iterator[Finding]:
         more=another('<mimic joint="j"/>') + controlled('<joint name="k"><command_interface name="position"/></joint>')
     ),
 )
-def _mimic(subject: Subject) -> Iterator[Finding]:
+def _mimic(subject: Subject) -> Iterator[Diagnostic]:
     """A mimic joint has a command interface of its own, or nothing to follow.
 
     It has no position of its own: two commands for one degree of freedom. ros2_control refuses it.
@@ -79,16 +79,16 @@ def _mimic(subject: Subject) -> Iterator[Finding]:
         what = f"ros2_control '{joint.component}': joint '{joint.name}'"
         if mimic is None and said == "true" and joint.name in written:
             message = f"{what} shall follow another (mimic), but the description has no <mimic> for it"
-            yield Finding("URDF321", message, joint.element.place, None)
+            yield Diagnostic("URDF321", message, joint.element.place, None)
         if mimic is None or said == "false":
             continue
         target = mimic.attributes.get("joint", "").strip()
         if joint.commands:
             message = f"{what} follows '{target}' and has a command interface"
-            yield Finding("URDF321", message, joint.commands[0].place, "keep its state interfaces only")
+            yield Diagnostic("URDF321", message, joint.commands[0].place, "keep its state interfaces only")
         if target in written and (joint.component, target) not in together:
             message = f"{what} follows '{target}', which is not one of this ros2_control"
-            yield Finding("URDF321", message, joint.element.place, f"put '{target}' there too, or take it out")
+            yield Diagnostic("URDF321", message, joint.element.place, f"put '{target}' there too, or take it out")
 
 
 @check(
@@ -100,7 +100,7 @@ def _mimic(subject: Subject) -> Iterator[Finding]:
         "</ros2_control>"
     ),
 )
-def _plugin(subject: Subject) -> Iterator[Finding]:
+def _plugin(subject: Subject) -> Iterator[Diagnostic]:
     """A <ros2_control> states no plugin, no name, or no known type.
 
     The controller manager does not start with it.
@@ -109,15 +109,15 @@ def _plugin(subject: Subject) -> Iterator[Finding]:
         name = component.name
         hardware, plugin = component.first("hardware"), component.first("hardware", "plugin")
         if not name:
-            yield Finding("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
+            yield Diagnostic("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
         if component.attributes.get("type", "").strip() not in TYPES:
             kind = component.attributes.get("type", "")
             message = f"ros2_control '{name}' is of type '{kind}'; expected {', '.join(TYPES)}"
-            yield Finding("URDF322", message, component.place, 'type="system"')
+            yield Diagnostic("URDF322", message, component.place, 'type="system"')
         if plugin is None or not plugin.text.strip():
             message = f"ros2_control '{name}' has no <hardware> with a <plugin>"
             hint = "<hardware><plugin>mock_components/GenericSystem</plugin></hardware>"
-            yield Finding("URDF322", message, (hardware or component).place, hint)
+            yield Diagnostic("URDF322", message, (hardware or component).place, hint)
 
 
 @check(
@@ -127,7 +127,7 @@ def _plugin(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(more=controlled('<joint name="j"><command_interface name="postion"/></joint>')),
 )
-def _interface(subject: Subject) -> Iterator[Finding]:
+def _interface(subject: Subject) -> Iterator[Diagnostic]:
     """An interface of ros2_control has a name that no controller asks for, or none.
 
     Controllers ask for position, velocity, effort or acceleration by exactly these names.
@@ -141,11 +141,11 @@ def _interface(subject: Subject) -> Iterator[Finding]:
                 continue
             what = f"'{name}'" if name else "no name"
             message = f"ros2_control '{joint.component}': an interface of joint '{joint.name}' has {what}"
-            yield Finding("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
+            yield Diagnostic("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
 
 
 @check("URDF325", "control-element", "readiness", bad=one_joint(more=controlled('<joint name="j"/><joint name="j"/>')))
-def _element(subject: Subject) -> Iterator[Finding]:
+def _element(subject: Subject) -> Iterator[Diagnostic]:
     """A <ros2_control> has an element, joint, interface or parameter that may not be there as it is.
 
     Its parser knows hardware, joint, sensor, gpio and transmission, and throws at any other; what it does not know
@@ -156,32 +156,32 @@ def _element(subject: Subject) -> Iterator[Finding]:
     for component in subject.description.root.all("ros2_control"):
         name = component.attributes.get("name", "")
         if name.strip() and name.strip() in names:
-            yield Finding("URDF325", f"ros2_control '{name}' is there twice", component.place, "name them apart")
+            yield Diagnostic("URDF325", f"ros2_control '{name}' is there twice", component.place, "name them apart")
         names.add(name.strip())
         seen: set[str] = set()
         for child in component.children:
             if child.tag not in ELEMENTS:
                 message = f"ros2_control '{name}' has an element <{child.tag}>; expected {', '.join(ELEMENTS)}"
-                yield Finding("URDF325", message, child.place, None)
+                yield Diagnostic("URDF325", message, child.place, None)
             own = child.name
             if child.tag == "joint" and own in seen:
-                yield Finding("URDF325", f"ros2_control '{name}' has joint '{own}' twice", child.place, None)
+                yield Diagnostic("URDF325", f"ros2_control '{name}' has joint '{own}' twice", child.place, None)
             if child.tag in ("sensor", "gpio") and not own:
-                yield Finding(
+                yield Diagnostic(
                     "URDF325", f"ros2_control '{name}': a <{child.tag}> has no name", child.place, 'name="..."'
                 )
             seen |= {own} if child.tag == "joint" else set()
             yield from _within(child, name)
         if component.attributes.get("type", "").strip() == "actuator" and len(component.all("joint")) > 1:
             message = f"ros2_control '{name}' is an actuator and has {len(component.all('joint'))} joints; expected one"
-            yield Finding("URDF325", message, component.all("joint")[1].place, 'type="system" may have several')
+            yield Diagnostic("URDF325", message, component.all("joint")[1].place, 'type="system" may have several')
         for parameter in _parameters(component):
             if not parameter.name:
-                yield Finding("URDF325", f"ros2_control '{name}': a <param> has no name", parameter.place, None)
+                yield Diagnostic("URDF325", f"ros2_control '{name}': a <param> has no name", parameter.place, None)
     yield from _commanded_twice(subject)
 
 
-def _within(element: Element, component: str) -> Iterator[Finding]:
+def _within(element: Element, component: str) -> Iterator[Diagnostic]:
     """What a joint, a sensor or a gpio holds: elements that nobody reads, and interfaces that are there twice."""
     if element.tag not in ("joint", "sensor", "gpio"):
         return
@@ -190,14 +190,14 @@ def _within(element: Element, component: str) -> Iterator[Finding]:
     for child in element.children:
         if child.tag not in PARTS and ":" not in child.tag:
             message = f"{what} has an element <{child.tag}>, which is ignored"
-            yield Finding("URDF325", message, child.place, did_you_mean(child.tag, PARTS, kind="known"), "warning")
+            yield Diagnostic("URDF325", message, child.place, did_you_mean(child.tag, PARTS, kind="known"), "warning")
         interface = child.tag, child.name
         if child.tag.endswith("_interface") and interface[1] and interface in seen:
-            yield Finding("URDF325", f"{what} has <{child.tag}> '{interface[1]}' twice", child.place, None)
+            yield Diagnostic("URDF325", f"{what} has <{child.tag}> '{interface[1]}' twice", child.place, None)
         seen.add(interface)
 
 
-def _commanded_twice(subject: Subject) -> Iterator[Finding]:
+def _commanded_twice(subject: Subject) -> Iterator[Diagnostic]:
     """Command interfaces of one joint in two components, and any in one that is a sensor."""
     sensors = {
         component.attributes.get("name", "")
@@ -211,11 +211,11 @@ def _commanded_twice(subject: Subject) -> Iterator[Finding]:
             what = f"ros2_control '{joint.component}': command interface '{name}' of joint '{joint.name}'"
             if joint.component in sensors:
                 hint = 'a sensor has state interfaces only; type="system" may have both'
-                yield Finding("URDF325", f"{what}, but it is a sensor", interface.place, hint)
+                yield Diagnostic("URDF325", f"{what}, but it is a sensor", interface.place, hint)
             owner = owners.setdefault((joint.name, name), joint)
             if name and owner.component != joint.component:
                 message = f"{what} belongs to ros2_control '{owner.component}' already"
-                yield Finding("URDF325", message, interface.place, "one hardware commands a joint")
+                yield Diagnostic("URDF325", message, interface.place, "one hardware commands a joint")
 
 
 def _parameters(element: Element) -> Iterator[Element]:

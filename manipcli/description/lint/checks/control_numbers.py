@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import shorten
 from manipcli.description.elements import JointLimits
 from manipcli.description.lint.check import Subject, check
@@ -27,7 +27,7 @@ TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", 
         )
     ),
 )
-def _find(subject: Subject) -> Iterator[Finding]:
+def _find(subject: Subject) -> Iterator[Diagnostic]:
     """A number or switch in <ros2_control> cannot be read, or contradicts the limits.
 
     ros2_control takes its default instead, without a word; an initial position outside of the limits starts the
@@ -39,7 +39,7 @@ def _find(subject: Subject) -> Iterator[Finding]:
             message = (
                 f"ros2_control '{component.attributes.get('name', '')}': rw_rate is '{rate}'; expected a whole number"
             )
-            yield Finding("URDF324", message, component.place, None)
+            yield Diagnostic("URDF324", message, component.place, None)
         yield from _switch(component, "is_async")
     limits = {joint.name: joint.limits for joint in subject.parts.joints}
     for joint in controlled_joints(subject):
@@ -50,39 +50,39 @@ def _find(subject: Subject) -> Iterator[Finding]:
             yield from _interface(f"joint '{joint.name}'", interface, limits.get(joint.name, JointLimits()))
 
 
-def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[Finding]:
+def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[Diagnostic]:
     kind = interface.attributes.get("data_type", "double").strip()
     if kind not in TYPES:
         message = f"{joint}: an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
-        yield Finding("URDF324", message, interface.place, None, "warning")
+        yield Diagnostic("URDF324", message, interface.place, None, "warning")
     for each in interface.all("limits"):
         yield from _switch(each, "enable")
     size = interface.attributes.get("size", "1").strip()
     if not _whole(size):
         message = f"{joint}: the size of an interface is '{size}'; expected a whole number"
-        yield Finding("URDF324", message, interface.place, None)
+        yield Diagnostic("URDF324", message, interface.place, None)
     values, wrong = _parameters(joint, interface)
     yield from wrong
     if "min" in values and "max" in values and values["min"] > values["max"]:
         message = f"{joint}: min {values['min']:g} is above max {values['max']:g}"
-        yield Finding("URDF324", message, interface.place, None)
+        yield Diagnostic("URDF324", message, interface.place, None)
     if interface.attributes.get("name") != "position":
         return
     lower, upper = limits.range
     for key, beyond in (("min", values.get("min", lower) > upper), ("max", values.get("max", upper) < lower)):
         if beyond and interface.tag == "command_interface":
             message = f"{joint}: {key} {values[key]:g} leaves nothing of its limits {lower:g} to {upper:g}"
-            yield Finding("URDF324", message, interface.place, "it narrows those of <limit>, in rad or m")
+            yield Diagnostic("URDF324", message, interface.place, "it narrows those of <limit>, in rad or m")
     start = values.get("initial_value")
     if start is None:
         return
     if not lower - 1e-9 <= start <= upper + 1e-9:
         message = f"{joint}: the initial position {start:g} is outside of its limits"
         hint = f"limits: {lower:g} to {upper:g}" if None not in (limits.lower, limits.upper) else None
-        yield Finding("URDF324", message, interface.place, hint, "warning")
+        yield Diagnostic("URDF324", message, interface.place, hint, "warning")
 
 
-def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[Finding]]:
+def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[Diagnostic]]:
     """The numbers that an interface states, and what is wrong with the others."""
     values: dict[str, float] = {}
     wrong = []
@@ -95,28 +95,28 @@ def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[
             values[key] = value
         elif text:
             message = f"{joint}: '{shorten(text)}' is no finite number for {key}"
-            wrong.append(Finding("URDF324", message, parameter.place, None))
+            wrong.append(Diagnostic("URDF324", message, parameter.place, None))
         elif key != "initial_value":  # an empty one is common, and counts as none
             message = f'{joint}: <param name="{key}"> is empty; expected a number'
-            wrong.append(Finding("URDF324", message, parameter.place, "state it, or take it out"))
+            wrong.append(Diagnostic("URDF324", message, parameter.place, "state it, or take it out"))
     return values, wrong
 
 
-def _switch(element: Element, attribute: str) -> Iterator[Finding]:
+def _switch(element: Element, attribute: str) -> Iterator[Diagnostic]:
     said = element.attributes.get(attribute, "true").strip()
     if said not in SWITCH:
         message = f"<{element.tag}>: {attribute} is '{shorten(said)}'; expected true or false"
-        yield Finding("URDF324", message, element.place, None)
+        yield Diagnostic("URDF324", message, element.place, None)
 
 
-def _legacy(joint: Element) -> Iterator[Finding]:
+def _legacy(joint: Element) -> Iterator[Diagnostic]:
     """<param name="multiplier"> and "offset" of a joint that follows another by <param name="mimic">."""
     for parameter in joint.all("param"):
         key, said = parameter.name, parameter.text.strip()
         if key in ("multiplier", "offset") and finite(said) is None:
             name = joint.name
             message = f"joint '{name}': '{shorten(said)}' is no finite number for {key}"
-            yield Finding("URDF324", message, parameter.place, None)
+            yield Diagnostic("URDF324", message, parameter.place, None)
 
 
 def _whole(text: str) -> bool:

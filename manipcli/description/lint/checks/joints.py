@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import radians
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name
 from manipcli.description.lint.samples import LIMIT, another, one_joint
@@ -23,7 +23,7 @@ MAX_JOINTS: Final = 127
 @check(
     "URDF104", "fixed-axis", "physics", "warning", bad=one_joint('<axis xyz="0 0 1"/><mimic joint="k"/>', kind="fixed")
 )
-def _fixed_axis(subject: Subject) -> Iterator[Finding]:
+def _fixed_axis(subject: Subject) -> Iterator[Diagnostic]:
     """A fixed joint has an axis, or follows another.
 
     It means nothing; mostly the joint moved once. What should follow another joint stands still.
@@ -34,14 +34,14 @@ def _fixed_axis(subject: Subject) -> Iterator[Finding]:
         what = f"joint '{joint.attributes.get('name', '')}' is fixed; its"
         axis, mimic = joint.first("axis"), joint.first("mimic")
         if axis is not None:
-            yield Finding("URDF104", f"{what} axis means nothing", axis.place, None, "note")
+            yield Diagnostic("URDF104", f"{what} axis means nothing", axis.place, None, "note")
         if mimic is not None:
             message = f"{what} <mimic> of '{mimic.attributes.get('joint', '')}' means nothing"
-            yield Finding("URDF104", message, mimic.place, "make the joint move, or delete <mimic>", "warning")
+            yield Diagnostic("URDF104", message, mimic.place, "make the joint move, or delete <mimic>", "warning")
 
 
 @check("URDF105", "default-axis", "physics", "note", bad=one_joint())
-def _default_axis(subject: Subject) -> Iterator[Finding]:
+def _default_axis(subject: Subject) -> Iterator[Diagnostic]:
     """A moving joint has no axis; x is used.
 
     URDF says x; whoever meant z does not see it before the robot moves.
@@ -52,11 +52,11 @@ def _default_axis(subject: Subject) -> Iterator[Finding]:
             axis is None or "xyz" not in axis.attributes
         ):
             message = f"joint '{joint.attributes.get('name', '')}' states no axis: it moves about or along x"
-            yield Finding("URDF105", message, joint.place, '<axis xyz="..."/>', "note")
+            yield Diagnostic("URDF105", message, joint.place, '<axis xyz="..."/>', "note")
 
 
 @check("URDF106", "continuous-limits", "physics", "note", bad=one_joint(kind="continuous"))
-def _continuous_limits(subject: Subject) -> Iterator[Finding]:
+def _continuous_limits(subject: Subject) -> Iterator[Diagnostic]:
     """A continuous joint states lower and upper limits.
 
     They are ignored: a joint with limits is revolute.
@@ -71,7 +71,7 @@ def _continuous_limits(subject: Subject) -> Iterator[Finding]:
         if stated:
             shown = " and ".join(f"{key}={limit.attributes[key].strip()}" for key in stated)
             message = f"joint '{joint.attributes.get('name', '')}' is continuous; {shown} is ignored"
-            yield Finding("URDF106", message, limit.place, "make it revolute where the limits are meant", "note")
+            yield Diagnostic("URDF106", message, limit.place, "make it revolute where the limits are meant", "note")
 
 
 @check(
@@ -81,7 +81,7 @@ def _continuous_limits(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(LIMIT + '<safety_controller soft_lower_limit="-2" soft_upper_limit="0.9" k_velocity="1"/>'),
 )
-def _safety_limits(subject: Subject) -> Iterator[Finding]:
+def _safety_limits(subject: Subject) -> Iterator[Diagnostic]:
     """The soft limits of a safety_controller lie outside of the limits, or cross.
 
     Soft limits are there to slow a joint before its end; outside of the limits they never act, and the joint meets
@@ -106,7 +106,7 @@ def _safety_limits(subject: Subject) -> Iterator[Finding]:
             )
         else:
             continue
-        yield Finding("URDF107", message, safety.place, "soft limits lie inside of the limits", "warning")
+        yield Diagnostic("URDF107", message, safety.place, "soft limits lie inside of the limits", "warning")
 
 
 @check(
@@ -116,7 +116,7 @@ def _safety_limits(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint('<limit lower="-180" upper="180" velocity="1" effort="1"/>'),
 )
-def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
+def _limits_in_degrees(subject: Subject) -> Iterator[Diagnostic]:
     """A joint has limits that look like degrees, or like millimetres.
 
     URDF counts in radians and metres: a limit of 180 lets a joint turn 28 times, or slide 180 m.
@@ -130,12 +130,12 @@ def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
         if joint.type == "prismatic" and most > FAR_SLIDE:
             message = f"joint '{joint.name}' slides from {lower:g} to {upper:g} m: are these millimetres?"
             hint = f'lower="{lower / 1000.0:g}" upper="{upper / 1000.0:g}"'
-            yield Finding("URDF109", message, place, hint, "warning")
+            yield Diagnostic("URDF109", message, place, hint, "warning")
         if joint.type != "revolute" or most <= MANY_TURNS or most > 720.0:
             continue
         message = f"joint '{joint.name}' turns from {lower:g} to {upper:g} rad: are these degrees?"
         hint = f'lower="{radians(lower):.4f}" upper="{radians(upper):.4f}"; many turns: type continuous'
-        yield Finding("URDF109", message, place, hint, "warning")
+        yield Diagnostic("URDF109", message, place, hint, "warning")
 
 
 @check(
@@ -145,7 +145,7 @@ def _limits_in_degrees(subject: Subject) -> Iterator[Finding]:
     "note",
     bad=one_joint('<limit lower="0.5" upper="1" velocity="1" effort="1"/>'),
 )
-def _zero_outside(subject: Subject) -> Iterator[Finding]:
+def _zero_outside(subject: Subject) -> Iterator[Diagnostic]:
     """Zero is outside of the limits of a joint.
 
     Programs that start a robot with all joints at zero start it where it cannot be; a pose `home` in the robot file
@@ -158,13 +158,13 @@ def _zero_outside(subject: Subject) -> Iterator[Finding]:
             message = f"joint '{joint.name}' moves from {lower:g} to {upper:g}: zero is outside"
             element = written[joint.name]
             place = (element.first("limit") or element).place
-            yield Finding("URDF334", message, place, "state a named pose in the robot file", "note")
+            yield Diagnostic("URDF334", message, place, "state a named pose in the robot file", "note")
 
 
 @check(
     "URDF335", "mimic-limits", "readiness", "warning", bad=one_joint(more=another('<mimic joint="j" multiplier="2"/>'))
 )
-def _mimic_limits(subject: Subject) -> Iterator[Finding]:
+def _mimic_limits(subject: Subject) -> Iterator[Diagnostic]:
     """A mimic joint cannot follow its joint all the way: its own limits are narrower.
 
     Either the coupling breaks at the limit or the limit does; a plan for the leading joint does not know of it.
@@ -187,7 +187,7 @@ def _mimic_limits(subject: Subject) -> Iterator[Finding]:
             f"and has limits {own.lower:.4g} to {own.upper:.4g}"
         )
         element = written[joint.name]
-        yield Finding("URDF335", message, (element.first("limit") or element).place, "widen them", "warning")
+        yield Diagnostic("URDF335", message, (element.first("limit") or element).place, "widen them", "warning")
 
 
 @check(
@@ -201,7 +201,7 @@ def _mimic_limits(subject: Subject) -> Iterator[Finding]:
         )
     ),
 )
-def _too_many_joints(subject: Subject) -> Iterator[Finding]:
+def _too_many_joints(subject: Subject) -> Iterator[Diagnostic]:
     """The robot has more than 127 joints.
 
     From 128 on, fixed ones included, PyBullet cannot read a joint; with thousands it hangs or crashes.
@@ -210,4 +210,4 @@ def _too_many_joints(subject: Subject) -> Iterator[Finding]:
     if len(joints) > MAX_JOINTS:
         message = f"the robot has {len(joints)} joints; Bullet holds {MAX_JOINTS}, fixed ones included"
         hint = "join links that are fixed to each other"
-        yield Finding("URDF332", message, joints[MAX_JOINTS].place, hint)
+        yield Diagnostic("URDF332", message, joints[MAX_JOINTS].place, hint)

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import digits
 from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.rigid import elements_by_name, extent, moved_bodies
@@ -29,7 +29,7 @@ DENSEST: Final = 30_000.0
 
 
 @check("URDF100", "massless-joint", "physics", "warning", bad=one_joint(tip=CUBE))
-def _massless_joint(subject: Subject) -> Iterator[Finding]:
+def _massless_joint(subject: Subject) -> Iterator[Diagnostic]:
     """A joint moves a link that has no mass.
 
     PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques mean nothing; here an engine
@@ -41,7 +41,7 @@ def _massless_joint(subject: Subject) -> Iterator[Finding]:
         if joint.child in links and not massive.intersection(body):  # of a link that is not there enough is said
             message = f"link '{joint.child}', which joint '{joint.name}' moves, has no mass"
             hint = "state the mass and moments of inertia of the link"
-            yield Finding("URDF100", message, links[joint.child].place, hint, "warning")
+            yield Diagnostic("URDF100", message, links[joint.child].place, hint, "warning")
 
 
 def _states_mass(link: Element) -> bool:
@@ -53,7 +53,7 @@ def _states_mass(link: Element) -> bool:
 @check(
     "URDF101", "inertia-size", "physics", "warning", bad=one_joint(tip=INERTIAL.replace("0.02", "0.00000002") + CUBE)
 )
-def _inertia_size(subject: Subject) -> Iterator[Finding]:
+def _inertia_size(subject: Subject) -> Iterator[Diagnostic]:
     """The moments of inertia do not fit the size of the link.
 
     A unit that was mixed up (g mm2 for kg m2, or a density) looks plausible as a number; the arm then shakes or
@@ -79,7 +79,7 @@ def _inertia_size(subject: Subject) -> Iterator[Finding]:
         )
         element = links[link.name].first("inertial") or links[link.name]
         hint = "compute it from the shape and the mass of the link, in kg m2"
-        yield Finding("URDF101", message, (element.first("inertia") or element).place, hint, "warning")
+        yield Diagnostic("URDF101", message, (element.first("inertia") or element).place, hint, "warning")
 
 
 @check(
@@ -89,7 +89,7 @@ def _inertia_size(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(tip=INERTIAL.replace("<mass", '<origin xyz="0 0 2"/><mass') + CUBE),
 )
-def _centre_of_mass(subject: Subject) -> Iterator[Finding]:
+def _centre_of_mass(subject: Subject) -> Iterator[Diagnostic]:
     """The centre of mass lies far outside of the shape of the link.
 
     Gravity then turns the joint with an arm that is not there; mostly a unit, a sign, or another frame.
@@ -110,7 +110,7 @@ def _centre_of_mass(subject: Subject) -> Iterator[Finding]:
         )
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("origin") or element).place
-        yield Finding("URDF102", message, place, "check the <origin> of <inertial>: its unit, its frame", "warning")
+        yield Diagnostic("URDF102", message, place, "check the <origin> of <inertial>: its unit, its frame", "warning")
 
 
 @check(
@@ -120,7 +120,7 @@ def _centre_of_mass(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(tip=CUBE + INERTIAL.replace('mass value="1"', 'mass value="0"'), kind="fixed", inside=""),
 )
-def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
+def _inertia_without_mass(subject: Subject) -> Iterator[Diagnostic]:
     """A link has moments of inertia and mass 0.
 
     No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all.
@@ -131,7 +131,7 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
             continue
         if any(finite(inertia.attributes.get(key, "0").strip()) for key in ("ixx", "iyy", "izz")):
             message = f"link '{link.attributes.get('name', '')}' has moments of inertia and mass 0"
-            yield Finding("URDF108", message, inertia.place, "state its mass, or leave the inertial out", "warning")
+            yield Diagnostic("URDF108", message, inertia.place, "state its mass, or leave the inertial out", "warning")
 
 
 @check(
@@ -141,7 +141,7 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Finding]:
     "note",
     bad=one_joint().replace('<link name="base"/>', f'<link name="base">{INERTIAL}</link>'),
 )
-def _root_inertia(subject: Subject) -> Iterator[Finding]:
+def _root_inertia(subject: Subject) -> Iterator[Diagnostic]:
     """The root link has an inertial, which is ignored.
 
     The robot stands on its root link, so that its mass moves nothing; KDL warns of it. On a mobile base it would
@@ -151,7 +151,7 @@ def _root_inertia(subject: Subject) -> Iterator[Finding]:
     inertial = root.first("inertial") if root is not None else None
     if inertial is not None and subject.parts.joints:
         message = f"the inertial of root link '{subject.parts.root}' is ignored: the robot stands on it"
-        yield Finding("URDF110", message, inertial.place, "put an empty root link before it for KDL", "note")
+        yield Diagnostic("URDF110", message, inertial.place, "put an empty root link before it for KDL", "note")
 
 
 @check(
@@ -161,7 +161,7 @@ def _root_inertia(subject: Subject) -> Iterator[Finding]:
     "note",
     bad=one_joint().replace('<link name="base"/>', f'<link name="base">{CUBE}</link>'),
 )
-def _no_inertial(subject: Subject) -> Iterator[Finding]:
+def _no_inertial(subject: Subject) -> Iterator[Diagnostic]:
     """A link that has a shape has no inertial; it counts as having no mass.
 
     Fine for a base that stands still; fixed to a moving link it makes the arm lighter than it is. PyBullet would
@@ -173,11 +173,11 @@ def _no_inertial(subject: Subject) -> Iterator[Finding]:
         shaped = link.first("visual") is not None or link.first("collision") is not None
         if shaped and link.first("inertial") is None and name not in moved:
             message = f"link '{name}' has no inertial: it counts as having no mass"
-            yield Finding("URDF111", message, link.place, None, "note")
+            yield Diagnostic("URDF111", message, link.place, None, "note")
 
 
 @check("URDF112", "heavy-link", "physics", "warning", bad=one_joint(tip=INERTIAL.replace('value="1"', 'value="20000"')))
-def _heavy_link(subject: Subject) -> Iterator[Finding]:
+def _heavy_link(subject: Subject) -> Iterator[Diagnostic]:
     """A link is heavier than anything of its size can be, or than 10 t.
 
     A mass in grams or a mesh in millimetres taken for metres gives it; no motor moves such a link, and beside light
@@ -200,4 +200,4 @@ def _heavy_link(subject: Subject) -> Iterator[Finding]:
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("mass") or element).place
         message = f"link '{link.name}' has mass {digits(mass)} kg: {why}"
-        yield Finding("URDF112", message, place, "URDF counts in kg and m", "warning")
+        yield Diagnostic("URDF112", message, place, "URDF counts in kg and m", "warning")

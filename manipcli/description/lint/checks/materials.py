@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import did_you_mean, shorten
 from manipcli.description.lint.check import Subject, check
 from manipcli.description.lint.samples import robot
@@ -20,7 +20,7 @@ from manipcli.description.urdf.schema_table import known_elements
         '<link name="base"><visual><geometry><box size="1 1 1"/></geometry><material name="red"/></visual></link>'
     ),
 )
-def _undefined_material(subject: Subject) -> Iterator[Finding]:
+def _undefined_material(subject: Subject) -> Iterator[Diagnostic]:
     """A material is used and nowhere defined, or has no name.
 
     The shape gets a colour that the program likes; some parsers refuse the file.
@@ -30,12 +30,12 @@ def _undefined_material(subject: Subject) -> Iterator[Finding]:
     for material in materials:
         name = material.attributes.get("name", "")
         if material.children and "name" not in material.attributes:  # an empty one is common, and read
-            yield Finding("URDF063", "a material has no name", material.place, 'name="..."', "warning")
+            yield Diagnostic("URDF063", "a material has no name", material.place, 'name="..."', "warning")
         if material.children or name in defined:
             continue
         what = f"material '{name}' has no colour anywhere" if name else "a material has neither a name nor a colour"
         near = did_you_mean(name, sorted(defined), kind="materials") if len(defined) < 100 else None
-        yield Finding("URDF063", what, material.place, near or "give it a <color rgba=.../>", "warning")
+        yield Diagnostic("URDF063", what, material.place, near or "give it a <color rgba=.../>", "warning")
 
 
 @check(
@@ -48,7 +48,7 @@ def _undefined_material(subject: Subject) -> Iterator[Finding]:
         '<color rgba="255 0 0 1"/></material></visual></link>'
     ),
 )
-def _colour_range(subject: Subject) -> Iterator[Finding]:
+def _colour_range(subject: Subject) -> Iterator[Diagnostic]:
     """A colour is not within 0 and 1.
 
     Colours are shares of 1, not of 255: what is larger is drawn white, or as nothing.
@@ -61,7 +61,7 @@ def _colour_range(subject: Subject) -> Iterator[Finding]:
         if any(value is not None and not 0.0 <= value <= 1.0 for value in values):
             message = f'<color rgba="{shorten(text)}">: expected red, green, blue and opacity from 0 to 1'
             hint = "divide by 255" if any(value is not None and value > 1.0 for value in values) else None
-            yield Finding("URDF064", message, element.place, hint, "warning")
+            yield Diagnostic("URDF064", message, element.place, hint, "warning")
 
 
 @check(
@@ -74,7 +74,7 @@ def _colour_range(subject: Subject) -> Iterator[Finding]:
         '<box size="1 1 1"/></geometry><material name="red"><color rgba="0 1 0 1"/></material></visual></link>'
     ),
 )
-def _redefined_material(subject: Subject) -> Iterator[Finding]:
+def _redefined_material(subject: Subject) -> Iterator[Diagnostic]:
     """A material is defined twice, with different colours.
 
     Programs keep one of the two for all shapes; PyBullet the first.
@@ -87,7 +87,7 @@ def _redefined_material(subject: Subject) -> Iterator[Finding]:
         other = first.setdefault(name, element)
         if _colour(other) != _colour(element):
             message = f"material '{name}' has another colour than at {other.place}"
-            yield Finding("URDF066", message, element.place, "give each colour a name of its own", "warning")
+            yield Diagnostic("URDF066", message, element.place, "give each colour a name of its own", "warning")
 
 
 def _colour(material: Element) -> tuple[float | None, ...] | None:

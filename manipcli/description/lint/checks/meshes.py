@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.description.lint.check import Subject, check, found_while_reading
 from manipcli.description.lint.samples import TETRAHEDRON, ascii_tetrahedron, collada_tetrahedron, one_link
 from manipcli.description.located_xml import Element
@@ -69,7 +69,7 @@ def _scale(element: Element) -> tuple[float, float, float]:
 
 
 @check("URDF033", "missing-visual", "assets", "warning", bad=one_link('filename="package://missing_package/a.stl"'))
-def _missing_visual(subject: Subject) -> Iterator[Finding]:
+def _missing_visual(subject: Subject) -> Iterator[Diagnostic]:
     """A visual mesh or a texture is not found.
 
     The link is not drawn; PyBullet refuses the whole robot for it, so engines are given none.
@@ -81,7 +81,7 @@ def _missing_visual(subject: Subject) -> Iterator[Finding]:
             try:
                 subject.packages.resolve(uri)
             except NotFound as error:
-                yield Finding("URDF033", f"texture: {error.message}", element.place, error.hint, "warning")
+                yield Diagnostic("URDF033", f"texture: {error.message}", element.place, error.hint, "warning")
 
 
 @check(
@@ -92,7 +92,7 @@ def _missing_visual(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.obj"'),
     files=lambda: {"a.obj": binary_stl(TETRAHEDRON)},
 )
-def _mesh_suffix(subject: Subject) -> Iterator[Finding]:
+def _mesh_suffix(subject: Subject) -> Iterator[Diagnostic]:
     """The name of a mesh file says another format than the file has.
 
     Most programs go by the name and fail, or draw nothing; here the content decides.
@@ -107,11 +107,11 @@ def _mesh_suffix(subject: Subject) -> Iterator[Finding]:
                 f"mesh '{mesh.uri}' ends in '{suffix}' and holds {kind.upper() if kind != 'collada' else 'Collada'}"
             )
             ending = next(ending for ending, known in SUFFIXES.items() if known == kind)
-            yield Finding("URDF203", message, mesh.element.place, f"name it *{ending}", "warning")
+            yield Diagnostic("URDF203", message, mesh.element.place, f"name it *{ending}", "warning")
 
 
 @check("URDF204", "absolute-mesh", "assets", "warning", bad=one_link('filename="file:///home/somebody/robot/base.stl"'))
-def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
+def _absolute_mesh(subject: Subject) -> Iterator[Diagnostic]:
     """A mesh is named by an absolute path.
 
     The description works on the machine it was written on and on no other.
@@ -121,7 +121,7 @@ def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
         windows = bool(PureWindowsPath(uri).drive)
         if uri.startswith("file:") or PurePosixPath(uri).is_absolute() or windows:
             message = f"mesh '{uri}' is named by an absolute path, which no other machine has"
-            yield Finding(
+            yield Diagnostic(
                 "URDF204", message, mesh.element.place, "use package://NAME/path or a relative path", "warning"
             )
 
@@ -134,7 +134,7 @@ def _absolute_mesh(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.stl"'),
     files=lambda: {"a.stl": binary_stl(TETRAHEDRON * 300.0)},
 )
-def _mesh_unit(subject: Subject) -> Iterator[Finding]:
+def _mesh_unit(subject: Subject) -> Iterator[Diagnostic]:
     """A mesh is longer than 10 m or shorter than 1 mm: another unit?
 
     STL and OBJ state no unit and URDF counts in metres; an arm of 300 m is one drawn in millimetres.
@@ -150,7 +150,7 @@ def _mesh_unit(subject: Subject) -> Iterator[Finding]:
         large = size > LARGEST
         message = f"mesh '{mesh.uri}' is {size:.3g} m long: " + ("is it in millimetres?" if large else "scaled twice?")
         hint = 'scale="0.001 0.001 0.001"' if large else "leave the scale out"
-        yield Finding("URDF206", message, mesh.element.place, hint, "warning")
+        yield Diagnostic("URDF206", message, mesh.element.place, hint, "warning")
 
 
 @check(
@@ -161,7 +161,7 @@ def _mesh_unit(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.stl"', role="collision"),
     files=lambda: {"a.stl": binary_stl(np.tile(TETRAHEDRON, (MANY_TRIANGLES // 4 + 1, 1, 1)))},
 )
-def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
+def _mesh_triangles(subject: Subject) -> Iterator[Diagnostic]:
     """A collision mesh has more than 200 000 triangles.
 
     Every load reads it all (seconds for a million), for a hull that needs a hundred. 2 000 000 are refused.
@@ -170,7 +170,7 @@ def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
         facts = mesh.facts
         if mesh.role == "collision" and facts is not None and facts.triangles > MANY_TRIANGLES:
             message = f"collision mesh '{mesh.uri}' has {facts.triangles} triangles; {MANY_TRIANGLES} are many"
-            yield Finding(
+            yield Diagnostic(
                 "URDF207", message, mesh.element.place, "use a simplified mesh, or a box or cylinder", "warning"
             )
 
@@ -183,7 +183,7 @@ def _mesh_triangles(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.stl"'),
     files=lambda: {"a.stl": ascii_tetrahedron()},
 )
-def _ascii_stl(subject: Subject) -> Iterator[Finding]:
+def _ascii_stl(subject: Subject) -> Iterator[Diagnostic]:
     """An STL file is written as text.
 
     PyBullet, among others, takes it for empty without a word; engines get a binary one here.
@@ -192,7 +192,7 @@ def _ascii_stl(subject: Subject) -> Iterator[Finding]:
         facts = mesh.facts
         if facts is not None and facts.format == "stl-ascii":
             message = f"mesh '{mesh.uri}' is an STL file of text, which some programs cannot read; here it is converted"
-            yield Finding("URDF208", message, mesh.element.place, "save it as binary STL", "note")
+            yield Diagnostic("URDF208", message, mesh.element.place, "save it as binary STL", "note")
 
 
 @check(
@@ -203,7 +203,7 @@ def _ascii_stl(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.stl" scale="1 -1 1"'),
     files=lambda: {"a.stl": binary_stl(TETRAHEDRON)},
 )
-def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
+def _mirrored_mesh(subject: Subject) -> Iterator[Diagnostic]:
     """A mesh is mirrored by a negative scale.
 
     Legal and common for left and right parts; some programs draw such a mesh inside out.
@@ -212,7 +212,7 @@ def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
         if min(mesh.scale) < 0.0:
             shown = " ".join(f"{value:g}" for value in mesh.scale)
             message = f"mesh '{mesh.uri}' is mirrored by its scale {shown}"
-            yield Finding("URDF209", message, mesh.element.place, None, "note")
+            yield Diagnostic("URDF209", message, mesh.element.place, None, "note")
 
 
 @check(
@@ -223,7 +223,7 @@ def _mirrored_mesh(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="a.dae"'),
     files=lambda: {"a.dae": collada_tetrahedron(up_axis="Y_UP")},
 )
-def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
+def _collada_up_axis(subject: Subject) -> Iterator[Diagnostic]:
     """A Collada file states an up axis other than z, or none.
 
     RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and three.js
@@ -234,7 +234,7 @@ def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
         if facts is not None and facts.up_axis != "Z_UP":
             said = f"the up axis {facts.up_axis}" if facts.up_axis else "no up axis, which stands for Y_UP"
             message = f"mesh '{mesh.uri}' states {said}; it changes nothing here, as in RViz"
-            yield Finding("URDF211", message, mesh.element.place, "export it with z up: programs differ", "note")
+            yield Diagnostic("URDF211", message, mesh.element.place, "export it with z up: programs differ", "note")
 
 
 @check(
@@ -245,7 +245,7 @@ def _collada_up_axis(subject: Subject) -> Iterator[Finding]:
     bad=one_link('filename="text.stl"'),
     files=lambda: {"text.stl": b"<!DOCTYPE html><html>404 not found</html>"},
 )
-def _unusable_visual(subject: Subject) -> Iterator[Finding]:
+def _unusable_visual(subject: Subject) -> Iterator[Diagnostic]:
     """A visual mesh is damaged, empty, too large, or of a format that is not read.
 
     The link is not drawn. An engine that reads it may crash, so it is given none.
@@ -257,4 +257,4 @@ def _unusable_visual(subject: Subject) -> Iterator[Finding]:
             mesh_facts(mesh.path)
         except UnusableMesh as error:
             message = f"visual mesh '{mesh.uri}' {error.reason}"
-            yield Finding("URDF212", message, mesh.element.place, error.hint, "warning")
+            yield Diagnostic("URDF212", message, mesh.element.place, error.hint, "warning")

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding
+from manipcli.core.errors import Diagnostic
 from manipcli.core.text import shorten
 from manipcli.description.lint.check import Subject, check, found_while_reading
 from manipcli.description.lint.rigid import elements_by_name
@@ -15,7 +15,7 @@ ALLOWED: Final = re.compile(r"[A-Za-z0-9_.\-]+")
 
 
 @check("URDF050", "robot-name", "schema", "warning", bad='<robot><link name="base"/></robot>')
-def _robot_name(subject: Subject) -> Iterator[Finding]:
+def _robot_name(subject: Subject) -> Iterator[Diagnostic]:
     """<robot> has no name, or a version that URDF does not have.
 
     The specification asks for a name, and most parsers refuse a description without one (PyBullet and Drake do);
@@ -26,7 +26,7 @@ def _robot_name(subject: Subject) -> Iterator[Finding]:
     version = root.attributes.get("version", "1.0").strip()
     if version not in VERSIONS:
         message = f"<robot> is of version '{shorten(version)}'; URDF has {', '.join(VERSIONS)}"
-        yield Finding("URDF050", message, root.place, "leave it out", "warning")
+        yield Diagnostic("URDF050", message, root.place, "leave it out", "warning")
 
 
 @check(
@@ -39,7 +39,7 @@ def _robot_name(subject: Subject) -> Iterator[Finding]:
         '<geometry><sphere radius="1"/></geometry></visual></link>'
     ),
 )
-def _shared_name(subject: Subject) -> Iterator[Finding]:
+def _shared_name(subject: Subject) -> Iterator[Diagnostic]:
     """Two visuals or two collisions of a link have the same name.
 
     Programs that find shapes by name (Drake, MoveIt) rename or lose the second.
@@ -51,12 +51,12 @@ def _shared_name(subject: Subject) -> Iterator[Finding]:
                 name = element.name
                 if name and name in seen:
                     message = f"two <{tag}> of link '{link.attributes.get('name', '')}' are named '{name}'"
-                    yield Finding("URDF068", message, element.place, severity="note")
+                    yield Diagnostic("URDF068", message, element.place, severity="note")
                 seen.add(name)
 
 
 @check("URDF331", "ros-names", "readiness", "warning", bad=one_joint().replace('"tip"', '"the tip"'))
-def _ros_names(subject: Subject) -> Iterator[Finding]:
+def _ros_names(subject: Subject) -> Iterator[Diagnostic]:
     """The name of a link or joint has characters that ROS 2 refuses in names.
 
     Joints become parameters and interfaces there, links become frames: letters, digits and _ work, a space or /
@@ -67,4 +67,4 @@ def _ros_names(subject: Subject) -> Iterator[Finding]:
         for name, element in elements_by_name(subject.description.root, tag).items():
             if name and not ALLOWED.fullmatch(name):
                 hint = f"'{re.sub(r'[^A-Za-z0-9_]+', '_', name).strip('_') or tag}'"
-                yield Finding("URDF331", f"ROS 2 refuses the name of {tag} '{name}'", element.place, hint, "warning")
+                yield Diagnostic("URDF331", f"ROS 2 refuses the name of {tag} '{name}'", element.place, hint, "warning")

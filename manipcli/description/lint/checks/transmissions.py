@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from manipcli.core.errors import Finding, Severity
+from manipcli.core.errors import Diagnostic, Severity
 from manipcli.core.text import did_you_mean
 from manipcli.description.elements import TransmissionTag
 from manipcli.description.lint.check import Subject, check
@@ -30,7 +30,7 @@ _UNREAD = (
 @check(
     "URDF310", "transmission-type", "readiness", "warning", bad=one_joint(more=transmission(kind="Simpletransmission"))
 )
-def _type(subject: Subject) -> Iterator[Finding]:
+def _type(subject: Subject) -> Iterator[Diagnostic]:
     """A transmission is of a type that is not known.
 
     It is left out: commands go to the joint as if there were no gear.
@@ -40,7 +40,7 @@ def _type(subject: Subject) -> Iterator[Finding]:
             kind = found.element.first("type") or found.element.first("plugin") or found.element
             message = f"transmission '{found.name}' is of the unknown type '{found.type}'"
             hint = did_you_mean(found.type, list(SIZES)) or "known: " + ", ".join(SIZES)
-            yield Finding("URDF310", message, kind.place, hint, "warning")
+            yield Diagnostic("URDF310", message, kind.place, hint, "warning")
 
 
 @check(
@@ -49,7 +49,7 @@ def _type(subject: Subject) -> Iterator[Finding]:
     "readiness",
     bad=one_joint(more=transmission() + transmission().replace('"t"', '"u"')),
 )
-def _shared(subject: Subject) -> Iterator[Finding]:
+def _shared(subject: Subject) -> Iterator[Diagnostic]:
     """A joint or actuator belongs to two transmissions, or to two unlike ones of ROS 1 and ros2_control.
 
     Each of them would set its position; which one wins depends on the order of loading.
@@ -68,11 +68,11 @@ def _shared(subject: Subject) -> Iterator[Finding]:
                 shared_joint = tag == "joint"
                 severity: Severity = "error" if shared_joint else "warning"
                 message = f"transmission '{found.name}': {tag} '{name}' belongs to transmission '{owner.name}' already"
-                yield Finding("URDF311", message, element.place, f"each {tag} has one transmission", severity)
+                yield Diagnostic("URDF311", message, element.place, f"each {tag} has one transmission", severity)
     yield from _unlike(subject)
 
 
-def _unlike(subject: Subject) -> Iterator[Finding]:
+def _unlike(subject: Subject) -> Iterator[Diagnostic]:
     """Gears of ros2_control that are others than those that ROS 1 has of the same joints, which are read first."""
     first: dict[str, TransmissionTag] = {}
     for found, tag in zip(transmissions(subject), subject.parts.transmissions, strict=True):
@@ -84,7 +84,7 @@ def _unlike(subject: Subject) -> Iterator[Finding]:
                     f"transmission '{found.name}' of ros2_control is another gear for joint '{joint}' than "
                     f"'{first[joint].name}' of ROS 1, which counts"
                 )
-                yield Finding("URDF311", message, found.element.place, "make them alike, or take one out", "warning")
+                yield Diagnostic("URDF311", message, found.element.place, "make them alike, or take one out", "warning")
                 break
 
 
@@ -108,7 +108,7 @@ def _gear(tag: TransmissionTag) -> tuple[object, ...]:
         + "</transmission>"
     ),
 )
-def _roles(subject: Subject) -> Iterator[Finding]:
+def _roles(subject: Subject) -> Iterator[Diagnostic]:
     """A transmission does not say by roles which joint and actuator is which.
 
     A differential or a four-bar linkage maps its two joints in different ways; ros2_control sorts them by name and
@@ -124,14 +124,14 @@ def _roles(subject: Subject) -> Iterator[Finding]:
                 shown = " and ".join(f"'{each}'" if each else "none" for each in roles)
                 expected = f"{tag}1 and {tag}2"
                 message = f"transmission '{found.name}': its {tag}s have the roles {shown}; expected {expected}"
-                yield Finding("URDF312", message, elements[0].place, how.format(tag))
+                yield Diagnostic("URDF312", message, elements[0].place, how.format(tag))
             elif not pairs and not found.ros1 and "" in roles:
                 message = f"transmission '{found.name}': {'an' if tag == 'actuator' else 'a'} {tag} has no role"
-                yield Finding("URDF312", message, elements[roles.index("")].place, how.format(tag))
+                yield Diagnostic("URDF312", message, elements[roles.index("")].place, how.format(tag))
             names = [element.name for element in elements]
             if pairs and len(names) == 2 and names[0] and names[0] == names[1]:
                 message = f"transmission '{found.name}': {tag} '{names[0]}' has both roles; expected two {tag}s"
-                yield Finding("URDF312", message, elements[1].place, None)
+                yield Diagnostic("URDF312", message, elements[1].place, None)
 
 
 @check(
@@ -140,7 +140,7 @@ def _roles(subject: Subject) -> Iterator[Finding]:
     "readiness",
     bad=one_joint(more=transmission(GEARED + MOTOR + MOTOR.replace('"m"', '"n"'))),
 )
-def _count(subject: Subject) -> Iterator[Finding]:
+def _count(subject: Subject) -> Iterator[Diagnostic]:
     """A transmission does not have as many joints and actuators as its type takes.
 
     A simple one has one of each, a differential and a four-bar linkage two; ros_control does not load another.
@@ -154,7 +154,7 @@ def _count(subject: Subject) -> Iterator[Finding]:
         if not found.ros1 and joints == count == 1 and actuators == 0:
             continue
         message = f"transmission '{found.name}' has {joints} joints and {actuators} actuators; expected {count} each"
-        yield Finding("URDF313", message, found.element.place, None)
+        yield Diagnostic("URDF313", message, found.element.place, None)
 
 
 @check(
@@ -164,7 +164,7 @@ def _count(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(more=transmission('<joint name="j"/>' + MOTOR)),
 )
-def _hardware_interface(subject: Subject) -> Iterator[Finding]:
+def _hardware_interface(subject: Subject) -> Iterator[Diagnostic]:
     """A joint of a ROS 1 transmission has no hardware interface, or an unknown one.
 
     ros_control then leaves the joint out without an error; no controller finds it.
@@ -177,13 +177,13 @@ def _hardware_interface(subject: Subject) -> Iterator[Finding]:
             if not interfaces:
                 message = f"transmission '{found.name}': joint '{name}' has no <hardwareInterface>"
                 hint = f"<hardwareInterface>hardware_interface/{_meant(found)}</hardwareInterface>"
-                yield Finding("URDF314", message, joint.place, hint, "warning")
+                yield Diagnostic("URDF314", message, joint.place, hint, "warning")
             for interface in interfaces:
                 word = interface.text.strip()
                 if word.rpartition("/")[2] not in INTERFACES:
                     message = f"transmission '{found.name}': joint '{name}' has the unknown hardware interface '{word}'"
                     near = did_you_mean(word.rpartition("/")[2], list(INTERFACES))
-                    yield Finding("URDF314", message, interface.place, near, "warning")
+                    yield Diagnostic("URDF314", message, interface.place, near, "warning")
 
 
 def _meant(found: WrittenTransmission) -> str:
@@ -193,7 +193,7 @@ def _meant(found: WrittenTransmission) -> str:
 
 
 @check("URDF315", "transmission-joint", "readiness", bad=one_joint(kind="fixed", inside="", more=transmission()))
-def _joint(subject: Subject) -> Iterator[Finding]:
+def _joint(subject: Subject) -> Iterator[Diagnostic]:
     """A transmission drives a fixed joint or one that follows another.
 
     A fixed joint does not move, and a mimic joint has no actuator of its own: its position is that of the joint it
@@ -208,7 +208,7 @@ def _joint(subject: Subject) -> Iterator[Finding]:
             severity: Severity = "warning" if joint.moves else "error"
             what = f"follows '{joint.mimic.joint}' (mimic)" if joint.mimic is not None else "is fixed"
             message = f"transmission '{found.name}' drives joint '{joint.name}', which {what}"
-            yield Finding("URDF315", message, element.place, "take the transmission out", severity)
+            yield Diagnostic("URDF315", message, element.place, "take the transmission out", severity)
 
 
 @check(
@@ -218,7 +218,7 @@ def _joint(subject: Subject) -> Iterator[Finding]:
     "warning",
     bad=one_joint(more=transmission(GEARED + '<actuator name="m"/>')),
 )
-def _reduction(subject: Subject) -> Iterator[Finding]:
+def _reduction(subject: Subject) -> Iterator[Diagnostic]:
     """A ROS 1 transmission states no reduction at its actuator.
 
     ros_control wants <mechanicalReduction> there and does not load the transmission without it; here it counts as
@@ -229,13 +229,13 @@ def _reduction(subject: Subject) -> Iterator[Finding]:
             if actuator.first("mechanicalReduction") is None:
                 name = actuator.attributes.get("name", "")
                 message = f"transmission '{found.name}': actuator '{name}' has no <mechanicalReduction>"
-                yield Finding(
+                yield Diagnostic(
                     "URDF316", message, actuator.place, "<mechanicalReduction>1</mechanicalReduction>", "warning"
                 )
 
 
 @check("URDF317", "transmission-name", "readiness", bad=one_joint(more=transmission().replace(' name="t"', "")))
-def _name(subject: Subject) -> Iterator[Finding]:
+def _name(subject: Subject) -> Iterator[Diagnostic]:
     """A transmission has no name, or one that another has.
 
     ros_control and ros2_control find transmissions by name, and load no other.
@@ -244,14 +244,14 @@ def _name(subject: Subject) -> Iterator[Finding]:
     for found in transmissions(subject):
         name = found.element.name
         if not name:
-            yield Finding("URDF317", f"a {found.type} has no name", found.element.place, 'name="..."')
+            yield Diagnostic("URDF317", f"a {found.type} has no name", found.element.place, 'name="..."')
         elif (found.ros1, name) in seen:
-            yield Finding("URDF317", f"transmission '{name}' is written twice", found.element.place, None)
+            yield Diagnostic("URDF317", f"transmission '{name}' is written twice", found.element.place, None)
         seen.add((found.ros1, name))
 
 
 @check("URDF318", "transmission-unread", "readiness", "warning", bad=one_joint(more=transmission(_UNREAD + MOTOR)))
-def _unread(subject: Subject) -> Iterator[Finding]:
+def _unread(subject: Subject) -> Iterator[Diagnostic]:
     """A simple transmission states a reduction where nobody reads it.
 
     ros_control reads the reduction of the actuator, ros2_control that of the joint; each leaves the other out
@@ -266,4 +266,4 @@ def _unread(subject: Subject) -> Iterator[Finding]:
             if child is None or finite(child.text) in (None, 1.0):
                 continue
             message = f"transmission '{found.name}': the reduction {child.text} of its {element.tag} is not read"
-            yield Finding("URDF318", message, child.place, f"write it at the {read}", "warning")
+            yield Diagnostic("URDF318", message, child.place, f"write it at the {read}", "warning")

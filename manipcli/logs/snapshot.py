@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from manipcli.conditions.state_window import ROUNDING
-from manipcli.core.errors import Finding, InvalidInput
+from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.geometry import Array, Transform
 from manipcli.judge.measures.reference import references
 from manipcli.judge.steps import step_outcomes
@@ -26,7 +26,7 @@ from manipcli.record.foreign.units import joint_units
 from manipcli.record.messages import WORLD
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording, Span, TaskEvent
-from manipcli.report.moment import JointMoment, Moment, PoseMoment
+from manipcli.report.snapshot import JointMoment, Moment, PoseMoment
 
 
 def moment(path: Path, time: float) -> Moment:
@@ -38,7 +38,7 @@ def moment(path: Path, time: float) -> Moment:
     found = open_topics(path, damaged=True)
     if not 0.0 <= time <= found.duration + ROUNDING:
         message = f"{path.name} goes from 0 s to {found.duration:.3f} s: there is nothing at {time:g} s"
-        raise InvalidInput([Finding("LOG110", message)])
+        raise InvalidInput([Diagnostic("LOG110", message)])
     if RECORD not in found.metadata:
         return _others(path, found, time, why="manipcli did not write it")
     try:
@@ -71,7 +71,7 @@ def _ours(path: Path, time: float) -> Moment:
     missing += [recording.unknown(topic) for topic in (TF, CONTACTS, EVENTS) if recording.unknown(topic)]
     span, k, touched, end = _at(recording.spans, time)
     if span is None:
-        raise InvalidInput([Finding("LOG111", f"{path.name} holds no state until {time:g} s")])
+        raise InvalidInput([Diagnostic("LOG111", f"{path.name} holds no state until {time:g} s")])
     states = span.states
     now = float(states.time[k])
     wanted = references(span.controllers, recording.joint_names, len(states.time))[k]

@@ -10,7 +10,7 @@ import numpy as np
 
 from manipcli.conditions.condition import Seen
 from manipcli.conditions.robustness import NotEvaluated
-from manipcli.conditions.state_window import Moments, Reference, StepTime, Touching
+from manipcli.conditions.state_window import Reference, StateWindow, StepTime, Touching
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import WorldState
@@ -77,7 +77,7 @@ def unrecorded(recording: Recording) -> dict[Seen, str]:
     return found
 
 
-def at_every_tick(moments: Moments, since: Moments | None, period: float) -> Moments:
+def at_every_tick(window: StateWindow, since: StateWindow | None, period: float) -> StateWindow:
     """The moments of a thinned log at all control ticks, `period` [s] apart, up to the last of them; for conditions
     that look at no state, of which it holds none there.
 
@@ -87,19 +87,19 @@ def at_every_tick(moments: Moments, since: Moments | None, period: float) -> Mom
         period: of control; 0 where the log does not say it.
     """
     if not period:
-        return moments
-    last = round(float(moments.times[-1]) / period)
-    first = round(float(moments.times[0]) / period) if since is None else round(float(since.times[-1]) / period) + 1
+        return window
+    last = round(float(window.times[-1]) / period)
+    first = round(float(window.times[0]) / period) if since is None else round(float(since.times[-1]) / period) + 1
     count = last - first + 1
-    if count <= len(moments.times) or count > MOST_TICKS:
-        return moments
+    if count <= len(window.times) or count > MOST_TICKS:
+        return window
     times = np.round(np.arange(first, last + 1) * period, 9)
-    unknown = moments.states.map(lambda a: np.broadcast_to(np.nan, (count, *a.shape[1:])))
+    unknown = window.states.map(lambda a: np.broadcast_to(np.nan, (count, *a.shape[1:])))
     before = None if since is None else since.states.map(lambda a: a[-1])
-    return replace(moments, states=replace(unknown, time=times), before=before, references=())
+    return replace(window, states=replace(unknown, time=times), before=before, references=())
 
 
-class MomentsOfSpans:
+class WindowsOfSpans:
     """Spans in, moments out, one after the other; keeps what the next ones need of the last."""
 
     def __init__(self, order: Order, steps: Sequence[StepOutcome]) -> None:
@@ -107,12 +107,12 @@ class MomentsOfSpans:
         self._steps = tuple(
             StepTime(one.id, one.started, one.ended, "" if one.ended is None else one.outcome) for one in steps
         )
-        self._last: Moments | None = None
+        self._last: StateWindow | None = None
 
-    def next(self, span: Span) -> Moments:
+    def next(self, span: Span) -> StateWindow:
         """The ticks of the span, of which there is one at least."""
         held = self._last.contacts[-1:] if self._last is not None else ()
-        self._last = Moments(
+        self._last = StateWindow(
             states=self._order.applied(span.states),
             before=None if self._last is None else self._last.states.map(lambda a: a[-1]),
             references=tuple(Reference(trace.joints, trace.reference_position) for trace in span.controllers),

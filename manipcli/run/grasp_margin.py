@@ -16,7 +16,7 @@ AMPLE = 3.0
 """Friction that carries this many times the weight is not what a held thing was lost for."""
 
 
-class Holding:
+class GraspMargin:
     """Remembers each grasp, to say why what was taken is no longer there.
 
     Args:

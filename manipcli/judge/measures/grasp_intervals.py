@@ -69,7 +69,7 @@ class Slip:
 
 
 @dataclass(frozen=True, slots=True)
-class HoldFacts:
+class GraspFacts:
     """A hold, measured from `grasped` to `until`.
 
     Attributes:
@@ -89,7 +89,7 @@ class HoldFacts:
     rotation: Slip | None
 
 
-def find_holds(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], float]:
+def find_grasps(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], float]:
     """Every hold of a recording, in the order of time, in one pass; and the time [s] of its last tick."""
     movable = [body.name for body in scene.movable]
     standing = {body.name for body in scene.bodies if body.fixed}
@@ -176,7 +176,7 @@ class _Stretches:
         return self._done + last
 
 
-class HoldMeter:
+class GraspMeter:
     """Measures one hold while the spans of the recording go by.
 
     Args:
@@ -239,10 +239,10 @@ class HoldMeter:
             for link, force in forces.items():
                 self._links[link] = max(force, self._links.get(link, 0.0))
 
-    def finish(self) -> HoldFacts:
+    def finish(self) -> GraspFacts:
         """What was measured."""
         self._pass(self._hold.until)
-        return HoldFacts(
+        return GraspFacts(
             self._hold,
             force=self._force.spread(),
             touching=self._touching.spread(),

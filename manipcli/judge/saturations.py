@@ -18,7 +18,7 @@ MOST_CUT: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Cuts:
+class Saturations:
     """Ticks, of `ticks` in all, in which joints' commands were cut at their limits, and actuators had no more to give.
 
     Names of which the count is 0 count as absent. `kinds`: by kind of limit (position, velocity, ...) and joint, in how
@@ -31,7 +31,7 @@ class Cuts:
     kinds: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
 
     @classmethod
-    def from_metadata(cls, metadata: Mapping[str, Mapping[str, str]], *, end: float, period: float) -> Cuts:
+    def from_metadata(cls, metadata: Mapping[str, Mapping[str, str]], *, end: float, period: float) -> Saturations:
         """What a log says whose last tick is at `end` [s]; what is no number in it is left out."""
         ticks = round(end / period) + 1 if period > 0.0 else 0
         joints, actuators, limits = (
@@ -51,9 +51,9 @@ class Cuts:
         found = {what: {name: str(count) for name, count in counts.items() if count} for what, counts in told.items()}
         return {what: counts for what, counts in found.items() if counts}
 
-    def since(self, before: Cuts) -> Cuts:
+    def since(self, before: Saturations) -> Saturations:
         """What was added since then."""
-        return Cuts(
+        return Saturations(
             {name: count - before.joints.get(name, 0) for name, count in self.joints.items()},
             {name: count - before.actuators.get(name, 0) for name, count in self.actuators.items()},
             self.ticks - before.ticks,

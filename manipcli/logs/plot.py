@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
-from manipcli.core.errors import Finding, InvalidInput, Place
+from manipcli.core.errors import Diagnostic, InvalidInput, Place
 from manipcli.core.text import did_you_mean, escape, listed, shorten
 from manipcli.core.units import NUMBER, TIME, UnitError, to_si
 from manipcli.judge.steps import step_outcomes
@@ -56,22 +56,22 @@ def open_chart(
     opened = [_Log(path, name) for path, name in zip(logs, map(escape, _short_names(logs)), strict=True)]
     first, last = _time(start, opened, begin=True), _time(end, opened, begin=False)
     if first >= last:
-        raise InvalidInput([Finding("PLOT003", f"nothing lies between --from {start} and --to {end}")])
+        raise InvalidInput([Diagnostic("PLOT003", f"nothing lies between --from {start} and --to {end}")])
     asked = [tuple(_split(word)) for word in words] or _overview(opened)
     if not asked:
         found = [topic.name for one in opened for topic in one.topics.all.values() if topic.definition]
         hint = f"say TOPIC.FIELD; topics: {listed(found)}" if found else "it has no topic of ROS 2 messages"
-        raise InvalidInput([Finding("PLOT001", "these logs have nothing that is shown by itself", hint=hint)])
+        raise InvalidInput([Diagnostic("PLOT001", "these logs have nothing that is shown by itself", hint=hint)])
     panels: _Panels = {}
     for one in opened:
         for number, group in enumerate(asked):
             one.read(group, number, panels, first, last)
             if sum(map(len, panels.values())) > MAX_CURVES:
                 hint = "pick elements in brackets: [joint_1]"
-                raise InvalidInput([Finding("PLOT005", f"more than {MAX_CURVES} curves are asked for", hint=hint)])
+                raise InvalidInput([Diagnostic("PLOT005", f"more than {MAX_CURVES} curves are asked for", hint=hint)])
     if not panels:
         what = f" of {listed(words)}" if words else ""
-        raise InvalidInput([Finding("PLOT004", f"there is no value{what} in that time")])
+        raise InvalidInput([Diagnostic("PLOT004", f"there is no value{what} in that time")])
     missing = [word for number, word in enumerate(words) if number not in {head.word for head in panels}]
     steps = next((one.steps for one in opened if one.steps), ())
     ends = [one.duration for one in opened]
@@ -229,7 +229,7 @@ class _Log:
         return joint_units(urdf.encode())
 
     def _refused(self, code: str, message: str, hint: str | None = None) -> InvalidInput:
-        return InvalidInput([Finding(code, message, Place(str(self.path), 0, 0), hint)])
+        return InvalidInput([Diagnostic(code, message, Place(str(self.path), 0, 0), hint)])
 
 
 def _steps(path: Path) -> tuple[Interval, ...]:
@@ -289,7 +289,7 @@ def _time(text: str | None, logs: Sequence[_Log], *, begin: bool) -> float:
         steps = [step.name for one in logs for step in one.steps]
         hint = did_you_mean(text, steps, kind="steps") or "these logs have no steps"
         message = f"{'--from' if begin else '--to'}: '{shorten(text)}' is neither a time nor a step"
-        raise InvalidInput([Finding("PLOT003", message, hint=hint)]) from None
+        raise InvalidInput([Diagnostic("PLOT003", message, hint=hint)]) from None
 
 
 def _short_names(logs: Sequence[Path]) -> list[str]:
