@@ -15,7 +15,7 @@ from manipcli.control.feed_forward import Index
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.plan.step import Strictness, Switch
+from manipcli.plan.motion import Strictness, Switch
 
 ControllerState = Literal["unconfigured", "inactive", "active"]
 

@@ -36,7 +36,7 @@ from manipcli.control.lifecycle import (
 from manipcli.core.errors import Diagnostic, InvalidArgument, InvalidInput, ManipcliError
 from manipcli.core.geometry import Array
 from manipcli.core.text import did_you_mean
-from manipcli.plan.step import Strictness, Switch
+from manipcli.plan.motion import Strictness, Switch
 from manipcli.spec.controllers import Interface
 
 

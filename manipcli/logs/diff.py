@@ -7,10 +7,10 @@ from pathlib import Path
 from manipcli.judge.measures.step_measures import step_measures
 from manipcli.judge.saturations import ACTUATORS, JOINTS, LIMITS
 from manipcli.logs.judge_log import judge_recording
-from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_robot
 from manipcli.record.channels import EVENTS, ROSOUT
 from manipcli.record.foreign.compare import Comparison, compare_logs
+from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.compare_entries import compare_entries
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import Recording

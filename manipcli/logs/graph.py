@@ -15,11 +15,11 @@ from manipcli.control.controller import Controller
 from manipcli.control.factory import build_controllers
 from manipcli.control.roles import is_follower, is_hand
 from manipcli.core.text import number_of
-from manipcli.logs.other_log import is_own
 from manipcli.logs.recorded_files import recorded_controllers_file, recorded_robot, recorded_scene, recorded_task_file
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.channels import channel_table
+from manipcli.record.foreign.origin import is_own
 from manipcli.record.foreign.topics import Topic, open_topics
 from manipcli.record.read.reading import open_recording
 from manipcli.record.selection import PLOTTED, Selection, word

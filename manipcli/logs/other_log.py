@@ -23,13 +23,11 @@ from manipcli.model.build_robot import bare_robot
 from manipcli.model.robot import RobotModel
 from manipcli.record import channels
 from manipcli.record.cdr import CdrError, CdrReader
-from manipcli.record.contents import RECORD
 from manipcli.record.faults import BadRecording
 from manipcli.record.foreign.namespaces import TYPES, meant, namespaces
 from manipcli.record.foreign.snapshot import joint_state, transforms
 from manipcli.record.foreign.topics import Topics, open_topics
 from manipcli.record.read.chunk import singly
-from manipcli.record.read.salvage import Salvage
 from manipcli.replay.drawing import WORLD
 from manipcli.replay.playback import Playback
 from manipcli.scene.scene import Body, Scene
@@ -38,17 +36,6 @@ LEAST_STEADY = 1e-6
 """[m], and of a quaternion's parts: a frame that moves by less stands still."""
 MAX_TIMES = 200_000
 """Of what is shown: more than an hour at the usual rate."""
-
-
-def is_own(path: Path) -> bool:
-    """Whether manipcli wrote a log: such a one says what it holds before its first message.
-
-    Raises:
-        BadRecording: it is no MCAP file, or damaged.
-    """
-    from mcap.records import Metadata
-
-    return any(isinstance(piece, Metadata) and piece.name == RECORD for piece in Salvage(path))
 
 
 @dataclass(slots=True)

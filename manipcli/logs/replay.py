@@ -14,10 +14,11 @@ from manipcli.judge.measures.reference import references
 from manipcli.judge.verdict import StepOutcome, Verdict
 from manipcli.logs.judge_log import judge_recording
 from manipcli.logs.mesh_search import MeshSearch
-from manipcli.logs.other_log import is_own, open_other
+from manipcli.logs.other_log import open_other
 from manipcli.logs.recorded_files import recorded_robot, recorded_scene
 from manipcli.record.channels import TF
 from manipcli.record.faults import LEFT_OUT, Thinned
+from manipcli.record.foreign.origin import is_own
 from manipcli.record.read.reading import open_recording
 from manipcli.record.recording import TaskEvent
 from manipcli.replay.playback import RATE, Phase, Playback, PlaybackStep

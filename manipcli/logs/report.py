@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -233,12 +232,10 @@ def limit_of(spec: Model, unit: str) -> float | None:
 
 
 def _picture(frames: Frames, time: float) -> Picture:
-    from PIL import Image
+    from manipcli.replay.renderer import webp_bytes
 
     run: Playback = frames.playback
-    stream = io.BytesIO()
-    Image.fromarray(frames.at(time)).save(stream, "WEBP", quality=QUALITY, method=4)
-    return Picture(float(run.times[run.index(time)]), stream.getvalue(), PICTURE)
+    return Picture(float(run.times[run.index(time)]), webp_bytes(frames.at(time), quality=QUALITY), PICTURE)
 
 
 def _provenance(recording: Recording, verdict: Verdict, path: Path) -> tuple[tuple[str, str], ...]:

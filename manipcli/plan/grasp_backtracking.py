@@ -7,8 +7,8 @@ from typing import Final
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array
+from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState
 from manipcli.plan.steps import STEPS
 
 MOST: Final = 7

@@ -18,12 +18,12 @@ from manipcli.plan.hand import closed_on, pressing
 from manipcli.plan.inverse_kinematics import InverseKinematics, Open
 from manipcli.plan.limits import MotionLimits
 from manipcli.plan.line import Walk, timed_line
+from manipcli.plan.motion import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.path import ANGULAR_STEP, follow_poses, linear_path
 from manipcli.plan.planner import NOTHING, Pairs, Planner
 from manipcli.plan.prediction import carried_along, put, spilled
 from manipcli.plan.rest_to_rest import rest_to_rest
 from manipcli.plan.sampling import LONGEST
-from manipcli.plan.step import CLOSING, Grip, Motion, PlanningState, StepPlan
 from manipcli.plan.sweep import grip_time, refuse_collision
 from manipcli.plan.trajectory import CUBIC, JointTrajectory
 from manipcli.plan.verify import verify

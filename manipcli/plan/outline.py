@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from manipcli.plan.step import Motion
+from manipcli.plan.motion import Motion
 
 PLAN_FILE = "plan.json"
 """The attachment with the planned steps: `{"steps": [{"id", "verb", "place", "planned_duration", "motions"}, ...],

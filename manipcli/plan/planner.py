@@ -18,7 +18,7 @@ from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import arm_joints
 from manipcli.plan.hand import moved_links
 from manipcli.plan.inverse_kinematics import InverseKinematics
-from manipcli.plan.step import PlanningState
+from manipcli.plan.motion import PlanningState
 from manipcli.scene.scene import Interior, Scene
 from manipcli.scene.start_overlap import TOLERANCE
 from manipcli.shapes.primitives import Cylinder

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from manipcli.core.geometry import Array, Transform, frozen
+from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Pairs, Planner
-from manipcli.plan.step import PlanningState
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.shapes.primitives import Cylinder
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator
 from manipcli.core.errors import NotPlannable
 from manipcli.core.text import number_of
 from manipcli.core.units import readable
-from manipcli.plan.step import StepPlan
+from manipcli.plan.motion import StepPlan
 from manipcli.spec.base import problem
 from manipcli.spec.quantity import Length
 

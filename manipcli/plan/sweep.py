@@ -9,9 +9,9 @@ from manipcli.core.geometry import Array
 from manipcli.model.collision import RESOLUTION, CollisionQuery
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import ramp
+from manipcli.plan.motion import Grip, PlanningState
 from manipcli.plan.planner import Planner
 from manipcli.plan.sampling import LONGEST
-from manipcli.plan.step import Grip, PlanningState
 from manipcli.plan.trajectory import JointTrajectory
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from manipcli.core.geometry import Array, Transform
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
+from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import ROBOT, Planner
-from manipcli.plan.step import PlanningState
 
 ALONG = 0.5
 """Cosine from which on two directions are taken for one."""

@@ -12,8 +12,8 @@ import numpy as np
 from manipcli.core.geometry import Array
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
+from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState
 from manipcli.preflight.preflight import Subject
 from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task

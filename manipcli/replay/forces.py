@@ -18,10 +18,10 @@ from manipcli.replay.drawing import link_frame
 from manipcli.replay.placing import Poses
 from manipcli.replay.playback import Playback
 from manipcli.shapes.primitives import Geometry
-from manipcli.shapes.proximity import coal_shape
+from manipcli.shapes.proximity import coal_shape, distance
 
 if TYPE_CHECKING:
-    import coal
+    from manipcli.shapes.proximity import CollisionGeometry
 
 LEAST = 0.05
 """[N] below this no arrow is seen."""
@@ -55,7 +55,7 @@ class Forces:
         self._frame = {name: k for k, name in enumerate(geometries, start=1)}
         self._movable = {body.name for body in bodies if not body.fixed}
         self._geometries = geometries
-        self._shapes: dict[str, list[tuple[Transform, coal.CollisionGeometry]]] = {}
+        self._shapes: dict[str, list[tuple[Transform, CollisionGeometry]]] = {}
         strong = [one.force for each in self._contacts for one in each if one.force > LEAST]
         self.scale = LONGEST / float(np.percentile(strong, STRONG)) if strong else 0.0
         """[m/N] length of an arrow."""
@@ -66,27 +66,23 @@ class Forces:
         return tuple(push for push in found if push is not None)
 
     def _push(self, contact: Contact, k: int) -> Push | None:
-        import coal
-
-        a, b = self._of(contact.a), self._of(contact.b)
         X_WA, X_WB = (self._poses_of(name, k) for name in (contact.a, contact.b))
-        nearest, request = np.inf, coal.DistanceRequest()
-        for X_AS, one in a:
-            placed = _placed(X_WA @ X_AS)
-            for X_BS, other in b:
-                result = coal.DistanceResult()
-                distance = coal.distance(one, placed, other, _placed(X_WB @ X_BS), request, result)
-                if distance < nearest:
-                    nearest = distance
-                    point = (result.getNearestPoint1() + result.getNearestPoint2()) / 2.0
-                    normal = np.array(result.normal)
-        if not np.isfinite(nearest) or not np.isfinite(normal).all():
+        found = [
+            distance(one, X_WA @ X_AS, other, X_WB @ X_BS)
+            for X_AS, one in self._of(contact.a)
+            for X_BS, other in self._of(contact.b)
+        ]
+        if not found:
             return None
-        # coal's normal points from the first part to the second; a force on the first has the other sign.
+        nearest = min(found, key=lambda one: one.distance)
+        point, normal = nearest.point, nearest.normal
+        if not np.isfinite(nearest.distance) or not np.isfinite(normal).all():
+            return None
+        # The normal points from the first part to the second; a force on the first has the other sign.
         on_second = contact.a not in self._movable and (contact.b in self._movable or contact.b.startswith("robot/"))
         return Push(point, normal if on_second else -normal, contact.force)
 
-    def _of(self, name: str) -> list[tuple[Transform, coal.CollisionGeometry]]:
+    def _of(self, name: str) -> list[tuple[Transform, CollisionGeometry]]:
         if name not in self._shapes:
             self._shapes[name] = list(_usable(self._geometries.get(name, ())))
         return self._shapes[name]
@@ -96,7 +92,7 @@ class Forces:
         return Transform.of(xyz=self._poses.position[k, frame], quat_xyzw=self._poses.quat_xyzw[k, frame])
 
 
-def _usable(geometries: Sequence[Geometry]) -> list[tuple[Transform, coal.CollisionGeometry]]:
+def _usable(geometries: Sequence[Geometry]) -> list[tuple[Transform, CollisionGeometry]]:
     """The shapes that can be read; a mesh whose file is missing touches nothing that is drawn."""
     found = []
     for one in geometries:
@@ -105,9 +101,3 @@ def _usable(geometries: Sequence[Geometry]) -> list[tuple[Transform, coal.Collis
         except ValueError:
             continue
     return found
-
-
-def _placed(X: Transform) -> coal.Transform3s:
-    import coal
-
-    return coal.Transform3s(X.R, X.p)

@@ -1,5 +1,6 @@
 """Pictures of robots and scenes with Bullet's TinyRenderer: no window, no GPU, the same bytes every time.
 
+from manipcli.simulate.rasterizer import Light, Rasterizer, View
 Bullet draws our surfaces (it reads no file) at twice the size; the average of four pixels smooths the edges.
 """
 
@@ -22,6 +23,7 @@ from manipcli.replay.camera import Camera, framing
 from manipcli.replay.drawing import Drawable, Drawing, draw
 from manipcli.replay.placing import Placing, Poses
 from manipcli.replay.surface import Surface, surface
+from manipcli.simulate.rasterizer import Light, Rasterizer, View
 
 Image = npt.NDArray[np.uint8]
 """(height, width, 3) red, green, blue; row 0 is the top."""
@@ -55,6 +57,15 @@ def png_bytes(image: Image) -> bytes:
 
     stream = BytesIO()
     PillowImage.fromarray(image).save(stream, "PNG", compress_level=9)
+    return stream.getvalue()
+
+
+def webp_bytes(image: Image, *, quality: int) -> bytes:
+    """A picture as WebP; `quality` from 0 to 100."""
+    from PIL import Image as PillowImage
+
+    stream = BytesIO()
+    PillowImage.fromarray(image).save(stream, "WEBP", quality=quality, method=4)
     return stream.getvalue()
 
 
@@ -130,35 +141,20 @@ class _Raster:
 
 
 class _Client:
-    """Some drawables in a client of Bullet."""
+    """Some drawables in a rasterizer of their own."""
 
     def __init__(self, drawing: Drawing, drawables: Sequence[Drawable]) -> None:
-        from manipcli.simulate.quiet import silence
-
-        with silence():  # its banner
-            import pybullet
-
-        self._bullet = pybullet
         frames = {name: k for k, name in enumerate(drawing.frames)}
-        self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._raster = Rasterizer()
         self._bodies = [(self._add(part, one), frames[one.frame]) for one in drawables for part in _parts(one.surface)]
         self._corners = [(frames[one.frame], one.surface.corners) for one in drawables if len(one.surface.vertices)]
 
     def close(self) -> None:
         """Ends the client."""
-        self._bullet.disconnect(self._client)
+        self._raster.close()
 
     def _add(self, part: Surface, drawable: Drawable) -> int:
-        visual = self._bullet.createVisualShape(
-            self._bullet.GEOM_MESH,
-            vertices=part.vertices.tolist(),
-            indices=part.faces.ravel().tolist(),
-            normals=part.normals.tolist(),
-            rgbaColor=list(drawable.rgba),
-            specularColor=[1.0, 1.0, 1.0],
-            physicsClientId=self._client,
-        )
-        return int(self._bullet.createMultiBody(0.0, -1, visual, physicsClientId=self._client))
+        return self._raster.add(part.vertices, part.faces, part.normals, drawable.rgba)
 
     def window(self, poses: Poses, camera: Camera, whole: Window) -> Window | None:
         """The part of a picture that the drawables may cover; None where they are outside of it."""
@@ -182,40 +178,26 @@ class _Client:
     def render(self, poses: Poses, camera: Camera, whole: Window, part: Window) -> _Raster:
         """A part of the whole picture."""
         for body, k in self._bodies:
-            self._bullet.resetBasePositionAndOrientation(
-                body, poses.position[k].tolist(), poses.quat_xyzw[k].tolist(), physicsClientId=self._client
-            )
-        width, height = part.right - part.left, part.bottom - part.top
+            self._raster.place(body, poses.position[k], poses.quat_xyzw[k])
         up = camera.near * math.tan(math.radians(camera.field) / 2.0)
         across = up * whole.right / whole.bottom
-        _, _, pixels, depth, seen = self._bullet.getCameraImage(
-            width,
-            height,
-            self._bullet.computeViewMatrix(camera.eye, camera.target, camera.up),
-            self._bullet.computeProjectionMatrix(
-                across * (2.0 * part.left / whole.right - 1.0),
-                across * (2.0 * part.right / whole.right - 1.0),
-                up * (1.0 - 2.0 * part.bottom / whole.bottom),
-                up * (1.0 - 2.0 * part.top / whole.bottom),
-                camera.near,
-                camera.far,
+        rgb, depth, there = self._raster.render(
+            (part.right - part.left, part.bottom - part.top),
+            View(
+                eye=camera.eye,
+                target=camera.target,
+                up=camera.up,
+                left=across * (2.0 * part.left / whole.right - 1.0),
+                right=across * (2.0 * part.right / whole.right - 1.0),
+                bottom=up * (1.0 - 2.0 * part.bottom / whole.bottom),
+                top=up * (1.0 - 2.0 * part.top / whole.bottom),
+                near=camera.near,
+                far=camera.far,
             ),
-            lightDirection=TO_LIGHT,
-            lightColor=(1.0, 1.0, 1.0),
-            lightAmbientCoeff=AMBIENT,
-            lightDiffuseCoeff=DIFFUSE,
-            lightSpecularCoeff=SPECULAR,
-            shadow=0,
-            renderer=self._bullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
+            Light(TO_LIGHT, ambient=AMBIENT, diffuse=DIFFUSE, specular=SPECULAR),
         )
-        there = np.asarray(seen).reshape(height, width) >= 0
-        rgb = np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
         behind = sky(whole.bottom)[part.top : part.bottom]
-        return _Raster(
-            np.where(there[..., None], rgb, behind),
-            np.where(there, np.asarray(depth, dtype=np.float32).reshape(height, width), np.inf),
-        )
+        return _Raster(np.where(there[..., None], rgb, behind), np.where(there, depth, np.inf))
 
 
 def _averaged(fine: Image) -> Image:

@@ -9,8 +9,9 @@ another page (`Origin`), and has no tunnel. What remains: programs of this machi
 from __future__ import annotations
 
 import http
+import io
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Self
 
 from manipcli.core.errors import ManipcliError
@@ -90,15 +91,9 @@ class LocalServer:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """viser prints banners to stdout through rich, where only results belong."""
-    import rich
-
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
+    """viser prints banners to stdout, where only results belong."""
+    with redirect_stdout(io.StringIO()):
         yield
-    finally:
-        console.quiet = before
 
 
 @contextmanager

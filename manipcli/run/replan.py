@@ -20,8 +20,8 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, frozen, quat_from_matrix
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import Grasp
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.simulate.session import Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain

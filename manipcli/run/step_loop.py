@@ -16,7 +16,7 @@ from manipcli.judge.verdict import StepOutcome
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import GRIP_FORCE, pinch_force, pressing
 from manipcli.model.state import WorldState
-from manipcli.plan.step import Motion, PlanningState
+from manipcli.plan.motion import Motion, PlanningState
 from manipcli.record.write.recorder import Recorder
 from manipcli.run.grasp_margin import GraspMargin
 from manipcli.run.live_conditions import Live, Probe

@@ -15,7 +15,7 @@ from manipcli.control.roles import Follower, Hand, is_follower, is_hand
 from manipcli.core.errors import InvalidArgument
 from manipcli.core.geometry import Array
 from manipcli.model.state import WorldState
-from manipcli.plan.step import Grip, Motion
+from manipcli.plan.motion import Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.session import SLOW, Session
 

@@ -16,9 +16,9 @@ from manipcli.model.configuration import configuration
 from manipcli.plan.claims import Claims
 from manipcli.plan.grasp_backtracking import GraspBacktracking
 from manipcli.plan.hand import SPEED, closing_speed
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.outline import PlanOutline, StepOutline
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.spec.task import StepSpec

@@ -8,7 +8,7 @@ from manipcli.conditions.condition import Problem
 from manipcli.control.lifecycle import ControllerState, decided
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claim, Claims
-from manipcli.plan.step import Switch
+from manipcli.plan.motion import Switch
 from manipcli.plan.steps import STEPS
 from manipcli.spec.task import StepSpec
 

@@ -14,8 +14,8 @@ from manipcli.control.controllers.gripper import GripperSpec
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.plan.hand import closing_speed
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.task.load_task import load_task
 from manipcli.task.plan_task import start_position

@@ -16,8 +16,8 @@ from manipcli.core.geometry import Array, Transform, frozen
 from manipcli.description.elements import Joint, JointLimits, Link
 from manipcli.model.robot import Group, RobotModel
 from manipcli.plan.hand import closing_speed
+from manipcli.plan.motion import Motion, PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, PlanningState, StepPlan
 from manipcli.plan.steps import STEPS
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Shape
 from manipcli.task.load_task import load_task

@@ -13,8 +13,8 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform
 from manipcli.pipeline import run_task
 from manipcli.plan.grasp_backtracking import MOST
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.run import replan
 from manipcli.spec.task import StepSpec
 from manipcli.task.load_task import load_task

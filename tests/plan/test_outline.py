@@ -4,8 +4,8 @@ import json
 
 import pytest
 
+from manipcli.plan.motion import Motion
 from manipcli.plan.outline import PlanOutline, StepOutline
-from manipcli.plan.step import Motion
 
 STEPS = (StepOutline("up", "move", "a.yaml:3:5", 1.25), StepOutline("hold", "wait", "a.yaml:4:5", 0.5))
 

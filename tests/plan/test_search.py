@@ -5,8 +5,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import frozen
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import PlanningState, StepPlan
 
 PLAN = StepPlan(motions=(), end=PlanningState(position=frozen([0.0]), bodies=()))
 

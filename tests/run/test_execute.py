@@ -13,7 +13,7 @@ import pytest
 from manipcli import pipeline
 from manipcli.core.errors import SimulationFailed
 from manipcli.judge.verdict import Verdict
-from manipcli.plan.step import Motion
+from manipcli.plan.motion import Motion
 from manipcli.record.read.reading import read_recording
 from manipcli.run import observer
 from manipcli.run import step_loop as steps_run

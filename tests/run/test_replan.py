@@ -16,8 +16,8 @@ from manipcli.core.geometry import Array, Transform
 from manipcli.model.collision import Carried
 from manipcli.model.grasp import MISPLACED
 from manipcli.model.state import Contact
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepPlan
 from manipcli.run import replan
 from manipcli.run.execute import build_manager
 from manipcli.run.replan import COMMANDED, Measured, after

@@ -12,7 +12,7 @@ import pytest
 
 from manipcli.core.errors import InvalidArgument
 from manipcli.model.state import Contact
-from manipcli.plan.step import Grip, Motion
+from manipcli.plan.motion import Grip, Motion
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate import executor as executor_module
 from manipcli.simulate.executor import REST, UNTIL_TICKS, Alarmed, Executor

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from manipcli.core.errors import SimulationFailed
-from manipcli.plan.step import Motion, Switch
+from manipcli.plan.motion import Motion, Switch
 from manipcli.plan.trajectory import JointTrajectory
 from manipcli.simulate.executor import Executor
 from manipcli.simulate.session import Session

@@ -20,7 +20,7 @@ from manipcli.model.batch_kinematics import tool_poses
 from manipcli.model.grasp import BRIDGED, LINK, pressing
 from manipcli.model.robot import RobotModel
 from manipcli.model.state import Contact
-from manipcli.plan.step import CLOSING
+from manipcli.plan.motion import CLOSING
 from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEvent
 from manipcli.scene.scene import Scene
 

@@ -20,10 +20,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unfollowed
 from manipcli.plan.limits import MotionLimits
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.names import unknown_joint
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepMember, StepPlan
+from manipcli.plan.step import StepMember
 from manipcli.plan.trajectory import CUBIC, QUINTIC, JointTrajectory, TrajectoryPoint
 from manipcli.plan.verify import verify_written
 from manipcli.scene.scene import Scene

@@ -27,10 +27,11 @@ from manipcli.core.errors import NotPlannable
 from manipcli.core.geometry import Array, Transform, matrix_from_axis_angle
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unmoved_tool
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
 from manipcli.plan.search import Range, first_feasible, spread
-from manipcli.plan.step import PlanningState, StepMember, StepPlan
+from manipcli.plan.step import StepMember
 from manipcli.plan.steps.move import RENAMED, VelocityScaling
 from manipcli.scene.scene import Body, Scene
 from manipcli.spec.base import Model

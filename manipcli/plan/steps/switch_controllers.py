@@ -17,8 +17,9 @@ from pydantic_core import CoreSchema
 from manipcli.conditions.condition import Problem
 from manipcli.model.robot import RobotModel
 from manipcli.plan.claims import Claims, unknown_controller
+from manipcli.plan.motion import Motion, PlanningState, StepPlan, Strictness, Switch
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import Motion, PlanningState, StepMember, StepPlan, Strictness, Switch
+from manipcli.plan.step import StepMember
 from manipcli.scene.scene import Scene
 from manipcli.spec.base import Model, or_short
 

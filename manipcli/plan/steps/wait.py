@@ -12,9 +12,10 @@ from pydantic import Field, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.motion_builder import MotionBuilder
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState, StepMember, StepPlan
+from manipcli.plan.step import StepMember
 from manipcli.spec.base import Model, or_short
 from manipcli.spec.quantity import Pause, Time
 

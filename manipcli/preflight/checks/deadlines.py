@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from manipcli.core.errors import Diagnostic
 from manipcli.core.text import told_apart
-from manipcli.plan.step import Motion
+from manipcli.plan.motion import Motion
 from manipcli.preflight.preflight import Check, Subject
 
 

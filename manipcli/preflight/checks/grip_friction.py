@@ -13,8 +13,8 @@ from manipcli.core.geometry import Array
 from manipcli.core.units import readable
 from manipcli.model.configuration import with_mimics
 from manipcli.plan.hand import moved_links
+from manipcli.plan.motion import PlanningState
 from manipcli.plan.planner import Planner
-from manipcli.plan.step import PlanningState
 from manipcli.preflight.grips import (
     NUDGE,
     grasps,

@@ -14,7 +14,7 @@ from manipcli.judge.measures.facts import RunFacts, run_facts
 from manipcli.judge.verdict import StepOutcome
 from manipcli.model.robot import RobotModel, Tool
 from manipcli.model.state import Contact, WorldState
-from manipcli.plan.step import CLOSING
+from manipcli.plan.motion import CLOSING
 from manipcli.record.recording import ContactSnapshot, ControllerTrace, Recording, Span, TaskEvent
 from manipcli.scene.scene import Body, Scene
 from manipcli.shapes.primitives import Box, Geometry

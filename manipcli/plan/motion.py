@@ -1,0 +1,98 @@
+"""What a step plans: from a planning state to motions and the state after them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from manipcli.core.geometry import Array, Transform
+from manipcli.model.collision import Carried
+from manipcli.plan.trajectory import JointTrajectory
+
+Strictness = Literal["strict", "best_effort"]
+"""Of a switch of controllers: all of it or nothing, or what of it can be done."""
+CLOSING = "close"
+"""The phase of a step in which the hand closes on something."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanningState:
+    """What a step starts from, predicted or measured.
+
+    Attributes:
+        position: (n) of `RobotModel.moving_joints`.
+        bodies: `X_WO` of every movable body, in the order of `Scene.movable`.
+        carried: what the hand holds.
+        closed: the hand was closed to hold something, and not opened since; moves leave it as it is.
+        at_start: the robot has not moved since the task began: it stands where the files put it.
+    """
+
+    position: Array
+    bodies: tuple[Transform, ...]
+    carried: Carried | None = None
+    closed: bool = False
+    at_start: bool = True
+
+    def moved(self, position: Array) -> PlanningState:
+        """The same with the robot at `position`."""
+        return replace(self, position=position, at_start=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grip:
+    """A goal of the hand: `joints` go to `target` (n) until each finger meets `force` [N] or arrives.
+
+    With `must_hold`, a hand that closed on nothing has failed; with `must_arrive`, one that something stopped.
+    """
+
+    joints: tuple[str, ...]
+    target: Array
+    force: float | None
+    must_hold: bool
+    must_arrive: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Switch:
+    """Controllers that take over between two ticks: those of `to`, in whose way nobody stays, or those of the lists."""
+
+    to: tuple[str, ...] = ()
+    activate: tuple[str, ...] = ()
+    deactivate: tuple[str, ...] = ()
+    strictness: Strictness = "strict"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What is commanded at once, and when it is done: all its goals reached and `duration` [s] over.
+
+    Attributes:
+        label: the phase of the step ("approach", "close", ...).
+        trajectory: of some joints, or None where they hold.
+        grip: of the hand, or None where it holds.
+        duration: planned [s].
+        awaits: the step's `until` is waited for here; where no motion awaits, it is at the step's end.
+        guarded: it stops where that comes to hold on the way.
+        switch: of controllers, before anything else; None where they stay.
+    """
+
+    label: str
+    trajectory: JointTrajectory | None
+    grip: Grip | None
+    duration: float
+    awaits: bool = False
+    guarded: bool = False
+    switch: Switch | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StepPlan:
+    """The motions of one step, and where they lead."""
+
+    motions: tuple[Motion, ...]
+    end: PlanningState
+
+    @property
+    def duration(self) -> float:
+        """Planned duration [s]."""
+        return sum(motion.duration for motion in self.motions)
