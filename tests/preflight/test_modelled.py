@@ -102,4 +102,4 @@ def test_a_soft_limit_of_the_velocity_that_leaves_too_little_effort_is_told(foun
     v, needed, left = map(float, numbers.groups())
     assert left == pytest.approx(3.0 - v, abs=0.006), "v has three digits"
     assert left < needed
-    assert not found(controller, k_velocity=100.0, step="move: {to: up, speed: 0.3}")
+    assert not found(controller, k_velocity=100.0, step="move: {to: up, velocity_scaling: 0.3}")

@@ -24,7 +24,7 @@ steps:
   - pick: {{object: $what, approach: {{from: top}}}}
   - lift: {{object: $what}}
 expect:
-  - slip: {{object: peg, within: 3 mm, turn: 3 deg}}
+  - slip: {{object: peg, within: 3 mm, rotation: 3 deg}}
 """
 
 

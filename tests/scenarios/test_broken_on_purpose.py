@@ -15,6 +15,7 @@ from manipcli import pipeline
 from manipcli.judge.verdict import Verdict
 from manipcli.record.read.reading import read_recording
 from manipcli.run import execute
+from manipcli.run.observer import SILENT
 from manipcli.simulate.engines import ENGINES
 
 pytestmark = pytest.mark.slow
@@ -79,7 +80,7 @@ Run = Callable[..., Verdict]
 def run(tmp_path: Path) -> Run:
     """Runs a task (a file, or text); its log, judged again, says the same."""
 
-    def run_task(task: Path | str, *overrides: str, progress: Any = None) -> Verdict:
+    def run_task(task: Path | str, *overrides: str, progress: Any = SILENT) -> Verdict:
         file = tmp_path / "task.yaml"
         if isinstance(task, Path):
             file = task

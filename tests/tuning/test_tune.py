@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from manipcli.control.command import JointCommand
+from manipcli.control.controllers.joint_trajectory import JointTrajectorySpec
 from manipcli.control.stability import Loop, largest_damping
 from manipcli.control.tuning import MARGIN, Tuned, Wish
 from manipcli.core.errors import InvalidInput
@@ -19,7 +20,6 @@ from manipcli.record.read.reading import open_recording
 from manipcli.scene.scene import Scene
 from manipcli.simulate.engine import EngineSettings
 from manipcli.simulate.engines import ENGINES
-from manipcli.spec.controllers import JointTrajectorySpec
 from manipcli.spec.load import load_controllers, load_robot
 from manipcli.task.load_task import load_task
 from manipcli.task.vocabulary import controllers_spec
