@@ -14,6 +14,7 @@ import pytest
 
 # Loaded here once: what pytest loads while it runs inside a test, it forgets.
 import manipcli.batch.discovery
+import manipcli.batch.process
 import manipcli.spec.load
 import manipcli.spec.task  # noqa: F401
 from manipcli.batch.job import Job, Settings
