@@ -5,7 +5,7 @@ Three questions, three names:
 - *pressing*: the links of the robot that touch an object with force.
 - *pinched*: at least two links press, each with at least `GRIP_FORCE`. The conditions `grasped` and `slip` and the end
   of `release` ask this. It needs contacts only.
-- *carried*: a link presses, and the object has followed at least `FOLLOWS` of the hand's motion since `Grasp.begin`.
+- *carried*: a link presses, and the object has followed at least `FOLLOWS` of the motion of the hand.
   Every step that ends with an object in the hand asks this, and so does planning again. It needs poses, too.
 
 `slip` (condition) and the grasp intervals of a report ask other questions: how far a pinched object moved in the hand,
@@ -15,6 +15,7 @@ and when a log shows an object pressed and without support. Both build on `press
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -32,8 +33,10 @@ BRIDGED: Final = 0.05
 """[s] A contact that is lost for less is not lost."""
 FOLLOWS: Final = 0.5
 """Share of the hand's motion that a carried object follows at least."""
-STILL: Final = 1e-3
-"""[m] A hand that moved less has not moved: the servo error of an arm at rest."""
+STILL: Final = 2e-4
+"""[m] A hand that moved less has not moved: fingers and arm yield by so much under load."""
+DROPPED: Final = 0.02
+"""[m] A lag on the way counts from this motion of the hand on; below it, contacts are still settling."""
 MISPLACED: Final = 0.05
 """[m] An object further than this from its planned place in the hand is not carried, whatever touches it."""
 
@@ -54,66 +57,117 @@ def pinch_force(contacts: Sequence[Contact], body: str) -> float:
     return found[1][0] if len(found) > 1 else 0.0
 
 
+@dataclass(slots=True)
+class _Motion:
+    """Motion since a start of the point at which the hand holds the object, on the hand and on the object.
+
+    Attributes:
+        hand, body: (3,) [m] where the two points were.
+        travel: [m] largest distance of the hand from there.
+        dropped: how far hand and object had moved, (3,) [m] each, when the object first did not follow.
+    """
+
+    hand: Array
+    body: Array
+    travel: float = 0.0
+    dropped: tuple[Array, Array] | None = None
+
+    def look(self, hand: Array, body: Array) -> None:
+        """The two points now, (3,) [m] in the world."""
+        moved, followed = hand - self.hand, body - self.body
+        length = float(np.linalg.norm(moved))
+        self.travel = max(self.travel, length)
+        if self.dropped is None and length > DROPPED and _behind(moved, followed, length):
+            self.dropped = moved, followed
+
+    def lag(self, hand: Array, body: Array) -> tuple[Array, Array] | None:
+        """How far hand and object moved, where the object did not follow; None where it did."""
+        moved, followed = hand - self.hand, body - self.body
+        if self.travel > STILL and _behind(moved, followed, self.travel):
+            return moved, followed
+        return self.dropped
+
+
+def _behind(hand: Array, body: Array, travel: float) -> bool:
+    return float(np.linalg.norm(hand - body)) > (1.0 - FOLLOWS) * travel
+
+
 class Grasp:
     """Follows the object in the hand, to decide whether the hand carries it.
 
+    The point that is followed is fixed to the object: the one that was at the tool when the hand closed. An object that
+    pivots between the fingers is carried; how far it slips or rotates there is the question of `slip`. Its motion counts
+    since the hand closed, and since the step began.
+
     Args:
         kinematics, scene: of the world that is measured.
+        period: [s] between two calls of `look`.
     """
 
-    def __init__(self, kinematics: Kinematics, scene: Scene) -> None:
+    def __init__(self, kinematics: Kinematics, scene: Scene, *, period: float = 0.0) -> None:
         self._kinematics = kinematics
         self._scene = scene
+        self._bridged = max(BRIDGED, 2.0 * period)
         self._carried: Carried | None = None
         self._k = 0
-        self._start = self._X_LC = np.zeros(3)
-        self._travel = 0.0
+        self._p_LC = self._p_OC = np.zeros(3)
+        self._motions: list[_Motion] = []
         self._pressed_at = -np.inf
 
-    def begin(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> None:
-        """From now on the motion counts: at the end of a closing motion, and when a step begins with a full hand."""
+    def close(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> None:
+        """The hand has closed on an object, which follows it from now on."""
         self._carried = carried
         self._k = self._scene.movable.index(self._scene.body(carried.body))
-        self._start = self._centre(state)
-        self._X_LC = self._link(state).inverse().apply(self._start)
-        self._travel = 0.0
+        tool, X_WL, X_WO = self._kinematics.robot.tool, self._link(state), self._object(state)
+        if tool is None:
+            point = X_WO.apply(self._scene.movable[self._k].centre)
+        else:
+            point = self._kinematics.forward(state.position, tool.link).apply(tool.X_LT.p)
+        self._p_LC, self._p_OC = X_WL.inverse().apply(point), X_WO.inverse().apply(point)
+        self._motions = [_Motion(point, point)]
         self._pressed_at = -np.inf
         self.look(state, contacts)
 
+    def begin_step(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> None:
+        """A step begins with this object in the hand."""
+        if self._carried is None or self._carried.body != carried.body:
+            self.close(carried, state, contacts)
+        self._motions = [self._motions[0], _Motion(*self._points(state))]
+
+    def release(self) -> None:
+        """The hand has opened."""
+        self._carried = None
+
     def look(self, state: WorldState, contacts: Sequence[Contact]) -> None:
-        """The world now; to be called at least every `BRIDGED` while the hand moves."""
+        """The world now; to be called every `period` while the hand moves."""
         if self._carried is None:
             return
         if pressing(contacts, self._carried.body):
             self._pressed_at = float(state.time)
-        self._travel = max(self._travel, float(np.linalg.norm(self._moved_with_hand(state))))
+        points = self._points(state)
+        for motion in self._motions:
+            motion.look(*points)
 
     def lost(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> str:
         """Why the hand does not carry this object now; "" where it does."""
         if self._carried is None or self._carried.body != carried.body:
-            self.begin(carried, state, contacts)
+            self.close(carried, state, contacts)
         self.look(state, contacts)
-        hand = self._moved_with_hand(state)
-        length = float(np.linalg.norm(hand))
-        way = hand / length if length > STILL else np.zeros(3)
-        object_moved = self._centre(state) - self._start
-        behind = float((hand - object_moved) @ way) > (1.0 - FOLLOWS) * max(self._travel, length)
-        why = []
-        if float(state.time) - self._pressed_at > BRIDGED:
-            why.append("no link of the robot presses on it")
-        if behind:
-            lifted = way[2] > 0.7
-            verb, along = ("rose", object_moved[2]) if lifted else ("moved", object_moved @ way)
-            hand_moved = hand[2] if lifted else length
-            why.append(f"it {verb} {_mm(float(along))} while the tool {verb} {_mm(float(hand_moved))}")
+        points = self._points(state)
+        lags = [lag for motion in reversed(self._motions) if (lag := motion.lag(*points)) is not None]
+        reasons = []
+        if float(state.time) - self._pressed_at > self._bridged:
+            reasons.append("no link of the robot presses on it")
+        if lags:
+            reasons.append(_described(*lags[0]))
         off = float(np.linalg.norm(self._pose(state, carried).p - carried.X_LO.p))
-        if off > MISPLACED and not behind:
-            why.append(f"it is {_mm(off)} from its place in the hand")
-        return ", ".join(why)
+        if off > MISPLACED and not lags:
+            reasons.append(f"it is {_mm(off)} from its place in the hand")
+        return ", ".join(reasons)
 
-    def _moved_with_hand(self, state: WorldState) -> Array:
-        """(3,) motion [m] of the object's centre since `begin` if it did not move in the hand."""
-        return np.asarray(self._link(state).apply(self._X_LC) - self._start)
+    def _points(self, state: WorldState) -> tuple[Array, Array]:
+        """The point (3,) [m] at which the object is held, in the world: on the hand, and on the object."""
+        return self._link(state).apply(self._p_LC), self._object(state).apply(self._p_OC)
 
     def _link(self, state: WorldState) -> Transform:
         assert self._carried is not None  # callers ask it first
@@ -122,12 +176,18 @@ class Grasp:
     def _object(self, state: WorldState) -> Transform:
         return Transform.of(xyz=state.body_position[self._k], quat_xyzw=state.body_quat_xyzw[self._k])
 
-    def _centre(self, state: WorldState) -> Array:
-        return self._object(state).apply(self._scene.movable[self._k].centre)
-
     def _pose(self, state: WorldState, carried: Carried) -> Transform:
         """X_LO of the object as it is measured."""
-        return self._kinematics.forward(state.position, carried.link).inverse() @ self._object(state)
+        return self._link(state).inverse() @ self._object(state)
+
+
+def _described(hand: Array, body: Array) -> str:
+    """The motions (3,) [m] of hand and object; upwards where the hand mostly rose."""
+    length = float(np.linalg.norm(hand))
+    if hand[2] > 0.7 * length:
+        return f"it rose {_mm(float(body[2]))} while the tool rose {_mm(float(hand[2]))}"
+    along = float(body @ hand) / length if length > 0.0 else float(np.linalg.norm(body))
+    return f"it moved {_mm(along)} while the tool moved {_mm(length)}"
 
 
 def _mm(length: float) -> str:

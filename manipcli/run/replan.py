@@ -22,7 +22,7 @@ from manipcli.model.collision import Carried
 from manipcli.model.grasp import Grasp
 from manipcli.plan.motion import PlanningState, StepPlan
 from manipcli.plan.planner import Planner
-from manipcli.simulate.session import Session
+from manipcli.simulate.session import SLOW, Session
 from manipcli.spec.reactions import ReplanSpec
 from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import StepSpec
@@ -50,7 +50,8 @@ class Measured:
         self._planner = planner
         self._limits = limits
         self._physics = physics
-        self.grasp = Grasp(planner.kinematics, planner.scene)
+        self._lost = ""
+        self.grasp = Grasp(planner.kinematics, planner.scene, period=SLOW * session.period)
 
     def situation(self, believed: PlanningState) -> PlanningState:
         """Where everything is now.
@@ -58,6 +59,7 @@ class Measured:
         Args:
             believed: says what the hand holds; it holds nothing any more where that is elsewhere.
         """
+        self._lost = ""
         state = self._session.engine.read()
         measured = np.array(state.position)
         position = self._commanded(measured)
@@ -71,7 +73,8 @@ class Measured:
         carried = believed.carried
         if carried is None:
             return now
-        if self.grasp.lost(carried, state, self._session.touching):
+        self._lost = self.grasp.lost(carried, state, self._session.touching)
+        if self._lost:
             return now
         X_WO = planner.body_pose(now, carried.body)
         X_LO = planner.kinematics.forward(measured, carried.link).inverse() @ X_WO
@@ -162,7 +165,8 @@ class Measured:
         before, after = planned.carried, now.carried
         if before is not None and (after is None or after.body != before.body):
             away = float(np.linalg.norm(self._pose(now, before.body).p - self._pose(planned, before.body).p))
-            yield f"'{before.body}' is not in the hand: it is {_mm(away)} from where it was to be"
+            why = self._lost or f"it is {_mm(away)} from its planned place"
+            yield f"'{before.body}' is not in the hand: {why}"
         elif after is not None and before is None:
             yield f"the hand holds '{after.body}'"
         elif before is not None and after is not None:

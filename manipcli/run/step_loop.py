@@ -247,7 +247,8 @@ class StepLoop:
     def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
         """Every motion of the plan, which begins in `before`, and what the step waits for."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
-        self._follow(before.carried)
+        if before.carried is not None and self._physics:
+            self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
         texts = []
         with self._asked(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
@@ -269,7 +270,7 @@ class StepLoop:
                     return MotionEnd(end.outcome, text)
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
                     self._holding.taken(planned.plan.end.carried.body, self._session.touching)
-                    self._follow(planned.plan.end.carried)
+                    self._take(planned.plan.end.carried)
                 if end.weak:
                     self._tell(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
@@ -284,6 +285,8 @@ class StepLoop:
         held = self._still_held(before) if planned.plan.end.carried is None else ""
         if held:
             return MotionEnd("failed", held)
+        if planned.plan.end.carried is None:
+            self._measured.grasp.release()
         left = self._left_behind(planned.plan.end.carried)
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
@@ -300,10 +303,10 @@ class StepLoop:
         finally:
             self._live.close(probe)
 
-    def _follow(self, carried: Carried | None) -> None:
-        """From now on what the hand carries is to move with it."""
-        if carried is not None and self._physics:
-            self._measured.grasp.begin(carried, self._session.engine.read(), self._session.touching)
+    def _take(self, carried: Carried) -> None:
+        """The hand has closed on an object."""
+        if self._physics:
+            self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
 
     def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
         """A failure where the hand does not carry what it is planned to; None where it does."""

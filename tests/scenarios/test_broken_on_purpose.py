@@ -112,7 +112,7 @@ steps:
 HEAVY = ("scene.block.mass=3", "scene.block.friction=0.05")
 
 
-@pytest.mark.parametrize("by", [2.0, 10.0, 49.0])
+@pytest.mark.parametrize("by", [0.9, 2.0, 49.0])
 def test_a_lift_of_a_block_that_stays_on_the_table_fails_however_low_it_is(run: Run, by: float) -> None:
     verdict = run(f"{BLOCK}  - lift: {{object: block, by: {by} mm}}\n", *HEAVY)
     assert outcomes(verdict) == ["done", "failed"]
@@ -120,6 +120,28 @@ def test_a_lift_of_a_block_that_stays_on_the_table_fails_however_low_it_is(run: 
     assert told is not None, verdict.text
     assert float(told[1]) < 0.2
     assert float(told[2]) == pytest.approx(by, abs=0.6)  # the arm sags a little below its reference
+
+
+def test_small_lifts_of_a_block_that_stays_on_the_table_add_up(run: Run) -> None:
+    """Each moves the hand by less than fingers and arm yield under load."""
+    lift = "  - lift: {object: block, by: 0.15 mm}\n"
+    assert "failed" in outcomes(run(BLOCK + 6 * lift, *HEAVY))
+
+
+def test_a_bar_that_pivots_between_the_fingers_is_carried(run: Run) -> None:
+    """Held 16 cm from its centre, which stays behind when the end is lifted."""
+    bar = "bar: {box: {size: [40 cm, 3 cm, 3 cm]}, mass: 150 g, rests_on: table, at: [0.40, -0.1]}"
+    head = BLOCK.partition("  block:")[0]
+    at = "pose: {{xyz: [0.56, -0.1, {}], rpy: [180 deg, 0, 0]}}"
+    steps = (
+        "release: {}",
+        f"move: {{{at.format(0.32)}}}",
+        f"move: {{{at.format(0.217)}, touch: [bar]}}",
+        "grasp: {object: bar, posture: closed, force: 10 N}",
+        "lift: {object: bar, by: 3 cm}",
+    )
+    task = f"{head}  {bar}\nsteps:\n" + "".join(f"  - {step}\n" for step in steps)
+    assert run(task).verdict == "passed"
 
 
 @pytest.mark.parametrize("by", [2.0, 10.0])
