@@ -1,4 +1,4 @@
-"""manipcli: manipulation tasks as files.
+"""manipcli: robot manipulation tasks, run from YAML files.
 
     from pathlib import Path
     import manipcli
@@ -6,8 +6,7 @@
     report = manipcli.run_task(Path("tasks/pour.yaml"))
     recording = manipcli.read_recording(Path(report.log))
 
-The public names are those of `__all__`. Each is imported when it is first used (PEP 562), so that `import manipcli`
-costs nothing.
+The public names are those of `__all__`. Each is imported on first use (PEP 562), so that `import manipcli` is fast.
 """
 
 from __future__ import annotations
@@ -67,12 +66,11 @@ _HOMES = {
     "Recording": "record.recording",
     "RunReport": "report.run_report",
 }
-"""The module in which each public name is defined, or which offers it."""
+"""The module that provides each public name."""
 
 
 __getattr__ = lazy_exports(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:
-    """What is there, and what can be."""
     return sorted({*globals(), *__all__})

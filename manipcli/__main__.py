@@ -5,6 +5,6 @@ import sys
 from manipcli.cli.app import main
 
 code = main()
-# Where Ctrl-C came while a text was executed, as dataclasses do, CPython would end by the signal and not with the code.
+# After Ctrl-C during an exec() (as in dataclasses), CPython would exit by the signal; this exec() resets that state.
 exec("")
 sys.exit(code)

@@ -1,7 +1,7 @@
-"""READ FIRST: the whole program. Files -> task -> plan -> recording -> verdict.
+"""READ FIRST: the whole program as one pipeline. Files -> task -> plan -> recording -> verdict.
 
-`run_task` is the sentence; each stage is a function of the layer that does it. The recording is the only witness: the
-verdict is computed from the log, read back from its file before the file gets its name.
+Each stage of `run_task` is a function of the layer that implements it. The verdict is computed from the recording
+alone: the log is read back from its file before the file gets its name.
 """
 
 from __future__ import annotations
@@ -61,23 +61,23 @@ def run_task(
     progress: Progress = SILENT,
     **options: Unpack[LoadOptions],
 ) -> RunReport:
-    """Load, plan, simulate, record and judge a task.
+    """Loads, plans, simulates, records and judges a task.
 
     Args:
         path: the task file.
-        log: where the log is written; default `runs/<task>.mcap`, which is replaced.
+        log: path of the log; default `runs/<task>.mcap`, which is replaced.
         force: replace `log` if it exists.
-        embed_meshes: put the files of all meshes into the log, so that it can be shown without any package.
-        progress: is called with warnings, steps and ticks.
+        embed_meshes: store all mesh files in the log, so that it can be shown without packages.
+        progress: receives warnings, steps and ticks.
         options: how the task is loaded, see `LoadOptions`.
 
     Returns:
-        The verdict on the log, and the duration of each stage. A step that cannot be planned (nothing was simulated,
-        there is no log), a simulation that diverged, or an interruption is part of the verdict.
+        The verdict on the log, and the duration of each stage. A step that cannot be planned (then nothing is simulated
+        and no log is written), a diverged simulation and an interruption are part of the verdict.
 
     Raises:
-        InvalidInput: a file or the log's path cannot be used; nothing was simulated.
-        RecordingFailed: the disk refused more of the log.
+        InvalidInput: a file or the path of the log is invalid; nothing was simulated.
+        RecordingFailed: writing the log failed.
     """
     task, loading = timed(_load, path, progress, options)
     (plan, warnings), planning = timed(_plan, task, progress)
@@ -99,17 +99,17 @@ def verify_log(
     allow_outside: bool = False,
     progress: Progress = SILENT,
 ) -> Verification:
-    """Plan, simulate and record again what a log holds, and compare the two logs.
+    """Repeats the recorded run of a log (plan, simulate, record), and compares the two logs.
 
     Args:
-        log: the log of a run, or what a killed run left.
-        allow_different: also with another version of manipcli or of the engine, or other meshes.
-        package_path: where meshes are looked for that the log does not carry.
+        log: the log of a run, or the unfinished log of a killed run.
+        allow_different: also compare with another version of manipcli or of the engine, or other meshes.
+        package_path: folders to search for meshes that the log does not embed.
         allow_outside: see `LoadOptions`.
-        progress: is called with steps and ticks.
+        progress: receives steps and ticks.
 
     Raises:
-        InvalidInput: the log lacks something, or versions or meshes differ.
+        InvalidInput: the log is incomplete, or versions or meshes differ.
         NotPlannable: a step can no longer be planned.
     """
     began = time.perf_counter()
@@ -136,20 +136,20 @@ def _load(path: Path, progress: Progress, options: LoadOptions) -> Task:
 
 
 def _plan(task: Task, progress: Progress) -> tuple[Plan | Verdict, tuple[Diagnostic, ...]]:
-    """The plan, or the verdict on a task that has none; and every warning before the run."""
+    """The plan, or the verdict on a task without a plan; and all warnings before the run."""
     try:
-        plan = plan_task(task, doing=progress.doing)
+        plan = plan_task(task, on_progress=progress.doing)
     except NotPlannable as refusal:
         return refused(task, refusal), task.warnings
-    doubts = preflight_findings(task, plan)
-    progress.warned(doubts)
-    return plan, (*task.warnings, *doubts)
+    findings = preflight_findings(task, plan)
+    progress.warned(findings)
+    return plan, (*task.warnings, *findings)
 
 
 def _record(
     task: Task, plan: Plan, path: Path, *, overwrite: bool, embed_meshes: bool, progress: Progress
 ) -> tuple[Verdict, Timing]:
-    """Simulate into a log that is judged before it gets its name."""
+    """Simulates into a log, which is judged before it gets its name."""
     manager = build_manager(task, plan.planner.kinematics)
     with open_log(task, plan, manager, path, overwrite=overwrite, embed_meshes=embed_meshes) as recorder:
         end, simulating = timed(simulate, task, plan, manager, recorder, progress)

@@ -1,1 +1,1 @@
-"""Knows no robot: errors and exit codes, units, geometry, text, the registry of seams."""
+"""Basics that know no robot: errors and exit codes, units, geometry, text, the registry of seams."""

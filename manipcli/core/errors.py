@@ -1,4 +1,4 @@
-"""Everything that can go wrong, as data: a place, a message, a hint, and the exit code it leads to."""
+"""Errors and diagnostics as data: place, message, hint and exit code."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import ClassVar, Final, Literal
 
 Severity = Literal["error", "warning", "note"]
 EXPANDED: Final = "expanded from"
-"""How the hint of a finding begins to say which call of a macro made what it is about."""
+"""Start of the hint that names the macro calls behind a finding."""
 
 
 class ExitCode(IntEnum):
-    """What the command line returns. The numbers are public and do not change."""
+    """Exit codes of the command line. The numbers are public and do not change."""
 
     PASSED = 0
     FAILED = 1
@@ -24,17 +24,17 @@ class ExitCode(IntEnum):
 
 
 Loc = tuple[str | int, ...]
-"""Where something stands in what a file holds: keys and numbers of items, from the top."""
+"""Path to a value in a file: keys and indices, from the top."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in a file the user wrote something. Lines and columns count from 1.
+    """A place in a file. Lines and columns count from 1.
 
-    Line 0: not in a file but in an argument, which `file` quotes (`--set scene.cup.mass=80`).
+    Line 0 means an argument instead of a file; `file` quotes it (`--set scene.cup.mass=80`).
 
     Attributes:
-        calls: where macros were called that made it, the outermost first; places are equal whoever called.
+        calls: places of the macro calls that produced the value, outermost first; ignored in comparisons.
     """
 
     file: str
@@ -47,14 +47,14 @@ class Place:
 
     @property
     def expanded(self) -> str:
-        """`expanded from OUTERMOST, in it from INNERMOST`; "" for what no macro made."""
-        inner = f", in it from {self.calls[-1]}" if len(self.calls) > 1 else ""
+        """`expanded from OUTERMOST, then from INNERMOST`; "" without macro calls."""
+        inner = f", then from {self.calls[-1]}" if len(self.calls) > 1 else ""
         return f"{EXPANDED} {self.calls[0]}{inner}" if self.calls else ""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One thing to tell about an input file."""
+    """An error, a warning or a note about an input file."""
 
     code: str
     message: str
@@ -63,9 +63,9 @@ class Diagnostic:
     severity: Severity = "error"
 
     def __post_init__(self) -> None:
-        told = self.place.expanded if self.place is not None else ""
-        if told and EXPANDED not in (self.hint or ""):
-            object.__setattr__(self, "hint", f"{self.hint}; {told}" if self.hint else told)
+        calls = self.place.expanded if self.place is not None else ""
+        if calls and EXPANDED not in (self.hint or ""):
+            object.__setattr__(self, "hint", f"{self.hint}; {calls}" if self.hint else calls)
 
     def __str__(self) -> str:
         where = f"{self.place}: " if self.place is not None else ""
@@ -73,19 +73,19 @@ class Diagnostic:
 
 
 class ManipcliError(Exception):
-    """Base of the family; caught once, in `cli/app.py`."""
+    """Base class of all errors of manipcli; caught once, in `cli/app.py`."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.INTERNAL
     code: ClassVar[str] = "INT000"
 
     @property
     def findings(self) -> tuple[Diagnostic, ...]:
-        """The error as findings, for every renderer alike."""
+        """The error as findings, for renderers."""
         return (Diagnostic(code=self.code, message=str(self)),)
 
 
 class InvalidInput(ManipcliError):
-    """A file or an argument cannot be used; carries every finding of the file at once."""
+    """A file or an argument is invalid; carries all findings of the file."""
 
     exit_code = ExitCode.USAGE
     code = "USE000"
@@ -100,22 +100,27 @@ class InvalidInput(ManipcliError):
 
 
 class InvalidArgument(InvalidInput, ValueError):
-    """An argument of the Python API cannot be used; also a `ValueError`, as callers in Python expect."""
+    """An argument of the Python API is invalid; also a `ValueError`, as Python callers expect."""
 
     def __init__(self, code: str, message: str, *, hint: str | None = None) -> None:
         super().__init__((Diagnostic(code=code, message=message, hint=hint),))
 
 
 RefusalReason = Literal["orientation", "touches", "in_the_way", "line"]
-"""The arm cannot turn its tool so; it reaches a pose only so that something touches; something is in a motion's way;
-the arm cannot take its tool along a straight line."""
+"""`orientation`: the arm cannot reach the tool orientation; `touches`: every solution is in collision; `in_the_way`: an
+obstacle blocks the motion; `line`: the tool cannot follow a straight line."""
 
 
 class NotPlannable(ManipcliError):
     """A step has no plan: unreachable, outside limits, in collision, or too slow for its limits.
 
-    `loc`: which value below the step's verb is the cause, where it is one; `place`: where that or the step is written.
-    `reason`: by which a step decides what to try next, or to tell; hints are for people alone.
+    Attributes:
+        cause: what is wrong, without the step.
+        step: id of the step.
+        hint: what to do, for users only.
+        place: of the value that is the cause, or of the step.
+        loc: path of that value below the step's verb; empty if no single value is the cause.
+        reason: for code that decides what to try next.
     """
 
     exit_code = ExitCode.FAILED
@@ -145,7 +150,7 @@ class NotPlannable(ManipcliError):
 
 
 class SimulationFailed(ManipcliError):
-    """The physics left the plausible: NaN, an explosion, a body in free fall, a bad start."""
+    """The simulation diverged: NaN, excessive speed, a body in free fall, an invalid start."""
 
     exit_code = ExitCode.FAILED
     code = "SIM100"

@@ -1,6 +1,6 @@
-"""Rigid transforms and quaternions, single or batched, in numpy.
+"""Rigid transforms and quaternions in numpy, single or batched.
 
-Notation is monogram: `X_AB` is the pose of frame B in frame A, so that adjacent letters cancel in a product:
+Monogram notation: `X_AB` is the pose of frame B in frame A, so that adjacent letters cancel in a product:
 `X_AC = X_AB @ X_BC`. Quaternions are `quat_xyzw`, unit, real part last.
 """
 
@@ -97,18 +97,18 @@ def quat_product(a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
 
 
 def rotation_between(start: Array, end: Array) -> Array:
-    """Rotation vectors (..., 3) [rad] that lead from `start` to `end` (..., 4) xyzw the short way, in the frame that
-    both are given in."""
-    turn = quat_product(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))
-    turn = np.where(turn[..., 3:] < 0.0, -turn, turn)
-    sine = np.linalg.norm(turn[..., :3], axis=-1, keepdims=True)
+    """Shortest rotation vectors (..., 3) [rad] from `start` to `end` (..., 4) xyzw, in the frame in which both are
+    given."""
+    rotation = quat_product(end, start * np.array([-1.0, -1.0, -1.0, 1.0]))
+    rotation = np.where(rotation[..., 3:] < 0.0, -rotation, rotation)
+    sine = np.linalg.norm(rotation[..., :3], axis=-1, keepdims=True)
     small = sine < 1e-12  # towards zero, angle / sine tends to 2
-    angle = 2.0 * np.arctan2(sine, turn[..., 3:])
-    return np.asarray(turn[..., :3] * np.where(small, 2.0, angle / np.where(small, 1.0, sine)))
+    angle = 2.0 * np.arctan2(sine, rotation[..., 3:])
+    return np.asarray(rotation[..., :3] * np.where(small, 2.0, angle / np.where(small, 1.0, sine)))
 
 
 def wrapped(angle: Array) -> Array:
-    """The same angles in [-pi, pi) [rad]: the short way round."""
+    """The same angles, wrapped to [-pi, pi) [rad]."""
     return np.asarray(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
@@ -132,7 +132,7 @@ def matrix_from_rpy(rpy: npt.ArrayLike) -> Array:
             ]
         )
         + 0.0
-    )  # angles of zero make the identity, without a -0.0 in it
+    )  # zero angles give the identity without -0.0
 
 
 def rpy_from_matrix(R: npt.ArrayLike) -> Array:
@@ -165,8 +165,7 @@ class Transform:
     ) -> Transform:
         """From a translation [m] and at most one of `rpy` [rad], `quat_xyzw`, `R`.
 
-        Angles are kept as they are given: written down and read again they make the same matrix, bit for bit. No number
-        of them or of the translation is -0.0.
+        `rpy` is stored as given, so that writing and reading it gives the same matrix bit for bit. -0.0 becomes 0.0.
         """
         p = frozen(np.asarray(xyz, dtype=np.float64) + 0.0)
         if R is None and quat_xyzw is None and rpy is not None:
@@ -198,17 +197,17 @@ class Transform:
 
     @cached_property
     def rpy(self) -> Array:
-        """Roll, pitch, yaw [rad], as given or of the matrix."""
+        """Roll, pitch, yaw [rad], as given or computed from `R`."""
         return frozen(rpy_from_matrix(self.R))
 
     @property
     def by_angles(self) -> Transform:
-        """The same, to rounding, with the rotation that its `rpy` make: for what is to be written down as angles."""
+        """The same transform, up to rounding, with `R` rebuilt from `rpy`: for output as angles."""
         return Transform.of(xyz=self.p, rpy=self.rpy)
 
     @cached_property
     def matrix(self) -> Array:
-        """Homogeneous (4, 4)."""
+        """Homogeneous matrix (4, 4)."""
         M = np.eye(4)
         M[:3, :3], M[:3, 3] = self.R, self.p
         return frozen(M)

@@ -1,4 +1,4 @@
-"""Public names of a package that are imported when they are first used (PEP 562)."""
+"""Lazy import of the public names of a package (PEP 562)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def lazy_exports(package: str, homes: Mapping[str, str]) -> Callable[[str], obje
 
     Args:
         package: its `__name__`.
-        homes: the public names, each with the module below the package that defines or offers it.
+        homes: public name -> module in the package that provides it.
     """
 
     def get(name: str) -> object:

@@ -1,4 +1,4 @@
-"""A file for one process alone, as long as that has it open."""
+"""File locks, held while a process has the file open."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, flock
 from typing import Final
 
 UNSUPPORTED: Final = frozenset({errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP})
-"""What a file system says that knows no locks, as some of networks and containers."""
+"""Errors of file systems without locks, such as some network and container mounts."""
 
 
 class Taken(Exception):
-    """Another process has the file."""
+    """Another process holds the lock."""
 
 
 def lock(descriptor: int, *, shared: bool = False) -> None:
-    """Takes an open file without waiting for it; on a file system that knows no locks everybody gets it.
+    """Locks an open file without waiting; always succeeds on a file system without locks.
 
     Args:
-        descriptor: of the file.
-        shared: with others that share it, too.
+        descriptor: descriptor of the file.
+        shared: take a shared lock instead of an exclusive one.
 
     Raises:
-        Taken: another process has it.
-        OSError: it cannot be locked for any other reason.
+        Taken: another process holds the lock.
+        OSError: locking fails for any other reason.
     """
     try:
         flock(descriptor, (LOCK_SH if shared else LOCK_EX) | LOCK_NB)

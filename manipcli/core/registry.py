@@ -1,4 +1,4 @@
-"""Members of a seam, by name. The pipeline gathers them and passes them down; nothing here is global state."""
+"""Registry of the members of a seam, by name; without global state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Member(Protocol):
-    """What every member of a seam has: the name by which files call it."""
+    """A member of a seam, with the name that files use for it."""
 
     @property
     def name(self) -> str: ...
@@ -35,4 +35,4 @@ class Seam(Generic[M]):
         for member in self.members:
             if member.name == name:
                 return member
-        raise KeyError(f"no {self.kind} '{name}'; known: {', '.join(self.names)}")
+        raise KeyError(f"unknown {self.kind} '{name}'; known: {', '.join(self.names)}")

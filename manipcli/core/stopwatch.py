@@ -1,4 +1,4 @@
-"""Wall time of a call, and of work that happens now and then."""
+"""Wall time of a call, or summed over several blocks."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ T = TypeVar("T")
 
 
 def timed(stage: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T, float]:
-    """The result of a call, and its wall time [s]."""
+    """The result of a call and its wall time [s]."""
     began = time.perf_counter()
     result = stage(*args, **kwargs)
     return result, time.perf_counter() - began
 
 
 class Stopwatch:
-    """Adds up the time [s] on the wall that is spent in its `with` blocks, however they end."""
+    """Sums the wall time [s] of its `with` blocks, also of those that raise."""
 
     def __init__(self) -> None:
         self.seconds = 0.0

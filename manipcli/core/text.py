@@ -1,4 +1,4 @@
-"""Text for people: the nearest known name, lists of names, and text that cannot harm a terminal."""
+"""Text of messages: nearest known names, lists of names, escaping for terminals."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from collections.abc import Iterable
 from pathlib import PurePath
 
 _UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
-"""Categories of Unicode: control, format (direction marks, spaces of no width), surrogates, ends of lines."""
+"""Unicode categories: control, format (direction marks, zero-width spaces), surrogates, line separators."""
 _LONG_WORD = re.compile(r"\S{241,}")
 _SHORT = {"\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
 def nearest(name: str, known: Iterable[str], *, most: int = 1) -> tuple[str, ...]:
-    """Up to `most` of the `known` names that look like `name`, the nearest first; empty when none does.
+    """Up to `most` of the `known` names similar to `name`, nearest first; empty if none is similar.
 
-    Upper and lower case count as equal at first, so that `Home` finds `home`; names of one or two letters match
-    only by case or as a prefix.
+    Case is ignored, so `Home` finds `home`; names of one or two letters match only by case or as a prefix.
     """
     names = list(dict.fromkeys(known))
     folded: dict[str, list[str]] = {}
@@ -33,26 +32,26 @@ def nearest(name: str, known: Iterable[str], *, most: int = 1) -> tuple[str, ...
     return tuple(found[:most])
 
 
-def _begins(one: str, other: str) -> bool:
-    return bool(one) and (one.startswith(other) or (len(one) >= 2 and other.startswith(one)))
+def _begins(name: str, other: str) -> bool:
+    return bool(name) and (name.startswith(other) or (len(name) >= 2 and other.startswith(name)))
 
 
 def nearest_file(name: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The one of the `known` files that looks like `name`, if one does: an ending in common is no likeness."""
+    """The `known` file most similar to `name`, at most one; a common suffix does not count as similarity."""
     names = list(known)
-    stems = {PurePath(one).stem: one for one in names if PurePath(one).suffix == PurePath(name).suffix}
+    stems = {PurePath(file).stem: file for file in names if PurePath(file).suffix == PurePath(name).suffix}
     alike = tuple(stems[stem] for stem in nearest(PurePath(name).stem, stems))
-    return alike or nearest(name, [one for one in names if one not in stems.values()])
+    return alike or nearest(name, [file for file in names if file not in stems.values()])
 
 
 def did_you_mean(name: str, known: Iterable[str], *, kind: str = "known", most: int = 1) -> str | None:
-    """The hint for an unknown name: the nearest of `known`, else the known names themselves; None when there are none.
+    """The hint for an unknown name: the nearest of `known`, else the list of known names; None without known names.
 
     Args:
-        name: what was given.
-        known: what would have been right.
-        kind: what the names are, in the plural ("verbs", "joints"); begins the list of them.
-        most: how many near names to offer.
+        name: the given name.
+        known: the valid names.
+        kind: plural of what the names are ("verbs", "joints"); the title of the list.
+        most: maximum number of near names.
     """
     names = list(dict.fromkeys(known))
     close = nearest(name, names, most=most)
@@ -68,7 +67,7 @@ def any_of(names: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str], *, most: int = 12) -> str:
-    """`a, b, c` and, beyond `most`, how many more there are."""
+    """`a, b, c`; beyond `most` names, the number of the rest."""
     every = [escape(name) for name in names]
     rest = len(every) - most
     return ", ".join(every[:most]) + (f", and {rest} more" if rest > 0 else "")
@@ -80,7 +79,7 @@ def number_of(number: int, noun: str) -> str:
 
 
 def escape(text: str) -> str:
-    r"""`text` on one line, with what cannot be seen (control and format characters) written as `\x1b`, `\u202e`."""
+    r"""`text` on one line, with control and format characters escaped as `\x1b`, `\u202e`."""
     if text.isprintable():
         return text
     return "".join(_escaped(c) if unicodedata.category(c) in _UNSEEN else c for c in text)
@@ -93,19 +92,18 @@ def _escaped(character: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """`text`, escaped, with the middle left out of words that nobody reads to their end: names of thousands of
-    letters."""
+    """`text`, escaped, with the middle of words of more than 240 characters replaced by `...`."""
     return _LONG_WORD.sub(lambda match: f"{match.group()[:160]}...{match.group()[-60:]}", escape(text))
 
 
 def shorten(text: str, *, width: int = 60) -> str:
-    """`text`, escaped, and cut in the middle of nowhere with `...` when longer than `width`."""
+    """`text`, escaped, and truncated with `...` if longer than `width`."""
     return _cut(escape(text), width)
 
 
-def shorten_apart(one: str, other: str, *, width: int = 60) -> tuple[str, str]:
-    """Both as `shorten` has them; where they would look the same then, from `...` shortly before they differ on."""
-    a, b = escape(one), escape(other)
+def shorten_apart(first: str, second: str, *, width: int = 60) -> tuple[str, str]:
+    """Both texts shortened; if they would look the same, both begin with `...` just before their first difference."""
+    a, b = escape(first), escape(second)
     same = next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     start = same - width // 3 if max(len(a), len(b)) > width and same > width // 2 else 0
     begins = "..." if start else ""
@@ -117,17 +115,17 @@ def _cut(line: str, width: int) -> str:
 
 
 def digits(value: float) -> str:
-    """Three digits, and no exponent from 1e-4 to 1e5: `6000`, `0.084`, `164`."""
+    """Three significant digits, without exponent from 1e-4 to 1e5: `6000`, `0.084`, `164`."""
     return f"{float(f'{value:.3g}'):.5g}"
 
 
-def told_apart(one: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
-    """Both as text, with as many digits more than `form` has as it takes that numbers that differ look different."""
+def told_apart(value: float, other: float, *, form: str = ".4g") -> tuple[str, str]:
+    """Both numbers as text, with more digits than `form` where different numbers would look the same."""
     least, kind = int(form[1:-1]), form[-1]
     for many in range(least, least + 16):
-        first, second = f"{one:.{many}{kind}}", f"{other:.{many}{kind}}"
+        first, second = f"{value:.{many}{kind}}", f"{other:.{many}{kind}}"
         if first != second:
             break
     else:
-        first, second = f"{one:{form}}", f"{other:{form}}"
+        first, second = f"{value:{form}}", f"{other:{form}}"
     return first, second

@@ -1,8 +1,8 @@
-"""Quantities as text: `"45 deg"`, `"5 mm"`, `"2 N m"`, `"-1.5e-3 rad/s"`, converted to SI with their dimension.
+"""Parsing of quantities (`"45 deg"`, `"5 mm"`, `"2 N m"`, `"-1.5e-3 rad/s"`) to SI with their dimension.
 
 A unit is a product of symbols: a space, `*` or `·` multiplies, `/` divides by the symbol after it, and an exponent is
-written `s2`, `s^2`, `s^-1` or `s²`. An angle is a dimension of its own here, so that a length is never taken for an
-angle and `rad/s` is not `Hz`.
+written `s2`, `s^2`, `s^-1` or `s²`. An angle is a dimension of its own, so that lengths and angles are distinct and
+`rad/s` is not `Hz`.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from manipcli.core.errors import Diagnostic, ExitCode, ManipcliError
 from manipcli.core.text import any_of, nearest, shorten
 
 EARTH_GRAVITY: Final = (0.0, 0.0, -9.81)
-"""[m/s2] in the world, where nobody says another."""
+"""Default gravity in the world frame [m/s2]."""
 
 
 class UnitError(ManipcliError):
-    """A text is no quantity, or one of another dimension than the wanted."""
+    """A text is not a quantity, or has the wrong dimension."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.USAGE
     code: ClassVar[str] = "USE110"
@@ -58,7 +58,7 @@ class Dimension:
 
     @property
     def name(self) -> str:
-        """What a quantity of this dimension is called, with its article."""
+        """Name of a quantity of this dimension, with its article."""
         return _NAMES.get(self, f"a quantity in {self.symbol}")
 
     @property
@@ -80,7 +80,7 @@ SPEED, ACCELERATION, JERK = LENGTH / TIME, LENGTH / TIME**2, LENGTH / TIME**3
 ANGULAR_VELOCITY, ANGULAR_ACCELERATION, ANGULAR_JERK = ANGLE / TIME, ANGLE / TIME**2, ANGLE / TIME**3
 FORCE = MASS * ACCELERATION
 TORQUE = ENERGY = FORCE * LENGTH
-"""One dimension: an angle that a torque turns through is a plain number here."""
+"""Torque and energy share one dimension: the angle of rotational work is a plain number here."""
 
 _NAMES = {
     NUMBER: "a plain number", LENGTH: "a length", ANGLE: "an angle", MASS: "a mass", TIME: "a time",
@@ -104,7 +104,7 @@ _EXAMPLES = {
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """`value [unit] * over / under` is SI. Two factors, because 36 mm is 36 / 1000 exactly, and 36 * 0.001 is not."""
+    """Unit whose SI value is `value * over / under`. Two factors: 36 / 1000 is exact, 36 * 0.001 is not."""
 
     over: float
     under: float
@@ -160,23 +160,23 @@ _PART = re.compile(r"(\s*[*·/]\s*|\s+)?([A-Za-zµμ]+|[°%])(\^-?\d{1,2}|\d{1,2
 
 
 def parse_unit(text: str) -> Unit:
-    """The unit that `text` writes.
+    """Parses a unit.
 
     Raises:
-        UnitError: an unknown symbol, or a product after a `/`, which people read in two ways.
+        UnitError: an unknown symbol, or an ambiguous product after a `/`.
     """
     over, under, dimension = 1.0, 1.0, NUMBER
     position, divided = 0, False
     while position < len(text):
         part = _PART.match(text, position)
         if part is None:
-            raise UnitError(f"'{shorten(text)}' is not a unit", hint="units look like mm, rad/s^2 or N m")
+            raise UnitError(f"'{shorten(text)}' is not a unit", hint="write a unit such as mm, rad/s^2 or N m")
         sign, symbol, exponent = (part.group(1) or "").strip(), part.group(2), part.group(3) or "1"
         unit = _symbol(symbol)
         power = _exponent(exponent)
         if divided and sign != "/":
             raise UnitError(
-                f"the unit '{shorten(text)}' multiplies after a '/'",
+                f"the unit '{shorten(text)}' is ambiguous: a product after '/'",
                 hint="write every divided symbol with its own '/': N/s/m",
             )
         if sign == "/":
@@ -205,15 +205,15 @@ def _exponent(text: str) -> int:
     except ValueError:
         power = 0
     if not 1 <= abs(power) <= 9:
-        raise UnitError(f"'{text}' is not an exponent from 1 to 9")
+        raise UnitError(f"the exponent '{text}' is not between 1 and 9")
     return power
 
 
 def parse_quantity(text: str) -> Quantity:
-    """Number and unit in SI; a text without a unit is a plain number.
+    """Parses a number with a unit to SI; a text without a unit is a plain number.
 
     Raises:
-        UnitError: no number, an unknown unit, or a value too large to be one.
+        UnitError: not a number, an unknown unit, or a value out of range.
     """
     match = _QUANTITY.fullmatch(text)
     if match is None:
@@ -222,7 +222,7 @@ def parse_quantity(text: str) -> Quantity:
     unit = parse_unit(unit_text) if unit_text else _unit(NUMBER)
     value = unit.to_si(float(number.replace(" ", "").replace("\t", "")))
     if not math.isfinite(value):
-        raise UnitError(f"'{shorten(text)}' is too large to be a number")
+        raise UnitError(f"'{shorten(text)}' exceeds the largest number, 1.8e308")
     return Quantity(value=value, dimension=unit.dimension)
 
 
@@ -231,7 +231,7 @@ _HOW = "write a number, a space and a unit: '45 deg', '5 mm', '2 N m'"
 
 def _syntax_hint(text: str) -> str:
     if re.fullmatch(r"\s*[-+]?\d+,\d+.*", text):
-        return "write the decimals after a point: 0.5, not 0,5"
+        return "use a decimal point: 0.5, not 0,5"
     if re.fullmatch(r"\s*[-+]?\.?(nan|inf(inity)?)\b.*", text, re.IGNORECASE):
         return "numbers must be finite"
     return _HOW
@@ -241,7 +241,7 @@ def to_si(text: str, *wanted: Dimension, read: Callable[[str], Quantity] = parse
     """The SI value of `text`, which must have one of the `wanted` dimensions.
 
     Raises:
-        UnitError: as `read`; another dimension; or no unit where one is needed.
+        UnitError: from `read`; a wrong dimension; or a missing unit.
     """
     try:
         quantity = read(text)
@@ -253,13 +253,13 @@ def to_si(text: str, *wanted: Dimension, read: Callable[[str], Quantity] = parse
     if quantity.dimension == NUMBER and "%" not in text:
         hint = f"write {text.strip()} without quotes for SI, or '{text.strip()} {wanted[0].symbol}'"
         if _QUANTITY.fullmatch(text) is None:
-            hint = "give its numbers units"
+            hint = "add units to its numbers"
         raise UnitError(f"'{shorten(text)}' has no unit; expected {describe(*wanted)}", hint=hint)
     raise UnitError(f"'{shorten(text)}' is {quantity.dimension.name}; expected {describe(*wanted)}")
 
 
 def describe(*wanted: Dimension) -> str:
-    """`a length (m, cm, mm, um, km, in)`; several are joined by `or`."""
+    """Names and usual units of dimensions: `a length (m, cm, mm, um, km, in)`, joined by `or`."""
     return " or ".join(f"{each.name} ({', '.join(fitting_units(each))})" for each in wanted)
 
 
@@ -269,7 +269,7 @@ def fitting_units(dimension: Dimension) -> tuple[str, ...]:
 
 
 def symbols_of(dimension: Dimension) -> tuple[str, ...]:
-    """Every symbol that alone is a unit of this dimension; for a speed there is none."""
+    """All single symbols of this dimension; empty for compound units such as those of speed."""
     return tuple(symbol for symbol, unit in _UNITS.items() if unit.dimension == dimension)
 
 
@@ -291,12 +291,12 @@ _READABLE: dict[str, tuple[tuple[float, str, float], ...]] = {
 
 
 def readable(value: float, symbol: str, *, digits: int = 3) -> str:
-    """`value` in the SI unit `symbol`, for people: `readable(0.0042, "m")` is `4.2 mm`; angles in degrees."""
+    """`value` [SI unit `symbol`] in a readable unit: `readable(0.0042, "m")` is `4.2 mm`; angles in degrees."""
     if not math.isfinite(value):
         return f"{value:g} {symbol}".rstrip()
     if value == 0.0:
         return f"0 {symbol}".rstrip()  # never -0
-    size = abs(float(f"{value:.{digits}g}"))  # as it is shown: 0.9999 s is 1 s, and not 1e+03 ms
+    size = abs(float(f"{value:.{digits}g}"))  # rounded as shown: 0.9999 s is 1 s, not 1e+03 ms
     for least, shown, factor in _READABLE.get(symbol, ()):
         if size >= least:
             return f"{value * factor:.{digits}g} {shown}"
@@ -304,5 +304,5 @@ def readable(value: float, symbol: str, *, digits: int = 3) -> str:
 
 
 def names_of(dimensions: Sequence[Dimension]) -> str:
-    """`an angle or a length`."""
+    """Names of dimensions: `an angle or a length`."""
     return " or ".join(dimension.name for dimension in dimensions)

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Atomic writing of files: a file is complete or absent."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Writes a file; see `whole_file`."""
+    """Writes a file atomically; see `whole_file`."""
     with whole_file(path) as partial:
         partial.write_bytes(data)
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A name beside that of a file, to write to; the file gets its own name when the block ends well.
+    """Yields a temporary path in the same folder, and renames it to `path` if the block succeeds.
 
-    What was there before is replaced then, and stays as it is where the block does not end well. A link is followed; a
-    device or a pipe (`/dev/stdout`) is itself what is written to.
+    If the block raises, an existing file stays unchanged. Links are followed; devices and pipes (`/dev/stdout`) are
+    written directly.
 
     Raises:
-        OSError: nothing can be written there.
+        OSError: the file cannot be written; names `path`.
     """
     if path.exists() and not path.is_file():
         try:
@@ -34,11 +34,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     whole = Path(os.path.realpath(path))
     partial = whole.with_name(f".{whole.name}.{os.getpid()}.partial")
     try:
-        partial.touch()  # what cannot be written is told before the work
+        partial.touch()  # an unwritable path fails before the work
         yield partial
         partial.replace(whole)
     except OSError as error:
-        # What fails while it is written names no file; and the user does not know of the partial one.
+        # Errors while writing name no file, or the partial one, which the user does not know.
         if error.filename is None or os.fspath(error.filename) == str(partial):
             error.filename = str(path)
         raise

@@ -1,4 +1,4 @@
-"""The base of everything that users write: frozen, unknown keys forbidden, nothing converted that was not meant."""
+"""Base model of all specs that users write: frozen, strict, unknown keys forbidden."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 from manipcli.core.errors import Loc
 
 Mistake = Literal["name", "range", "type", "count", "unit", "conflict", "verb", "duplicate"]
-"""Kinds of mistakes that validators tell with `problem`; the codes stand in `spec/explain.py`."""
+"""Kinds of mistakes that validators raise with `problem`; `spec/explain.py` lists their codes."""
 
 _STRICT = frozenset({"float", "int", "bool", "str"})
 _NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function", "expected"})
@@ -21,7 +21,7 @@ _NO_SCHEMA = frozenset({"default", "metadata", "serialization", "cls", "function
 
 def _make_strict(schema: object) -> None:
     if isinstance(schema, dict):
-        kind = schema.get("type")  # of a schema; a dict of fields may have a field called `type`
+        kind = schema.get("type")  # a string in a schema; a dict of fields may have a field named `type`
         if isinstance(kind, str) and kind in _STRICT:
             schema["strict"] = True
         for key, value in schema.items():
@@ -35,12 +35,12 @@ def _make_strict(schema: object) -> None:
 class Model(BaseModel):
     """A block of a user's file.
 
-    Its numbers, truth values and texts are strict: pydantic alone would read `true` as 1.0 and `"1.0"` as a number.
-    A whole number is still a float where one is wanted, and a list is a tuple.
+    Numbers, booleans and strings are strict: pydantic alone would read `true` as 1.0 and `"1.0"` as a number.
+    An integer is still accepted as a float, and a list as a tuple.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {}
-    """Keys of earlier versions, which are refused, and their names now."""
+    """Old key -> new key; an old key is refused, and the message names the new one."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -52,16 +52,16 @@ class Model(BaseModel):
 
 
 def about(spec: type[BaseModel]) -> str:
-    """The first paragraph of its docstring, in one line."""
+    """The first paragraph of the spec's docstring, on one line."""
     return " ".join(cleandoc(spec.__doc__ or "").partition("\n\n")[0].split())
 
 
 def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *short: JsonSchemaValue) -> JsonSchemaValue:
-    """The JSON Schema of a model of which a validator reads something `short`, too.
+    """The JSON Schema of a model that a validator also reads from a short form.
 
     Args:
-        schema, handler: of `__get_pydantic_json_schema__`.
-        short: schemas of what may stand in the place of the whole block.
+        schema, handler: arguments of `__get_pydantic_json_schema__`.
+        short: schemas of the short forms.
     """
     whole = handler.resolve_ref_schema(handler(schema))
     long = dict(whole)
@@ -73,12 +73,12 @@ def or_short(schema: CoreSchema, handler: GetJsonSchemaHandler, *short: JsonSche
 def problem(
     mistake: Mistake, message: str, *, at: Loc = (), hint: str | None = None, key: bool = False
 ) -> PydanticCustomError:
-    """What a validator raises when a block cannot be meant.
+    """The error that a validator raises for an invalid block.
 
     Args:
-        mistake: the kind, which decides the code.
+        mistake: kind of mistake; selects the code.
         message: one sentence: what is wrong, what was expected.
-        at: where inside the validated block.
+        at: location inside the validated block.
         hint: what to do; the nearest name.
         key: point at the key that `at` names, not at its value.
     """

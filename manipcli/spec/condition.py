@@ -1,4 +1,4 @@
-"""Conditions and expectations as they are written; the loader makes one model a word of these.
+"""Specs of conditions, expectations and watches; `unions` builds one model per condition from them.
 
 until: {inside: {object: ball, of: tray}}
 expect:
@@ -21,10 +21,10 @@ from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import Time
 
 ID = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
-ID_HINT = "an id is letters, digits, '_' and '-', and begins with a letter"
+ID_HINT = "use letters, digits, '_' and '-'; begin with a letter or '_'"
 COMBINATIONS = {
-    "all": "Every one of these conditions holds.",
-    "any": "One of these conditions holds, at least.",
+    "all": "All of these conditions hold.",
+    "any": "At least one of these conditions holds.",
     "not": "This condition does not hold.",
 }
 QUANTIFIERS = {
@@ -33,13 +33,13 @@ QUANTIFIERS = {
     "eventually": "This condition holds at some time.",
 }
 END = "end"
-"""The word of `at` for the end of the run."""
+"""Value of `at` for the end of the run."""
 WATCHED = ("never", "always")
-"""The words under which a condition can be watched while the run goes on."""
+"""Quantifiers of a watch."""
 
 
 class KeyedSpec(Model):
-    """A block that is known by its one key `word`."""
+    """A block that is identified by its single key `word`."""
 
     word: ClassVar[str] = ""
 
@@ -52,16 +52,16 @@ class KeyedSpec(Model):
 
 
 class ConditionSpec(KeyedSpec):
-    """A condition: its name, and under it what it asks; or `all`, `any`, `not`, and under it other conditions."""
+    """A condition: its name with its parameters; or `all`, `any`, `not` with other conditions."""
 
     @property
     def name(self) -> str:
-        """Which condition this is."""
+        """Name of the condition."""
         return self.word
 
     @property
     def combines(self) -> bool:
-        """Whether this is made of other conditions: its `members`."""
+        """Whether this combines other conditions: its `members`."""
         return self.word in COMBINATIONS
 
     @property
@@ -76,25 +76,27 @@ class ConditionSpec(KeyedSpec):
 class ExpectationSpec(ConditionSpec):
     """A condition and when it must hold: `at`, `during`, or under `always`, `never`, `eventually`."""
 
-    id: str | None = Field(None, description="Names it in reports. Default: its word, numbered from the second on.")
+    id: str | None = Field(
+        None, description="Name in reports. Default: the name of the condition, numbered from the second one on."
+    )
     at: str | None = Field(
-        None, description="When: `end` (the last 0.5 s of the run), or the id of a step (the moment at which it ends)."
+        None, description="When: `end` (the last 0.5 s of the run), or the id of a step (the end of that step)."
     )
     during: str | Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
-        None, description="When: all the time of a step, by its id, or of several."
+        None, description="When: throughout a step, by its id, or throughout several steps."
     )
     within: Annotated[Time, Field(gt=0)] | None = Field(
-        None, description="Only with `eventually`: how long there is time for it [s]. Default: to the end."
+        None, description="Only with `eventually`: time limit [s]. Default: the end of the run."
     )
 
     @property
     def quantifier(self) -> str | None:
-        """`always`, `never`, `eventually`; None where the condition stands alone."""
+        """`always`, `never` or `eventually`; None without a quantifier."""
         return self.word if self.word in QUANTIFIERS else None
 
     @property
     def condition(self) -> ConditionSpec:
-        """What must hold, or must not."""
+        """The condition under the quantifier, or this one."""
         if self.quantifier is None:
             return self
         found = getattr(self, self.word)
@@ -108,7 +110,7 @@ class ExpectationSpec(ConditionSpec):
 
     @property
     def label(self) -> str:
-        """Its id; else the word of its condition, after `never_` where it must never hold."""
+        """The id; else the name of the condition, with the prefix `never_` under `never`."""
         if self.id is not None:
             return self.id
         return f"never_{self.condition.name}" if self.quantifier == "never" else self.condition.name
@@ -116,26 +118,28 @@ class ExpectationSpec(ConditionSpec):
     @model_validator(mode="after")
     def _once(self) -> ExpectationSpec:
         if self.id is not None and not ID.fullmatch(self.id):
-            raise problem("conflict", f"'{self.id}' cannot be an id", at=("id",), hint=ID_HINT)
+            raise problem("conflict", f"'{self.id}' is not a valid id", at=("id",), hint=ID_HINT)
         if self.at is not None and self.during is not None:
-            hint = "`at` is one moment, `during` a time"
-            raise problem("conflict", "say either `at` or `during`", at=("during",), key=True, hint=hint)
+            hint = "give `at` for one moment, or `during` for an interval"
+            raise problem("conflict", "both `at` and `during` are given", at=("during",), key=True, hint=hint)
         if self.at is not None and self.quantifier is not None:
-            message = f"`at` is one moment, `{self.quantifier}` speaks of a time"
-            raise problem("conflict", message, at=("at",), key=True, hint="say `during`, or leave it out")
+            message = f"`at` cannot be combined with `{self.quantifier}`"
+            raise problem(
+                "conflict", message, at=("at",), key=True, hint="use `during` for an interval, or leave `at` out"
+            )
         if self.within is not None and self.quantifier != "eventually":
-            message = "`within` beside a condition goes with `eventually` alone"
+            message = "`within` is only allowed with `eventually`"
             raise problem("conflict", message, at=("within",), key=True, hint="write `eventually: {...}`")
         return self
 
 
 class WatchSpec(ExpectationSpec):
-    """What ends the run where it is broken: `always` or `never`, over the whole run or `during` steps."""
+    """A condition that ends the run when violated: `always` or `never`, over the whole run or `during` steps."""
 
-    at: None = Field(None, description="Nothing: a watch looks at all times.")
-    within: None = Field(None, description="Nothing: a watch looks at all times.")
+    at: None = Field(None, description="Not allowed: a watch checks at all times.")
+    within: None = Field(None, description="Not allowed: a watch checks at all times.")
 
     @property
     def label(self) -> str:
-        """Its id; else `watch_` and what an expectation would be called."""
+        """The id; else `watch_` and the label of an expectation."""
         return super().label if self.id is not None else f"watch_{super().label}"

@@ -1,5 +1,4 @@
-"""The controllers file as a whole. Each entry is a controller; the key `type` says which type, by our short name or by
-ROS's long one."""
+"""Spec of a controllers file. The key `type` of an entry is a short name, or the long name that ROS uses."""
 
 from __future__ import annotations
 
@@ -15,12 +14,12 @@ from manipcli.spec.robot import Version
 
 
 class ControllersSpec(Model):
-    """Controllers: who moves which joints, and by what law."""
+    """Controllers: which joints each one commands, and its control law."""
 
-    # The file as a whole, after ROS's own forms have been rewritten to this one.
+    # Files in one of ROS's forms are rewritten to this form first.
 
     types: ClassVar[Mapping[str, type[ControllerSpec]]] = MappingProxyType({})
-    """The specs of the members, by the word under `type`; `unions.controllers_model` fills it."""
+    """Specs of the members by type; `unions.controllers_model` fills it."""
 
     version: Version = None
     controllers: dict[str, ControllerSpec] = Field(description="The controllers, by name.")

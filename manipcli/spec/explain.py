@@ -1,26 +1,26 @@
-"""Pydantic's complaints, told to the writer of the file: place, what was given, what was expected, the nearest name.
+"""Diagnostics from pydantic's errors: place, given value, expected value, nearest name.
 
-Codes are the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not change:
+A code is the kind of file (`TASK`, `ROBOT`, `CTRL`) and a number that does not change:
 
 | number | mistake |
 |---|---|
-| 200 | the file is empty, or no mapping at its top |
+| 200 | the file is empty, or its top level is not a mapping |
 | 201 | an unknown key |
 | 202 | a key is missing |
 | 203 | an unknown name, verb, condition or parameter |
 | 204 | out of range |
 | 205 | a value of the wrong type |
 | 206 | too many or too few items |
-| 207 | a quantity without a unit, or with the wrong one |
+| 207 | a quantity without a unit, or with a wrong unit |
 | 208 | keys or values that contradict each other |
-| 209 | a step without a verb or with several; a condition likewise |
-| 210 | the same name, id or joint twice |
+| 209 | a step without a verb or with several verbs; likewise a condition |
+| 210 | a duplicate name, id or joint |
 | 211 | an expression (`2 * $tilt + 5 deg`) that cannot be computed |
-| 212 | an override (`--set a.b=value`) that fits nowhere |
+| 212 | an override (`--set a.b=value`) whose path does not exist |
 | 213 | the file needs a newer manipcli |
-| 214 | something that ROS knows and manipcli does not serve (warning) |
-| 215 | of several controllers of ROS on one joint, one that is not started (note) |
-| 216 | an integral gain that ROS 1 would not let act (warning) |
+| 214 | a ROS feature that manipcli does not support (warning) |
+| 215 | a ROS controller that starts inactive, since another commands the same joint (note) |
+| 216 | an integral gain that has no effect in ROS 1 (warning) |
 """
 
 from __future__ import annotations
@@ -60,16 +60,16 @@ _MISTAKES = {
     "finite_number": 204, "union_tag_invalid": 203, "union_tag_not_found": 202,
 }  # fmt: skip
 _EXPECTED = {
-    "float_type": "a number", "int_type": "a whole number", "bool_type": "true or false", "string_type": "a text",
+    "float_type": "a number", "int_type": "a whole number", "bool_type": "true or false", "string_type": "a string",
     "tuple_type": "a list", "list_type": "a list", "dict_type": "a mapping", "model_type": "a mapping",
     "model_attributes_type": "a mapping", "mapping_type": "a mapping", "set_type": "a list",
-    "frozen_set_type": "a list", "none_required": "nothing", "int_from_float": "a whole number",
+    "frozen_set_type": "a list", "none_required": "no value", "int_from_float": "a whole number",
 }  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class _Complaint:
-    """One of pydantic's errors on the tree: `path` leads to it, `tags` say at which depth a union took which branch."""
+    """One pydantic error located in the tree. `tags`: the branch that a union took, by depth."""
 
     error: ErrorDetails
     path: Loc
@@ -78,11 +78,11 @@ class _Complaint:
 
     @property
     def open_tag(self) -> tuple[int, str] | None:
-        """The outermost branch that is not decided yet."""
+        """The outermost undecided branch."""
         return self.tags[self.used] if self.used < len(self.tags) else None
 
     def mismatch(self, depth: int) -> bool:
-        """Whether the branch at `depth` was wrong as a whole, so that it was not meant."""
+        """Whether the value does not fit the branch at `depth` at all."""
         return len(self.path) == depth and (self.error["type"] in _EXPECTED or self.error["type"] in _WHOLE)
 
 
@@ -90,7 +90,7 @@ _WHOLE = frozenset({"literal_error", "quantity_type", "unit"})
 
 
 def explain(error: ValidationError, root: Node, model: type[BaseModel], area: str) -> tuple[Diagnostic, ...]:
-    """Every complaint as a finding, in the order of the file."""
+    """All errors as diagnostics, in the order of the file."""
     complaints = [_locate(details, root) for details in error.errors(include_url=False)]
     findings: list[Diagnostic] = []
     for complaint in _decide(_counted(complaints), root):
@@ -100,7 +100,7 @@ def explain(error: ValidationError, root: Node, model: type[BaseModel], area: st
 
 
 def _locate(error: ErrorDetails, root: Node) -> _Complaint:
-    """Walk the location down the tree; what is not on it is pydantic's name of a union's branch."""
+    """Walks the location down the tree; a part that is not in the tree is pydantic's name of a union branch."""
     path: Loc = ()
     tags: list[tuple[int, str]] = []
     loc = error["loc"]
@@ -119,7 +119,7 @@ def _locate(error: ErrorDetails, root: Node) -> _Complaint:
 
 
 def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
-    """Missing items of a list of fixed length are one complaint: its length."""
+    """Merges the missing items of a fixed-length list into one complaint about its length."""
     result: list[_Complaint] = []
     longest: dict[tuple[Loc, tuple[tuple[int, str], ...]], int] = {}
     for complaint in complaints:
@@ -131,9 +131,11 @@ def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
             longest[key] = last + 1
         else:
             result.append(complaint)
-    # An item that is wrong is not counted, which needs no second telling.
+    # A wrong item is not counted; the count needs no second message.
     wrong = {complaint.path[:depth] for complaint in result for depth in range(len(complaint.path))}
-    result = [one for one in result if one.error["type"] != "too_short" or one.path not in wrong]
+    result = [
+        complaint for complaint in result if complaint.error["type"] != "too_short" or complaint.path not in wrong
+    ]
     for index, complaint in enumerate(result):
         wanted = longest.get((complaint.path, complaint.tags))
         if wanted is not None and complaint.error["type"] == "missing":
@@ -144,7 +146,7 @@ def _counted(complaints: Sequence[_Complaint]) -> list[_Complaint]:
 
 
 def _decide(complaints: Sequence[_Complaint], root: Node) -> list[list[_Complaint]]:
-    """For each union, keep the branch that was meant; branches that are all of the wrong type become one complaint."""
+    """Keeps the best matching branch of each union; if none matches, its branches become one complaint."""
     decided: list[list[_Complaint]] = []
     unions: dict[tuple[int, Loc], list[_Complaint]] = {}
     for complaint in complaints:
@@ -179,7 +181,7 @@ def _finding(
 ) -> Diagnostic:
     kind, path = first.error["type"], first.path
     node = node_at(root, path)
-    what, hint = _told(first, branches, root, model)
+    what, hint = _message(first, branches, root, model)
     at_key = kind == "extra_forbidden" or bool(first.error.get("ctx", {}).get("key", False))
     origin = None if at_key else _origin(node, root)
     if kind in _RANGES and hint is not None and origin is not None:
@@ -193,24 +195,24 @@ def _finding(
 
 
 def _origin(node: Node, root: Node) -> str | None:
-    """Where the parameter stands that a value comes from."""
+    """The parameter that a value comes from, and its place."""
     written = node.written if isinstance(node, ScalarNode) else None
     for name in re.findall(r"\$\{?(\w+)", written or ""):
-        said = child(child(root, "params") or root, name)
-        if said is not None:
-            return f"it comes from '{written}'; params.{name} is at {said.place}"
+        declared = child(child(root, "params") or root, name)
+        if declared is not None:
+            return f"the value comes from '{written}'; params.{name} is at {declared.place}"
     return None
 
 
-def _told(
+def _message(
     first: _Complaint, branches: Sequence[_Complaint], root: Node, model: type[BaseModel]
 ) -> tuple[str, str | None]:
-    """What to say, and the hint."""
+    """The message and the hint."""
     kind, path, context = first.error["type"], first.path, first.error.get("ctx", {})
     node = node_at(root, path)
     if len(branches) > 1:
         around = {depth: tag for depth, tag in first.tags if depth < len(path)}
-        return _none_fits(branches, node, shape.at(model, path, around))
+        return _no_match(branches, node, shape.at(model, path, around))
     if kind == "extra_forbidden":
         return f"unknown key '{dotted((path[-1],))}'", hints.unknown_key(path, dict(first.tags), model)
     if kind == "missing":
@@ -235,7 +237,7 @@ def _told(
     if kind in ("value_error", "assertion_error"):
         return str(context.get("error", first.error["msg"])), None
     if kind == "none_required":
-        return f"expected nothing, not {shown(node)}", _described(_field(first, model), path)
+        return f"expected no value, not {shown(node)}", _described(_field(first, model), path)
     expected = _expected(first)
     kinds = shape.at(model, path, dict(first.tags))
     hint = hints.of_type(kind, node, kinds, item=isinstance(path[-1], int))
@@ -252,7 +254,7 @@ _RANGES = {
 
 
 def _field(complaint: _Complaint, model: type[BaseModel]) -> FieldInfo | None:
-    """What the model says of the key; None for an item of a list, and for a name that the writer has chosen."""
+    """The field of the key; None for a list item and for a user-defined name."""
     *above, key = complaint.path or ("",)
     return shape.keys_of(shape.at(model, tuple(above), dict(complaint.tags))).get(str(key))
 
@@ -262,7 +264,7 @@ def _described(field: FieldInfo | None, path: Loc) -> str | None:
 
 
 def _limit(context: dict[str, object], unit: Unit | None) -> str:
-    """A bound, with its unit: `180 deg`, `3600 s`."""
+    """A bound with its unit: `180 deg`, `3600 s`."""
     value = next((context[key] for key in ("gt", "ge", "lt", "le", "multiple_of") if key in context), "")
     if not isinstance(value, int | float):
         return str(value)
@@ -273,7 +275,7 @@ def _limit(context: dict[str, object], unit: Unit | None) -> str:
 
 
 def _unit(complaint: _Complaint, model: type[BaseModel]) -> Unit | None:
-    """Of the quantity that should stand there, also as an item of a list."""
+    """Unit of the expected quantity, also for list items."""
     path, tags = complaint.path, dict(complaint.tags)
     key = max((k for k, part in enumerate(path) if isinstance(part, str)), default=None)
     if key is None:
@@ -292,25 +294,26 @@ def _expected(complaint: _Complaint) -> str:
     return str(context.get("expected") or _EXPECTED.get(error["type"], ""))
 
 
-def _none_fits(branches: Sequence[_Complaint], node: Node, kinds: Sequence[object]) -> tuple[str, str | None]:
+def _no_match(branches: Sequence[_Complaint], node: Node, kinds: Sequence[object]) -> tuple[str, str | None]:
     wanted = list(dict.fromkeys(expected for expected in map(_expected, branches) if expected))
-    one = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
-    said = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
-    return f"expected {one}, not {shown(node)}", hints.its_key(node, kinds) or next(filter(None, said), None)
+    alternatives = wanted[0] if len(wanted) == 1 else f"{', '.join(wanted[:-1])}, or {wanted[-1]}"
+    given = (str(branch.error.get("ctx", {}).get("hint", "")) for branch in branches)
+    hint = hints.its_key(node, kinds) or next(filter(None, given), None)
+    return f"expected {alternatives}, not {shown(node)}", hint
 
 
 def _unknown_word(expected: str, node: Node) -> tuple[str, str | None]:
     words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
     value = node.value if isinstance(node, ScalarNode) else None
     close = nearest(value, words) if isinstance(value, str) else ()
-    one = f"one of {expected}" if len(words) > 1 else expected
-    return f"expected {one}, not {shown(node)}", f"did you mean {any_of(close)}?" if close else None
+    wanted = f"one of {expected}" if len(words) > 1 else expected
+    return f"expected {wanted}, not {shown(node)}", f"did you mean {any_of(close)}?" if close else None
 
 
 def _unknown_type(context: dict[str, object], node: Node) -> tuple[str, str | None]:
     key = str(context.get("discriminator", "")).strip("'")
     if "expected_tags" not in context:
-        return f"the key '{key}' is missing: it says which kind this is", None
+        return f"the key '{key}' is missing: it selects the type", None
     tags = [tag.strip(" '") for tag in str(context["expected_tags"]).split(",")]
     given = str(context.get("tag", ""))
     hint = did_you_mean(given, tags, kind="known")

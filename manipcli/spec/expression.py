@@ -1,14 +1,14 @@
-"""Parameters and arithmetic with units in a task's texts: `$tilt`, `$a / 2`, `2 * $tilt + 5 deg`.
+"""Expressions with parameters and units in a task file: `$tilt`, `$a / 2`, `2 * $tilt + 5 deg`.
 
-The grammar, which has no names but parameters and can therefore run nothing:
+The grammar (parameters are its only names, so it cannot run code):
 
     sum     = product (("+" | "-") product)*
     product = sign (("*" | "/") sign)*
     sign    = ("+" | "-")* value
     value   = number [unit] | "$" name | "(" sum ")"
 
-A unit belongs to the number before it: `6 rad/s / 2` is 3 rad/s. `$$` writes a dollar sign. Where a quantity is wanted,
-arithmetic needs no parameter: `30 deg + 5 deg`.
+A unit belongs to the number before it: `6 rad/s / 2` is 3 rad/s. `$$` writes a dollar sign. A quantity may be
+arithmetic without parameters: `30 deg + 5 deg`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from manipcli.spec.source.tree import Entry, MappingNode, Node, Scalar, ScalarNo
 
 _REFERENCE = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)(?=[A-Za-z_{])")
 NAME = re.compile(r"[A-Za-z_]\w*")
-"""What a parameter may be called."""
+"""Valid parameter names."""
 _NAMES = re.compile(r"(?<!\$)(?:\$\$)*\$(?!\$)([A-Za-z_]\w*)")
 _ALONE = re.compile(r"\s*\$([A-Za-z_]\w*)\s*")
 _TOKEN = re.compile(
@@ -46,7 +46,7 @@ Params = Mapping[str, Scalar]
 
 @dataclass(frozen=True, slots=True)
 class ExpressionError(Exception):
-    """An expression that has no value; `unknown`: because of a parameter's name; `uncut`: it is no expression."""
+    """An expression without a value. `unknown`: a parameter is unknown; `uncut`: it cannot be tokenised."""
 
     cause: str
     hint: str | None = None
@@ -60,26 +60,26 @@ def is_expression(text: str) -> bool:
 
 
 def evaluate(text: str, params: Params) -> Scalar:
-    """A parameter as it is, or the quantity that an expression computes: a text in SI, a number if it has no unit.
+    """The value of a parameter or expression: an SI text, or a number if it has no unit.
 
-    `params` has every name in it.
+    `params` must hold every name that `text` uses.
 
     Raises:
-        ExpressionError: no expression, dimensions that cannot be added, division by zero.
+        ExpressionError: syntax error, dimensions that cannot be added, division by zero.
     """
     alone = _ALONE.fullmatch(text)
     if alone is not None:
         return params[alone.group(1)]
     value = _Parser(text, params).whole()
     if not math.isfinite(value.value):
-        raise ExpressionError(f"'{shorten(text)}' is too large to be a number")
+        raise ExpressionError(f"'{shorten(text)}' exceeds the largest number, 1.8e308")
     if value.dimension == NUMBER:
         return int(value.value) if value.value.is_integer() and abs(value.value) < 2**53 else value.value
     return format_quantity(value.value, value.dimension)
 
 
 def quantity_of(text: str) -> Quantity:
-    """A number with a unit, or what arithmetic with such gives: `30 deg + 5 deg`.
+    """A number with a unit, or the result of arithmetic on such numbers: `30 deg + 5 deg`.
 
     Raises:
         UnitError: as `parse_quantity`; or the arithmetic has no value.
@@ -97,7 +97,7 @@ def quantity_of(text: str) -> Quantity:
     if value is None:
         raise plain
     if not math.isfinite(value.value):
-        raise UnitError(f"'{shorten(text)}' is too large to be a number")
+        raise UnitError(f"'{shorten(text)}' exceeds the largest number, 1.8e308")
     return value
 
 
@@ -118,8 +118,8 @@ class _Parser:
             match = _TOKEN.match(self.text, position)
             if match is None or match.lastgroup is None:
                 rest = shorten(self.text[position:].strip(), width=20)
-                hint = "write `$name`, or arithmetic: 2 * $tilt + 5 deg; `$$` is a plain dollar sign"
-                raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{rest}'", hint, uncut=True)
+                hint = "write `$name`, or arithmetic: 2 * $tilt + 5 deg; write `$$` for a plain dollar sign"
+                raise ExpressionError(f"cannot compute '{shorten(self.text)}': unexpected '{rest}'", hint, uncut=True)
             tokens.append((match.lastgroup, match.group(match.lastgroup)))
             position = match.end()
         return tokens
@@ -130,11 +130,13 @@ class _Parser:
         except UnitError as error:
             raise ExpressionError(error.cause, error.hint) from None
         if self.position < len(self.tokens):
-            raise ExpressionError(f"cannot compute '{shorten(self.text)}': at '{self.tokens[self.position][1]}'")
+            raise ExpressionError(
+                f"cannot compute '{shorten(self.text)}': unexpected '{self.tokens[self.position][1]}'"
+            )
         return value
 
     def taken(self, *signs: str) -> str | None:
-        """The next token if it is one of `signs`, taken."""
+        """Consumes and returns the next token if it is in `signs`."""
         if self.position < len(self.tokens) and self.tokens[self.position][1] in signs:
             self.position += 1
             return self.tokens[self.position - 1][1]
@@ -143,7 +145,7 @@ class _Parser:
     def sum(self) -> Quantity:
         self.depth += 1
         if self.depth > _DEEPEST:
-            raise ExpressionError("too many parentheses")
+            raise ExpressionError(f"more than {_DEEPEST} nested parentheses")
         value = self.product()
         while (sign := self.taken("+", "-")) is not None:
             other = self.product()
@@ -191,14 +193,14 @@ class _Parser:
         if isinstance(value, str):
             return quantity_of(value)
         if value is None or isinstance(value, bool):
-            raise ExpressionError(f"the parameter '${name}' is no number")
+            raise ExpressionError(f"the parameter '${name}' is not a number")
         return Quantity(float(value), NUMBER)
 
 
 def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list[Diagnostic], frozenset[Place]]:
-    """The task with every expression computed, what could not be, and which values are unknown because of that.
+    """The task with all expressions computed, the diagnostics, and the places of values that stay unknown.
 
-    Parameters may use those above them in `params:`. `refused`: places of values that are none.
+    A parameter may use the parameters above it in `params:`. `refused`: places of invalid values.
     """
     work = _Substitution(refused)
     if not isinstance(root, MappingNode):
@@ -225,8 +227,8 @@ def substitute(root: Node, *, refused: Iterable[Place] = ()) -> tuple[Node, list
 
 
 class _Substitution:
-    """`params`: those with a value; `lost`: those without one, which has been told; `below`: not reached yet, the one
-    that is computed first."""
+    """`params`: computed parameters; `lost`: parameters without a value, already reported; `below`: not computed yet,
+    beginning with the current one."""
 
     def __init__(self, refused: Iterable[Place]) -> None:
         self.params: dict[str, Scalar] = {}
@@ -257,25 +259,25 @@ class _Substitution:
             return node
 
     def in_order(self, names: Sequence[str]) -> None:
-        """Parameters, and only those, are spoken of; in `params:` by what stands below them."""
+        """Checks that all names are parameters; inside `params:`, that they are defined above."""
         for name in names:
             if self.below and name == self.below[0]:
-                raise ExpressionError(f"the parameter '${name}' is computed from itself", "give it a value")
+                raise ExpressionError(f"the parameter '${name}' depends on itself", "give it a value")
             if name in self.below:
-                cause = f"the parameter '${name}' stands below; one is computed from those above it"
+                cause = f"the parameter '${name}' is used before it is defined"
                 raise ExpressionError(cause, f"move '{escape(name)}' above '{escape(self.below[0])}'", unknown=True)
             if name not in self.params:
-                known = [one for one in self.declared if one not in self.below[:1]]
+                known = [param for param in self.declared if param not in self.below[:1]]
                 hint = did_you_mean(name, known, kind="params") if self.declared else no_params(name)
                 raise ExpressionError(f"unknown parameter '${name}'", hint, unknown=True)
 
 
 def no_params(name: str) -> str:
-    """The hint where a task uses a parameter and has none."""
+    """Hint for a task that uses a parameter and declares none."""
     word = escape(name)
-    return f"the task has no parameters: write `params: {{{word}: ...}}` at its top, and ${word} where it is used"
+    return f"the task has no parameters: add `params: {{{word}: ...}}`, then write ${word} where it is used"
 
 
 def escaped(text: str) -> str:
-    """`text` so that `substitute` gives it back."""
+    """`text` with dollar signs escaped, so that `substitute` returns it unchanged."""
     return text.replace("$", "$$")

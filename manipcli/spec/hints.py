@@ -1,4 +1,4 @@
-"""Hints for who wrote a file: the unit that was meant, the place of a key, the value as it should be written."""
+"""Hints for errors in a file: the likely unit, the right place of a key, the right form of a value."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SMALLER = (
 
 
 def other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str | None:
-    """The hint where a plain number beyond what is taken lies within it as degrees, millimetres or percent."""
+    """Hint for a number out of range that would be in range as degrees, millimetres or percent."""
     most = next((context[key] for key in ("le", "lt", "ge") if key in context), None)
     value = node.value if isinstance(node, ScalarNode) else None
     if not isinstance(most, int | float) or not isinstance(value, int | float) or value * most <= 0:
@@ -37,25 +37,25 @@ def other_unit(unit: Unit | None, context: dict[str, object], node: Node) -> str
 
 
 def unknown_key(path: Loc, tags: Mapping[int, str], model: type[BaseModel]) -> str | None:
-    """The key's new name, the block around it that knows it, or the nearest of the keys that are known there."""
+    """Hint for an unknown key: its new name, the block it belongs to, or the nearest known key."""
     key = str(path[-1])
     for kind in shape.at(model, path[:-1], tags):
         if isinstance(kind, type) and issubclass(kind, Model) and key in kind.renamed:
-            return f"write `{kind.renamed[key]}`, as `{key}` is called now"
+            return f"write `{kind.renamed[key]}`: `{key}` was renamed"
     for k in range(len(path) - 2, 0, -1):
         if key in shape.keys_of(shape.at(model, path[:k], tags)):
-            return f"`{key}` stands beside `{path[k]}`, not below it"
+            return f"put `{key}` next to `{path[k]}`, not inside it"
     known = shape.keys_of(shape.at(model, path[:-1], tags))
     inside = [name for name in known if key in shape.keys_of(shape.at(model, (*path[:-1], name), tags))]
     if 0 < len(inside) <= 3:
-        return f"`{key}` stands below {' or '.join(f'`{name}`' for name in inside)}"
+        return f"put `{key}` inside {' or '.join(f'`{name}`' for name in inside)}"
     close = nearest(key, known)
     hint = did_you_mean(key, known, kind="known keys")
     return f"{hint} ({close[0]}: {known[close[0]].description})" if close and known[close[0]].description else hint
 
 
 def to_write(kinds: Sequence[object]) -> str | None:
-    """How a mapping of these types is written: `{to: ...}`; of several, what all of them need."""
+    """How to write a mapping of these types: `{to: ...}`; for several types, their common required keys."""
     known = shape.keys_of(kinds)
     each = [keys for kind in kinds if (keys := shape.keys_of([kind]))]
     needed = [key for key in known if all(key in keys and keys[key].is_required() for keys in each)]
@@ -66,27 +66,26 @@ def to_write(kinds: Sequence[object]) -> str | None:
 
 
 def its_key(node: Node, kinds: Sequence[object]) -> str | None:
-    """Where a word stands alone that is a key of the mapping that may stand there: how that is written."""
+    """Hint for a scalar that is a key of the expected mapping: how to write that mapping."""
     known = shape.keys_of(kinds)
     return to_write(kinds) if isinstance(node, ScalarNode) and node.value in known else None
 
 
 def of_type(kind: str, node: Node, kinds: Sequence[object], *, item: bool) -> str | None:
-    """Where a value, maybe an `item` of a list, is of none of the `kinds` that may stand there: the YAML that was
-    meant."""
+    """Hint for a value, maybe an `item` of a list, of the wrong type: the YAML that was probably meant."""
     value = node.value if isinstance(node, ScalarNode) else None
     if isinstance(node, ScalarNode) and value is None:
         return "the key has no value"
     if kind == "bool_type" and isinstance(value, str) and value.casefold() in _WORDS:
-        return f"YAML 1.2 knows true and false alone: write {_WORDS[value.casefold()]}"
+        return f"YAML 1.2 has only true and false: write {_WORDS[value.casefold()]}"
     if kind in ("float_type", "int_type") and isinstance(value, str):
         return _quoted(value)
-    if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, ...) for one in kinds):
+    if kind == "tuple_type" and isinstance(value, str) and any(get_args(allowed) == (str, ...) for allowed in kinds):
         return f"write [{value}]"
-    if kind == "tuple_type" and isinstance(value, str) and any(get_args(one) == (str, str) for one in kinds):
-        return "a pair is a list of its own: [[A, B]]" if item else "a pair is a list: [A, B]"
+    if kind == "tuple_type" and isinstance(value, str) and any(get_args(allowed) == (str, str) for allowed in kinds):
+        return "write each pair as a list: [[A, B]]" if item else "write a pair as a list: [A, B]"
     if kind == "string_type" and isinstance(value, int | float):
-        return "quotes make a text of it"
+        return "put it in quotes to make it a string"
     return None
 
 

@@ -1,4 +1,4 @@
-"""A file given in the place of another kind, refused in one finding instead of by all that it lacks."""
+"""Refusal of a file of the wrong kind, with one diagnostic instead of all its missing keys."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ _DESCRIPTIONS = (".urdf", ".xacro")
 
 
 def refuse_description(name: str, wanted: str) -> None:
-    """A URDF or xacro, known by its `name`, where a file of the kind `wanted` belongs.
+    """Refuses a URDF or xacro, recognised by its `name`, instead of a file of the kind `wanted`.
 
     Raises:
-        InvalidInput: USE105 it is one.
+        InvalidInput: USE105 the file is a URDF or xacro.
     """
     if name.lower().endswith(_DESCRIPTIONS):
-        raise _refusal(name, "a robot description", wanted, hint=f"a robot file names it: `description: {name}`")
+        raise _refusal(name, "a robot description", wanted, hint=f"name it in a robot file: `description: {name}`")
 
 
 def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
-    """The tree of the file `name` is of another kind than `wanted`, without doubt.
+    """Refuses the file `name` if its tree is certainly not of the kind `wanted`.
 
     Raises:
-        InvalidInput: USE105 it is.
+        InvalidInput: USE105 the file is of another kind.
     """
     found = _certain_kind(root) if isinstance(root, MappingNode) else None
     if found is not None and found != wanted:
@@ -33,7 +33,7 @@ def refuse_other_kind(root: Node, name: str, wanted: str) -> None:
 
 
 def names_controllers(node: Node, types: Collection[str]) -> bool:
-    """Whether there is a controller, of ROS or of one of our types, or ROS's manager of them, at or below this."""
+    """Whether this or a block below is a controller of ROS or of one of `types`, or ROS's controller manager."""
     return isinstance(node, MappingNode) and any(
         key == MANAGER
         or (key.rpartition(".")[2] == "type" and _is_controller(entry.node, types))
@@ -48,7 +48,7 @@ def _is_controller(kind: Node, types: Collection[str]) -> bool:
 
 
 def _certain_kind(root: MappingNode) -> str | None:
-    """Which kind this is; None for the controllers files of ROS, and where keys of several kinds stand together."""
+    """The kind of file; None for ROS controllers files and for mixed keys of several kinds."""
     entries = root.entries
     texts = {key for key, entry in entries.items() if isinstance(entry.node, ScalarNode)}
     if "task" in texts or ("steps" in entries and isinstance(entries["steps"].node, SequenceNode)):
@@ -61,5 +61,5 @@ def _certain_kind(root: MappingNode) -> str | None:
 
 
 def _refusal(name: str, found: str, wanted: str, *, hint: str | None = None) -> InvalidInput:
-    message = f"this is {found}; a {wanted} file was expected"
+    message = f"expected a {wanted} file, not {found}"
     return InvalidInput([Diagnostic("USE105", message, Place(name, 1, 1), hint=hint)])

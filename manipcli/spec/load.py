@@ -1,4 +1,4 @@
-"""The three files, loaded: text to tree to validated spec. All findings of a file are raised at once, with places."""
+"""Loading of task, robot and controllers files: text to tree to validated spec, with all errors at once."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from manipcli.spec.source.yaml import MAX_BYTES, parse
 from manipcli.spec.task import TaskSpec
 
 FileKind = Literal["task", "robot", "controllers"]
-_NONE = "expected the mapping of a task, robot or controllers file"
+_NONE = "not a task, robot or controllers file"
 
 
 def read_bytes(path: Path) -> bytes:
-    """The bytes of a file that a user named.
+    """Reads a file that the user named.
 
     Raises:
-        InvalidInput: USE101 it is not there; USE102 no regular file; USE103 it cannot be read; YAML103 too large.
+        InvalidInput: USE101 missing; USE102 not a regular file; USE103 unreadable; YAML103 too large.
     """
     place = Place(str(path), 0, 0)
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            what = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            what = "a folder, not a file" if stat.S_ISDIR(status.st_mode) else "not a regular file"
             raise InvalidInput([Diagnostic("USE102", f"this is {what}", place)])
         if status.st_size > MAX_BYTES:
             raise InvalidInput([Diagnostic("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", place)])
@@ -54,30 +54,30 @@ def read_bytes(path: Path) -> bytes:
 
 
 def sibling(path: Path) -> str | None:
-    """The file beside it that was meant."""
+    """Hint for a missing file: similar names in its folder."""
     try:
         names = sorted(entry.name for entry in os.scandir(path.parent))
     except OSError:
-        return f"the folder '{path.parent}' is not there either"
+        return f"the folder '{path.parent}' does not exist either"
     close = nearest_file(path.name, names)
-    return f"did you mean {any_of(close)}?" if close else f"beside it: {listed(names)}" if names else None
+    return f"did you mean {any_of(close)}?" if close else f"files in the folder: {listed(names)}" if names else None
 
 
 def kind_of(path: Path, *, types: Collection[str] | None = None) -> FileKind:
-    """Which of the three files this is, by its top-level keys; a controllers file of ROS has none of its own.
+    """The kind of a file, by its top-level keys; any other mapping is a controllers file, as ROS writes them.
 
     Args:
         path: the file.
-        types: of our controllers, where the file may be none of the three: a controllers file has to name a
-            controller then, of one of these types or of ROS.
+        types: our controller types. If given, a controllers file must name a controller of one of these types or of
+            ROS.
 
     Raises:
-        InvalidInput: it cannot be read, is no YAML mapping, or with `types` none of the three.
+        InvalidInput: the file cannot be read or is not a YAML mapping; with `types`, it is not of any kind.
     """
-    told: list[Diagnostic] = []
-    root = parse(read_bytes(path), str(path), infinite=True, told=told if types is None else None)
-    if not isinstance(root, MappingNode) and told:
-        raise InvalidInput(told)
+    found: list[Diagnostic] = []
+    root = parse(read_bytes(path), str(path), infinite=True, reported=found if types is None else None)
+    if not isinstance(root, MappingNode) and found:
+        raise InvalidInput(found)
     if not isinstance(root, MappingNode):
         raise InvalidInput([Diagnostic("USE104", _NONE, Place(str(path), 1, 1))])
     if "task" in root.entries or "steps" in root.entries:
@@ -99,12 +99,12 @@ def load_task(
     overrides: Sequence[str] = (),
     seed: int | None = None,
 ) -> Located[TaskSpec]:
-    """A task file.
+    """Loads a task file.
 
     Args:
         path: the file.
-        model: of `unions.task_model`: which verbs, conditions and expectations there are.
-        overrides: of `--set`, for all three files; those of the other two are only read.
+        model: the result of `unions.task_model`, with all verbs, conditions and expectations.
+        overrides: values of `--set` for all three files; those of the other two are only parsed.
         seed: replaces `simulation.seed`.
 
     Raises:
@@ -133,7 +133,7 @@ def salvage_task(
     overrides: Sequence[str],
     seed: int | None,
 ) -> Located[TaskSpec] | None:
-    """What remains of a task file that `load_task` refused, for checking it further; None where too little does."""
+    """The valid part of a task file that `load_task` refused, for further checks; None if too little is left."""
     try:
         source, _ = _task_source(read_bytes(path), str(path), model, overrides, seed)
     except InvalidInput:
@@ -144,18 +144,18 @@ def salvage_task(
 def _task_source(
     text: str | bytes, name: str, model: type[TaskSpec], overrides: Sequence[str], seed: int | None
 ) -> tuple[Source, list[Diagnostic]]:
-    """The tree of a task, overrides and parameters put in, and what is wrong with those."""
+    """The tree of a task after overrides and parameters, and their diagnostics."""
     wanted = (*read_overrides(overrides), *(() if seed is None else (seed_override(seed),)))
-    written, told = _source(text, name, "TASK", "task")
+    written, in_text = _source(text, name, "TASK", "task")
     source, findings = _changed(written, wanted, model)
-    refused = {finding.place for finding in told if finding.place is not None}
+    refused = {finding.place for finding in in_text if finding.place is not None}
     root, more, unknown = substitute(source.root, refused=refused)
     source = Source(name, root, "TASK", unknown=unknown)
-    return source, [*told, *findings, *more, *_taken_twice(source)]
+    return source, [*in_text, *findings, *more, *_duplicate_ids(source)]
 
 
-def _taken_twice(source: Source) -> Iterator[Diagnostic]:
-    """Ids that two steps, or two of expectations and watches, have: looked for here, so that no other mistake hides
+def _duplicate_ids(source: Source) -> Iterator[Diagnostic]:
+    """Duplicate ids of steps, or of expectations and watches; checked on the tree, so that no other error hides
     them."""
     judged: dict[str, str] = {}
     for key, why, first in (
@@ -169,13 +169,13 @@ def _taken_twice(source: Source) -> Iterator[Diagnostic]:
             if not isinstance(own, ScalarNode) or not isinstance(own.value, str):
                 continue
             if own.value in first:
-                message = f"the id '{escape(own.value)}' is taken by {first[own.value]}"
-                yield source.finding(210, (key, k, "id"), message, hint=f"{why}: give another")
+                message = f"duplicate id '{escape(own.value)}': {first[own.value]} has it already"
+                yield source.finding(210, (key, k, "id"), message, hint=f"choose another: {why}")
             first.setdefault(own.value, f"{key}[{k}]")
 
 
 def load_robot(path: Path, *, overrides: Sequence[str] = ()) -> Located[RobotSpec]:
-    """A robot file; of the overrides those that begin with `robot.`."""
+    """Loads a robot file; uses the overrides that begin with `robot.`."""
     return load_robot_text(read_bytes(path), str(path), overrides=overrides)
 
 
@@ -186,13 +186,13 @@ def load_robot_text(text: str | bytes, name: str, *, overrides: Sequence[str] = 
 
 
 def _robot_source(text: str | bytes, name: str, overrides: Sequence[str]) -> tuple[Source, list[Diagnostic]]:
-    written, told = _source(text, name, "ROBOT", "robot")
+    written, in_text = _source(text, name, "ROBOT", "robot")
     source, findings = _changed(written, read_overrides(overrides), RobotSpec)
-    return source, [*told, *findings]
+    return source, [*in_text, *findings]
 
 
 def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[RobotSpec] | None:
-    """What remains of a robot file that `load_robot` refused, for checking it further; None where too little does."""
+    """The valid part of a robot file that `load_robot` refused, for further checks; None if too little is left."""
     try:
         source, _ = _robot_source(read_bytes(path), str(path), overrides)
     except InvalidInput:
@@ -203,12 +203,12 @@ def salvage_robot_file(path: Path, *, overrides: Sequence[str]) -> Located[Robot
 def load_controllers(
     path: Path, *, model: type[ControllersSpec], overrides: Sequence[str] = ()
 ) -> Located[ControllersSpec]:
-    """A controllers file in our form or one of ROS's.
+    """Loads a controllers file in our form or in a form of ROS.
 
     Args:
         path: the file.
-        model: of `unions.controllers_model`: which types of controllers there are.
-        overrides: of `--set`; those that begin with `controllers.` are used.
+        model: the result of `unions.controllers_model`, with all types of controllers.
+        overrides: values of `--set`; those that begin with `controllers.` are used.
     """
     return load_controllers_text(read_bytes(path), str(path), model=model, overrides=overrides)
 
@@ -224,16 +224,16 @@ def load_controllers_text(
 def _controllers_source(
     text: str | bytes, name: str, model: type[ControllersSpec], overrides: Sequence[str]
 ) -> tuple[Source, list[Diagnostic]]:
-    written, told = _source(text, name, "CTRL", "controllers")
+    written, in_text = _source(text, name, "CTRL", "controllers")
     root, more = rewrite(written.root, model.types)
     source, findings = _changed(Source(name, root, "CTRL"), read_overrides(overrides), model)
-    return source, [*told, *more, *findings]
+    return source, [*in_text, *more, *findings]
 
 
 def salvage_controllers_file(
     path: Path, *, model: type[ControllersSpec], overrides: Sequence[str]
 ) -> Located[ControllersSpec] | None:
-    """What remains of a controllers file that `load_controllers` refused; None where too little does."""
+    """The valid part of a controllers file that `load_controllers` refused; None if too little is left."""
     try:
         source, _ = _controllers_source(read_bytes(path), str(path), model, overrides)
     except InvalidInput:
@@ -242,14 +242,14 @@ def salvage_controllers_file(
 
 
 def _source(text: str | bytes, name: str, area: Area, kind: FileKind | None = None) -> tuple[Source, list[Diagnostic]]:
-    """The tree of a file, and what is wrong with its text."""
+    """The tree of a file, and the diagnostics of its text."""
     if kind is not None:
         refuse_description(name, kind)
-    told: list[Diagnostic] = []
-    root: Node | None = parse(text, name, infinite=area == "CTRL", told=told)
+    findings: list[Diagnostic] = []
+    root: Node | None = parse(text, name, infinite=area == "CTRL", reported=findings)
     if kind is not None and root is not None:
         refuse_other_kind(root, name, kind)
-    return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area), told
+    return Source(name, MappingNode({}, Place(name, 1, 1)) if root is None else root, area), findings
 
 
 def _changed(source: Source, overrides: Sequence[Override], model: type[Model]) -> tuple[Source, list[Diagnostic]]:

@@ -1,4 +1,4 @@
-"""A validated file with the places of everything in it, so that later stages can point at what they refuse."""
+"""A validated spec with the place of every value in its file, for the diagnostics of later stages."""
 
 from __future__ import annotations
 
@@ -33,20 +33,24 @@ M = TypeVar("M", bound=Model)
 Area = Literal["TASK", "ROBOT", "CTRL"]
 
 UNCOMPUTED: Final = ("TASK203", "TASK211")
-"""An expression that has no value. That its text is no name either (`MISNAMED`) needs no second telling."""
+"""Codes of an expression without a value: `MISNAMED` errors at the same place are dropped."""
 MISNAMED: Final = "TASK23"
 TWICE: Final = "YAML106"
-"""A key that stands twice: what the second holds is left out, which may be what other lines name (`UNNAMED`)."""
+"""Code of a duplicate key: its second value is dropped, so `UNNAMED` errors in the same file are dropped, too."""
 UNNAMED: Final = ("TASK225", "TASK227", "TASK230")
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file's tree, after parameters and overrides, and what it is called.
+    """The tree of a file after parameters and overrides.
 
-    `kept`: where items of a list were left out, the indices in the file of those that remain, by the list's key.
-    `whole`: where anything was left out or replaced, the tree before that.
-    `unknown`: the values that are not known, since what they are computed from has been refused.
+    Attributes:
+        name: of the file, as places show it.
+        root: the tree.
+        area: prefix of the file's codes.
+        kept: indices in the file of the items that remain, by list; only for lists with removed items.
+        whole: the tree before values were removed or replaced; None if none were.
+        unknown: places of values that cannot be computed, because their inputs were refused.
     """
 
     name: str
@@ -57,11 +61,11 @@ class Source:
     unknown: frozenset[Place] = frozenset()
 
     def plain(self) -> Plain:
-        """The data alone."""
+        """The plain data, without places."""
         return plain(self.root)
 
     def untouched(self, *path: str) -> bool:
-        """Whether nothing at or below `path` was left out or replaced."""
+        """Whether no value at or below `path` was removed or replaced."""
         before: Node | None = self.whole
         now: Node | None = self.root
         for part in path if before is not None else ():
@@ -69,11 +73,11 @@ class Source:
         return self.whole is None or before is now
 
     def place(self, *path: str | int) -> Place:
-        """Where the value at `path` stands; of what is not written, the nearest block around it."""
+        """Place of the value at `path`; for a missing value, of the nearest enclosing block."""
         return node_at(self.root, path).place
 
     def key_place(self, *path: str | int) -> Place:
-        """Where the key at `path` stands."""
+        """Place of the key at `path`."""
         return key_place_at(self.root, path)
 
     def finding(
@@ -86,7 +90,7 @@ class Source:
         severity: Severity = "error",
         key: bool = False,
     ) -> Diagnostic:
-        """Something to tell about the value (or, with `key`, the key) at `path`, under this kind of file's code."""
+        """A diagnostic at the value (with `key`: at the key) at `path`; the code is the file's area and `number`."""
         place = self.key_place(*path) if key else self.place(*path)
         where = f"{dotted(self._in_file(path))}: " if path else ""
         return Diagnostic(f"{self.area}{number}", f"{where}{message}", place, hint=hint, severity=severity)
@@ -99,61 +103,61 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Located(Generic[M]):
-    """A validated spec and its source. `findings` are warnings and notes: errors do not get here."""
+    """A validated spec and its source. `findings`: warnings and notes; errors are raised."""
 
     spec: M
     source: Source
     findings: tuple[Diagnostic, ...] = ()
 
     def place(self, *path: str | int) -> Place:
-        """`place("scene", "cup", "mass")`, `place("steps", 3, "move", "to")`."""
+        """Place of a value: `place("scene", "cup", "mass")`, `place("steps", 3, "move", "to")`."""
         return self.source.place(*path)
 
 
 def validate(source: Source, model: type[M], *, findings: Sequence[Diagnostic]) -> Located[M]:
-    """The spec that the source says.
+    """Validates a source.
 
     Args:
         source: the tree.
-        model: what it should be.
-        findings: what is known against the file already; errors among them are raised together with the model's.
+        model: the spec to validate against.
+        findings: earlier findings on the file; their errors are raised together with the model's.
 
     Raises:
-        InvalidInput: with every finding.
+        InvalidInput: with all findings.
     """
-    told = apart(findings, source.unknown)
-    if not any(finding.code.startswith("YAML") for finding in told):
+    earlier = apart(findings, source.unknown)
+    if not any(finding.code.startswith("YAML") for finding in earlier):
         _check_top(source, model)
     _check_version(source)
     try:
         spec = model.model_validate(plain(source.root))
     except ValidationError as error:
-        # A text whose expression failed stays in the tree; that it is no quantity either needs no second telling.
-        places = {finding.place for finding in told if finding.severity == "error"} | source.unknown
+        # A failed expression stays in the tree as text: pydantic's error at its place is redundant.
+        places = {finding.place for finding in earlier if finding.severity == "error"} | source.unknown
         more = [f for f in explain(error, source.root, model, source.area) if f.place not in places]
-        raise InvalidInput([*told, *more]) from None
+        raise InvalidInput([*earlier, *more]) from None
     except RecursionError:
-        raise InvalidInput([*told, source.finding(205, (), "nested too deep")]) from None
-    if any(finding.severity == "error" for finding in told):
-        raise InvalidInput(told)
-    return Located(spec, source, told)
+        raise InvalidInput([*earlier, source.finding(205, (), "nested too deeply")]) from None
+    if any(finding.severity == "error" for finding in earlier):
+        raise InvalidInput(earlier)
+    return Located(spec, source, earlier)
 
 
 def apart(findings: Sequence[Diagnostic], unknown: AbstractSet[Place]) -> tuple[Diagnostic, ...]:
-    """Without what would not be, had the text of the file been right, or were the values known that are `unknown`."""
-    places = {one.place for one in findings if one.code.startswith("YAML")}
-    uncomputed = {one.place for one in findings if one.code in UNCOMPUTED}
-    halved = {one.place.file for one in findings if one.code == TWICE and one.place is not None}
+    """The findings without those that only follow from an error in the text, or from a value that is `unknown`."""
+    places = {finding.place for finding in findings if finding.code.startswith("YAML")}
+    uncomputed = {finding.place for finding in findings if finding.code in UNCOMPUTED}
+    halved = {finding.place.file for finding in findings if finding.code == TWICE and finding.place is not None}
     return tuple(
-        one
-        for one in findings
-        if one.code.startswith("YAML")
-        or one.place is None
+        finding
+        for finding in findings
+        if finding.code.startswith("YAML")
+        or finding.place is None
         or not (
-            one.place in places
-            or one.place in unknown
-            or (one.place in uncomputed and one.code.startswith(MISNAMED))
-            or (one.place.file in halved and one.code in UNNAMED)
+            finding.place in places
+            or finding.place in unknown
+            or (finding.place in uncomputed and finding.code.startswith(MISNAMED))
+            or (finding.place.file in halved and finding.code in UNNAMED)
         )
     )
 
@@ -168,12 +172,12 @@ def _check_top(source: Source, model: type[Model]) -> None:
 
 
 def _check_version(source: Source) -> None:
-    """A newer file may have keys that this version does not know: that alone is told then."""
+    """Refuses a file for a newer version, before its unknown keys are reported."""
     node = source.root.get("version") if isinstance(source.root, MappingNode) else None
     if not isinstance(node, ScalarNode) or not isinstance(node.value, str):
         return
     if re.fullmatch(r"\d{1,6}\.\d{1,6}\.\d{1,6}", node.value) and _numbers(node.value) > _numbers(__version__):
-        message = f"this file needs manipcli >= {shorten(node.value)}; this is {__version__}"
+        message = f"this file needs manipcli >= {shorten(node.value)}; {__version__} is installed"
         hint = "update with: pip install --upgrade manipcli"
         raise InvalidInput([source.finding(213, ("version",), message, hint=hint)])
 

@@ -1,11 +1,10 @@
-"""Overrides: `--set PATH=VALUE` replaces or adds one value before anything is validated.
+"""Overrides: `--set PATH=VALUE` replaces or adds one value before validation.
 
-PATH is dotted. `robot.` and `controllers.` with something after the dot lead into those files
-(`controllers.arm_controller.gains.joint_1.p`, whatever form the file has: after ROS's own forms were rewritten);
-everything else is a path of the task. Items of a list go by their index from 0, steps also by their id
-(`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`). Keys that the user chose (bodies, joints, poses, parameters) must
-exist, unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`; `null` leaves a key out that
-has a default.
+PATH is dotted. Paths that begin with `robot.` or `controllers.` address those files
+(`controllers.arm_controller.gains.joint_1.p`, also for ROS files: overrides apply after these are rewritten);
+all other paths address the task. List items are addressed by index from 0, steps also by id
+(`steps.0.pour.tilt`, `steps.pour_1.pour.tilt`). User-defined keys (bodies, joints, poses, parameters) must exist,
+unless they end the path. VALUE is YAML: `80 g`, `true`, `[1, 2]`, `{radius: 4 cm}`; `null` restores a default.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _FILES: dict[str, Area] = {"robot": "ROBOT", "controllers": "CTRL"}
 
 @dataclass(frozen=True, slots=True)
 class Override:
-    """One override: which file, the path in it, the value, and what the user typed."""
+    """One override: the file, the path in it, the value, and the argument that the user typed."""
 
     area: Area
     path: tuple[str, ...]
@@ -37,7 +36,7 @@ class Override:
 
 
 def read_override(text: str) -> Override:
-    """An override from its argument, `PATH=VALUE`.
+    """Parses `PATH=VALUE`.
 
     Raises:
         InvalidInput: no `=`, an empty path or value, or a value that is not YAML.
@@ -47,9 +46,9 @@ def read_override(text: str) -> Override:
     parts = tuple(part.strip() for part in path_text.strip().split("."))
     if not equals or not all(parts):
         hint = "write --set scene.cup.mass='80 g'"
-        raise InvalidInput([Diagnostic("TASK212", "an override is PATH=VALUE", place, hint=hint)])
+        raise InvalidInput([Diagnostic("TASK212", "expected PATH=VALUE", place, hint=hint)])
     if not value_text.strip():
-        hint = "null unsets a value that has a default"
+        hint = "write null to restore a default"
         raise InvalidInput([Diagnostic("TASK212", "the value is missing", place, hint=hint)])
     try:
         value = parse(value_text, place.file)
@@ -62,13 +61,17 @@ def read_override(text: str) -> Override:
 
 
 def seed_override(seed: int) -> Override:
-    """What `--seed N` means."""
+    """The override of `--seed N`."""
     place = Place(f"--seed {seed}", 0, 0)
     return Override("TASK", ("simulation", "seed"), ScalarNode(seed, place), place)
 
 
 def read_overrides(texts: Sequence[str]) -> tuple[Override, ...]:
-    """All of them, or all their findings."""
+    """Parses all overrides.
+
+    Raises:
+        InvalidInput: with the findings of all of them.
+    """
     overrides: list[Override] = []
     findings: list[Diagnostic] = []
     for text in texts:
@@ -82,7 +85,7 @@ def read_overrides(texts: Sequence[str]) -> tuple[Override, ...]:
 
 
 def apply(root: Node, overrides: Sequence[Override], model: type[Model], area: Area) -> tuple[Node, list[Diagnostic]]:
-    """The tree with the overrides of this kind of file, one after the other, and those that fit nowhere."""
+    """The tree with the overrides of this kind of file applied in order, and the diagnostics of invalid paths."""
     findings: list[Diagnostic] = []
     for override in overrides:
         if override.area != area:
@@ -103,7 +106,7 @@ def _moved(node: Node, place: Place) -> Node:
 
 
 def _set(node: Node, override: Override, done: Loc, rest: tuple[str, ...], model: type[Model]) -> Node:
-    """`node` with the value put at `rest` below it; `done` leads to `node`."""
+    """`node` with the value set at `rest` below it; `done` is the path to `node`."""
     if not rest:
         return override.value
     part, further = rest[0], rest[1:]
@@ -115,10 +118,10 @@ def _set(node: Node, override: Override, done: Loc, rest: tuple[str, ...], model
     if isinstance(node, ScalarNode) and node.value is None:
         node = MappingNode({}, override.place)
     if isinstance(node, ScalarNode):
-        raise _nowhere(override, f"'{dotted(done)}' is {shown(node)}, which has no '{escape(part)}' in it", None)
+        raise _nowhere(override, f"'{dotted(done)}' has no '{escape(part)}': it is {shown(node)}", None)
     entry = node.entries.get(part)
     if entry is None:
-        if further or done == ("params",):  # a new parameter would change nothing: nobody asks for it
+        if further or done == ("params",):  # a new parameter has no effect: nothing uses it
             _may_be_added(node, override, done, part, model)
         entry = Entry(override.place, MappingNode({}, override.place))
     if not further and _is_null(override.value) and _left_to_default(model, done, part):
@@ -132,7 +135,7 @@ def _is_null(value: Node) -> bool:
 
 
 def _left_to_default(model: type[Model], done: Loc, part: str) -> bool:
-    """Whether the key may be left out, but not be nothing."""
+    """Whether the key is optional but cannot be null."""
     known = [shape.keys_of([kind]).get(part) for kind in shape.at(model, done, {})]
     fields = [field for field in known if field is not None]
     kinds = [kind for field in fields for kind, _ in shape.alternatives(field.annotation)]
@@ -146,10 +149,10 @@ def _may_be_added(node: MappingNode, override: Override, done: Loc, part: str, m
         return
     known = dict.fromkeys((*node.entries, *(() if shape.takes_any_key(kinds) else fields)))
     where = f"in '{dotted(done)}'" if done else "at the top of the file"
-    hint = did_you_mean(part, known, kind="there are")
+    hint = did_you_mean(part, known, kind="known")
     if hint is None:
         path = ("robot", *done, part) if override.area == "ROBOT" else (*done, part)
-        hint = f"nothing stands there yet: give the whole of it, {'.'.join(map(str, path))}={{...}}"
+        hint = f"there is nothing at this path yet: give the whole block, {'.'.join(map(str, path))}={{...}}"
     raise _nowhere(override, f"there is no '{escape(part)}' {where}", hint)
 
 
@@ -171,7 +174,7 @@ def _nowhere(override: Override, message: str, hint: str | None) -> InvalidInput
 
 
 def step_ids(steps: SequenceNode) -> tuple[str, ...]:
-    """The ids that the steps have or will get."""
+    """The ids of the steps, given or generated."""
     given = {node.value for item in steps.items if isinstance(node := child(item, "id"), ScalarNode)}
     counts: dict[str, int] = {}
     ids: list[str] = []

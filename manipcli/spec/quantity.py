@@ -1,6 +1,6 @@
-"""Numbers with units, converted to SI once: a bare number is SI, a text is a number and a unit (`"45 deg"`).
+"""Quantity types of specs, converted to SI: a bare number is SI, a string has a unit (`"45 deg"`).
 
-A truth value, NaN and infinity are refused; so is a text without a unit, which could be meant either way.
+Booleans, NaN, infinity and strings without a unit are refused.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _LETTER, _OTHER = r"[A-Za-z°µμ%]", r"[^A-Za-z°µμ%\s]"
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """Metadata of an annotated float: the dimensions that a text may have."""
+    """Metadata of an annotated float: the dimensions that a string may have."""
 
     dimensions: tuple[Dimension, ...]
 
@@ -37,11 +37,11 @@ class Unit:
         symbols = " or ".join(dimension.symbol or "1" for dimension in self.dimensions)
         last = fitting_units(self.dimensions[0])[1 if len(fitting_units(self.dimensions[0])) > 1 else 0]
         example = f"5 {last}" if self.dimensions[0].symbol else last
-        return f"{self.name}: a number in {symbols}, or a text such as '{example}'"
+        return f"{self.name}: a number in {symbols}, or a string such as '{example}'"
 
     @property
     def pattern(self) -> str:
-        """Of a text in JSON Schema: after a number an operator, a unit of several symbols, or one symbol that fits."""
+        """JSON Schema pattern of a string: a number, then an operator, a compound unit, or one fitting symbol."""
         fitting = [symbol for dimension in self.dimensions for symbol in symbols_of(dimension)]
         alone = "|".join(symbol.replace("u", "[uµμ]") for symbol in fitting)
         if units.NUMBER in self.dimensions:
@@ -51,7 +51,7 @@ class Unit:
         return rf"^[-+(\s]*{NUMBER_PATTERN}(?![\d.]|[eE][-+]?\d)\s*(?:{after})|\$"
 
     def read(self, value: object) -> object:
-        """The SI value of a text; anything but a text, a number or truth value passes on to pydantic."""
+        """The SI value of a string; a number passes on to pydantic unchanged."""
         if isinstance(value, str):
             try:
                 return to_si(value, *self.dimensions, read=quantity_of)
@@ -77,23 +77,23 @@ Angle = Annotated[float, Unit((units.ANGLE,))]
 Mass = Annotated[float, Unit((units.MASS,))]
 Time = Annotated[float, Unit((units.TIME,))]
 Pause = Annotated[Time, Field(le=3600.0)]
-"""A time that is waited: an hour at most."""
+"""A waiting time, at most 1 h."""
 Frequency = Annotated[float, Unit((units.FREQUENCY,))]
 Force = Annotated[float, Unit((units.FORCE,))]
 Speed = Annotated[float, Unit((units.SPEED,))]
 Acceleration = Annotated[float, Unit((units.ACCELERATION,))]
 Energy = Annotated[float, Unit((units.ENERGY,))]
-"""In J, which is N m: a torque is not told apart."""
+"""In J = N m: a torque has the same dimension."""
 Share = Annotated[float, Unit((units.NUMBER,))]
 """`0.1` or `"10 %"`."""
 JointValue = Annotated[float, Unit((units.ANGLE, units.LENGTH))]
 """Position of a joint, revolute or prismatic."""
 Turn = Annotated[Angle, Field(ge=-6.2832, le=6.2832)]
-"""To which angle something is turned: a whole turn either way; rounded up, as it may be written."""
+"""An angle of at most one revolution in either direction, rounded up."""
 AngleTolerance = Annotated[Angle, Field(gt=0, le=3.1416)]
-"""A difference of two directions: half a turn at most, so that degrees without their unit are not taken."""
+"""Tolerance on an orientation, at most pi: degrees without a unit are refused."""
 JointTolerance = Annotated[JointValue, Field(gt=0, le=3.1416)]
-"""A difference of two positions of a joint, likewise."""
+"""Tolerance on a joint position, at most pi likewise."""
 JointVelocity = Annotated[float, Unit((units.ANGULAR_VELOCITY, units.SPEED))]
 JointAcceleration = Annotated[float, Unit((units.ANGULAR_ACCELERATION, units.ACCELERATION))]
 JointJerk = Annotated[float, Unit((units.ANGULAR_JERK, units.JERK))]

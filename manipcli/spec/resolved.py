@@ -1,4 +1,4 @@
-"""A spec as YAML with everything written out: defaults, SI numbers, ids. Loading it gives an equal spec."""
+"""A spec as YAML with defaults, SI numbers and ids written out. Loading it gives an equal spec."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from manipcli.spec.source.tree import Plain
 from manipcli.spec.task import TaskSpec
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]*")
-# The second line only means something to readers of YAML 1.1, which a log may well meet.
+# The second set is only reserved in YAML 1.1, which other readers of a log may use.
 _RESERVED = frozenset({"null", "true", "false"}) | frozenset({"yes", "no", "on", "off", "y", "n"})
 _UNSAFE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 _WIDTH = 100
 
 
 def resolved(spec: BaseModel, expressions: Mapping[Loc, str] | None = None) -> str:
-    """The YAML text, keys in the order of the model and of the file.
+    """The YAML text, with keys in the order of the model and of the file.
 
     Args:
-        spec: what is written out.
-        expressions: texts with `$name` that stay, by the path of what they are the value of.
+        spec: the spec to write.
+        expressions: expressions with `$name` to write instead of their values, by path.
     """
     data = _data(spec, escape=isinstance(spec, TaskSpec))
     for path, text in (expressions or {}).items():
@@ -35,18 +35,18 @@ def resolved(spec: BaseModel, expressions: Mapping[Loc, str] | None = None) -> s
 
 
 def as_written(spec: BaseModel) -> str:
-    """The same with only what was stated, in a file or by `model_copy`: defaults stay unsaid."""
+    """The YAML text without defaults: only values set in a file or by `model_copy`."""
     data = _data(spec, escape=isinstance(spec, TaskSpec), stated=True)
     assert isinstance(data, dict)
     return "".join(f"{line}\n" for line in _lines(data))
 
 
 def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
-    """Plain data; a key that is not set and has no default but nothing is left out, `stated`: every one not set."""
+    """Plain data without null keys whose default is null; with `stated`, without all unset keys."""
     if isinstance(value, BaseModel):
         fields = type(value).model_fields
-        said = value.model_fields_set if stated else fields.keys()
-        pairs = ((field.alias or name, field, getattr(value, name)) for name, field in fields.items() if name in said)
+        chosen = value.model_fields_set if stated else fields.keys()
+        pairs = ((field.alias or name, field, getattr(value, name)) for name, field in fields.items() if name in chosen)
         return {
             key: _data(v, escape=escape, stated=stated)
             for key, field, v in pairs
@@ -64,7 +64,7 @@ def _data(value: object, *, escape: bool, stated: bool = False) -> Plain:
 
 
 def _with(data: Plain, path: Loc, text: str) -> Plain:
-    """The data with `text` in the place of what stands at `path`, or of the block that it is short for."""
+    """The data with `text` instead of the value at `path`, or of the block it abbreviates."""
     if not path:
         return text
     first, rest = path[0], path[1:]
@@ -112,12 +112,12 @@ def _inline(value: Plain) -> str:
     if isinstance(value, str):
         return _text(value)
     mantissa, exponent, power = repr(value).partition("e")
-    # 1e-05 has no point, without which YAML 1.1 takes it for a text.
+    # YAML 1.1 reads 1e-05, which has no point, as a string.
     return f"{mantissa}.0e{power}" if exponent and "." not in mantissa else f"{mantissa}{exponent}{power}"
 
 
 def _text(text: str) -> str:
-    """A word as it is; anything that YAML could read as something else in double quotes."""
+    """A plain word unquoted; a text that YAML could misread in double quotes."""
     if _WORD.fullmatch(text) and text.casefold() not in _RESERVED:
         return text
     return _UNSAFE.sub(lambda match: f"\\u{ord(match.group()):04x}", json.dumps(text, ensure_ascii=False))

@@ -1,4 +1,4 @@
-"""A step as it reads with other parameters: what `on_fail: {retry: 2, with: {tilt: 140 deg}}` tries."""
+"""A step with the other parameters of its retries: `on_fail: {retry: 2, with: {tilt: 140 deg}}`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from manipcli.spec.task import StepSpec, TaskSpec
 
 
 def retried(file: Located[TaskSpec], index: int) -> StepSpec:
-    """The step `steps[index]` of a task with the parameters under its `on_fail`; without any, as it is.
+    """The step `steps[index]` of a task with the parameters under its `on_fail`; without any, the step unchanged.
 
     Raises:
-        InvalidInput: a parameter is unknown, or the step cannot be meant with it; told at the places of the file.
+        InvalidInput: a parameter is unknown, or the step is invalid with it; places are those of the file.
     """
     source, step = file.source, file.spec.steps[index]
     changed = node_at(source.root, ("steps", index, "on_fail", "with"))
@@ -26,22 +26,22 @@ def retried(file: Located[TaskSpec], index: int) -> StepSpec:
     assert isinstance(root, MappingNode)
     params = child(root, "params")
     entries = {} if not isinstance(params, MappingNode) else dict(params.entries)
-    told = []
+    unknown_params = []
     for name, entry in changed.entries.items():
         if name not in entries:
             path = ("steps", index, "on_fail", "with", name)
             hint = did_you_mean(name, entries, kind="params") or no_params(name)
-            told.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
+            unknown_params.append(source.finding(203, path, f"unknown parameter '{name}'", hint=hint, key=True))
         entries[name] = Entry(entry.key_place, mapped(entry.node, _escaped))
     block = Entry(changed.place, MappingNode(entries, changed.place))
     changed_root = MappingNode({"params": block, **root.without("params").entries}, root.place)
-    again, findings, unknown = substitute(changed_root)
-    tree = replace(source, root=again, unknown=unknown)
-    return validate(tree, type(file.spec), findings=[*told, *findings]).spec.steps[index]
+    substituted, findings, unknown = substitute(changed_root)
+    tree = replace(source, root=substituted, unknown=unknown)
+    return validate(tree, type(file.spec), findings=[*unknown_params, *findings]).spec.steps[index]
 
 
 def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
-    """What was written, by its path, where a step that is tried again with other parameters needs it."""
+    """The expressions, by path, of steps with other parameters in a retry, and of `params:`."""
     steps = [k for k, step in enumerate(file.spec.steps) if step.retry is not None and step.retry.with_]
     found: dict[Loc, str] = {}
 
@@ -60,10 +60,9 @@ def expressions(file: Located[TaskSpec]) -> dict[Loc, str]:
 
 
 def _written(node: ScalarNode, path: Loc) -> ScalarNode:
-    """The text before its expression was computed."""
+    """The expression that a value was computed from; else the value, escaped."""
     return _escaped(node, path) if node.written is None else ScalarNode(node.written, node.place)
 
 
 def _escaped(node: ScalarNode, path: Loc) -> ScalarNode:
-    """A value that is to stay as it is."""
     return ScalarNode(escaped(node.value), node.place) if isinstance(node.value, str) else node

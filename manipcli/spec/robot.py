@@ -1,4 +1,4 @@
-"""The robot file: a description (URDF or xacro) and what URDF cannot say."""
+"""Spec of a robot file: a description (URDF or xacro) and data that URDF does not hold."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from manipcli.core.text import shorten
+from manipcli.core.text import number_of, shorten
 from manipcli.spec.base import Model, problem
 from manipcli.spec.quantity import (
     JointAcceleration,
@@ -29,14 +29,14 @@ _VERSION = re.compile(r"\d+\.\d+\.\d+")
 
 def _three_numbers(version: str | None) -> str | None:
     if version is not None and not _VERSION.fullmatch(version):
-        raise problem("conflict", f"'{shorten(version)}' is no version: expected three numbers, as '0.1.0'")
+        raise problem("conflict", f"'{shorten(version)}' is not a version: expected three numbers such as '0.1.0'")
     return version
 
 
 Version = Annotated[
     str | None,
     Field(
-        description="The least version of manipcli that reads this file, as '0.1.0'.",
+        description="Minimum version of manipcli that reads this file, such as '0.1.0'.",
         json_schema_extra={"pattern": rf"^{_VERSION.pattern}$"},
     ),
     AfterValidator(_three_numbers),
@@ -44,18 +44,18 @@ Version = Annotated[
 Arguments = dict[str, bool | int | float | str]
 
 UNIT_TOLERANCE = 1e-3
-"""How far the length of an axis or of a quaternion may be from 1 without a word."""
+"""Accepted deviation of the norm of an axis or a quaternion from 1."""
 
 
 class PoseSpec(Model):
-    """A pose: translation, and at most one way to say the rotation (fixed-axis roll, pitch, yaw; or a quaternion)."""
+    """A pose: a translation and at most one rotation (fixed-axis roll, pitch, yaw; or a quaternion)."""
 
     xyz: Vector3 = Field((0.0, 0.0, 0.0), description="Translation [m]. Default [0, 0, 0].")
     rpy: tuple[Turn, Turn, Turn] | None = Field(
         None, description="Roll, pitch, yaw about the fixed x, y, z axes [rad]. Default: no rotation."
     )
     quat_xyzw: tuple[float, float, float, float] | None = Field(
-        None, description="Unit quaternion, real part last; of length 1 within 0.001."
+        None, description="Unit quaternion, real part last; norm 1 within 0.001."
     )
 
     @model_validator(mode="after")
@@ -63,24 +63,24 @@ class PoseSpec(Model):
         if self.quat_xyzw is None:
             return self
         if self.rpy is not None:
-            message = "the rotation is said twice: by rpy and by quat_xyzw"
+            message = "the rotation is given twice: by rpy and by quat_xyzw"
             raise problem("conflict", message, at=("quat_xyzw",), key=True)
         norm = math.sqrt(sum(q * q for q in self.quat_xyzw))
         if abs(norm - 1.0) > UNIT_TOLERANCE:
-            hint = "the order is x, y, z, w: no rotation is [0, 0, 0, 1]"
-            raise problem("range", f"not a unit quaternion: its length is {norm:.6g}", at=("quat_xyzw",), hint=hint)
+            hint = "the order is x, y, z, w; the identity is [0, 0, 0, 1]"
+            raise problem("range", f"not a unit quaternion: its norm is {norm:.6g}", at=("quat_xyzw",), hint=hint)
         return self
 
     @property
     def transform(self) -> Transform:
-        """The transform that it says."""
+        """The pose as a transform."""
         from manipcli.core.geometry import Transform
 
         return Transform.of(xyz=self.xyz, rpy=self.rpy, quat_xyzw=self.quat_xyzw)
 
 
 class ChainSpec(Model):
-    """The independent joints on the way from link `base` to link `tip`."""
+    """The independent joints between link `base` and link `tip`."""
 
     base: str = Field(description="The link above the first joint.")
     tip: str = Field(description="The link below the last joint.")
@@ -90,39 +90,42 @@ class GroupSpec(Model):
     """Joints that are planned and named together: a `chain`, or a list of `joints` (`tip`: the link they end in)."""
 
     chain: ChainSpec | None = Field(None, description="All independent joints between two links.")
-    joints: tuple[str, ...] | None = Field(None, description="The joints by name; their order is that of poses.")
-    tip: str | None = Field(None, description="The link that poses of the group speak of.")
+    joints: tuple[str, ...] | None = Field(None, description="The joints by name, in the order that poses use.")
+    tip: str | None = Field(None, description="The link that Cartesian poses of the group refer to.")
 
 
 class LimitsSpec(Model):
-    """What replaces or completes the URDF's limits of a joint; lower/upper may only narrow them."""
+    """Limits of a joint that replace or complete those of the URDF; lower/upper may only narrow them."""
 
-    lower: JointValue | None = Field(None, description="Least position [rad or m]; not below the URDF's.")
-    upper: JointValue | None = Field(None, description="Greatest position [rad or m]; not above the URDF's.")
-    velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(None, description="[rad/s or m/s], above 0.")
-    effort: Annotated[JointEffort, Field(gt=0)] | None = Field(None, description="[N m or N], above 0.")
+    lower: JointValue | None = Field(None, description="Lower position limit [rad or m]; not below the URDF's.")
+    upper: JointValue | None = Field(None, description="Upper position limit [rad or m]; not above the URDF's.")
+    velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
+        None, description="Velocity limit [rad/s or m/s], above 0."
+    )
+    effort: Annotated[JointEffort, Field(gt=0)] | None = Field(None, description="Effort limit [N m or N], above 0.")
     acceleration: Annotated[JointAcceleration, Field(gt=0)] | None = Field(
-        None, description="[rad/s^2 or m/s^2], above 0. Default: `default_acceleration`."
+        None, description="Acceleration limit [rad/s^2 or m/s^2], above 0. Default: `default_acceleration`."
     )
     jerk: Annotated[JointJerk, Field(gt=0)] | None = Field(
-        None, description="[rad/s^3 or m/s^3], above 0. Default: unlimited."
+        None, description="Jerk limit [rad/s^3 or m/s^3], above 0. Default: unlimited."
     )
     soft_lower: JointValue | None = Field(
         None,
-        description="Where a joint slows down before `lower` [rad or m]; plans stay within it. It needs k_position. "
-        "Default: nowhere.",
+        description="Soft limit, where a joint begins to slow down before `lower` [rad or m]; plans stay within it. "
+        "Needs k_position. Default: none.",
     )
     soft_upper: JointValue | None = Field(
         None,
-        description="Where a joint slows down before `upper` [rad or m]; plans stay within it. It needs k_position. "
-        "Default: nowhere.",
+        description="Soft limit, where a joint begins to slow down before `upper` [rad or m]; plans stay within it. "
+        "Needs k_position. Default: none.",
     )
     k_position: Annotated[float, Field(ge=0)] | None = Field(
-        None, description="Velocity per distance to a soft limit [1/s]. Default: the description's, or 0: none."
+        None,
+        description="Allowed velocity per distance to the soft limit [1/s]. Default: the description's, or 0: none.",
     )
     k_velocity: Annotated[float, Field(ge=0)] | None = Field(
         None,
-        description="Effort per velocity beyond the allowed [N m s/rad or N s/m]. Default: the description's, or 0.",
+        description="Effort per velocity above the allowed one [N m s/rad or N s/m]. Default: the description's, or 0.",
     )
 
     @model_validator(mode="after")
@@ -138,7 +141,7 @@ TransmissionType = Literal["simple", "differential", "four_bar"]
 class TransmissionSpec(Model):
     """Actuators and the joints that they drive, in the order of their roles: one of each, or two.
 
-    It replaces what the description says about these joints.
+    It replaces the transmissions of these joints in the description.
     """
 
     type: TransmissionType = Field(
@@ -147,13 +150,13 @@ class TransmissionSpec(Model):
     joints: tuple[str, ...] = Field(description="The joint, or joint1 and joint2.")
     actuators: tuple[str, ...] = Field(description="The actuator, or actuator1 and actuator2.")
     actuator_reduction: tuple[float, ...] | None = Field(
-        None, description="Per actuator, not 0: its turns a turn of the joint; negative reverses. Default 1."
+        None, description="Per actuator, not 0: actuator motion per joint motion; negative reverses. Default 1."
     )
     joint_reduction: tuple[float, ...] | None = Field(
         None, description="Per joint, not 0: a second reduction, behind the coupling of a pair. Default 1."
     )
     joint_offset: tuple[JointValue, ...] | None = Field(
-        None, description="Per joint: its position where the actuators are at 0 [rad or m]. Default 0."
+        None, description="Per joint: its position when the actuators are at 0 [rad or m]. Default 0."
     )
 
     @model_validator(mode="after")
@@ -164,37 +167,37 @@ class TransmissionSpec(Model):
             if values is None:
                 continue
             if len(values) != count:
-                message = f"a {self.type} transmission has {count} of each; {key} has {len(values)}"
+                message = f"{key} has {number_of(len(values), 'item')}; a {self.type} transmission needs {count}"
                 raise problem("count", message, at=(key,))
             if key.endswith("reduction"):
                 for k, value in enumerate(values):
                     if value == 0.0:
-                        raise problem("range", "a reduction of 0 is not possible", at=(key, k))
+                        raise problem("range", "a reduction must not be 0", at=(key, k))
             elif len({*values}) < count and not key.startswith("joint_"):
-                raise problem("duplicate", f"{key} names '{values[0]}' twice", at=(key, 1))
+                raise problem("duplicate", f"duplicate '{values[0]}' in {key}", at=(key, 1))
         return self
 
 
 class ActuatorSpec(Model):
-    """A motor in front of its gear, in its own units: N m and rad, or N and m where it moves in a line."""
+    """A motor, on its own side of the gear: N m and rad, or N and m if it is linear."""
 
     effort: Annotated[JointEffort, Field(gt=0)] | None = Field(
-        None, description="The most that it gives [N m or N], above 0. Default: unlimited."
+        None, description="Effort limit [N m or N], above 0. Default: unlimited."
     )
     velocity: Annotated[JointVelocity, Field(gt=0)] | None = Field(
-        None, description="Beyond it nothing is left to drive with [rad/s or m/s], above 0. Default: unlimited."
+        None, description="Velocity above which it cannot drive [rad/s or m/s], above 0. Default: unlimited."
     )
     rotor_inertia: Annotated[float, Field(ge=0)] = Field(
-        0.0, description="Of what turns with the motor [kg m^2 or kg]; at the joint reduction^2 times that. Default 0."
+        0.0, description="Rotor inertia [kg m^2 or kg]; reflected to the joint, reduction^2 times that. Default 0."
     )
     viscous_friction: Annotated[float, Field(ge=0)] = Field(
-        0.0, description="Friction per velocity [N m s/rad or N s/m]. Default 0."
+        0.0, description="Viscous friction [N m s/rad or N s/m]. Default 0."
     )
     coulomb_friction: Annotated[JointEffort, Field(ge=0)] = Field(
-        0.0, description="Friction that does not depend on velocity [N m or N]. Default 0."
+        0.0, description="Coulomb friction [N m or N]. Default 0."
     )
     efficiency: Annotated[float, Field(gt=0, le=1)] = Field(
-        1.0, description="Share of its effort that reaches the joints while it drives them, in (0, 1]. Default 1."
+        1.0, description="Share of its effort that reaches the joints while driving, in (0, 1]. Default 1."
     )
     latency: Annotated[int, Field(ge=0, le=1000)] = Field(
         0, description="Control ticks from a command to its effort, 0 to 1000. Default 0."
@@ -204,7 +207,7 @@ class ActuatorSpec(Model):
 def _begins_names(prefix: str) -> str:
     if not re.fullmatch(r"[\w./-]{0,100}", prefix):
         raise problem(
-            "conflict", f"'{shorten(prefix)}' cannot begin names", hint="write letters, digits and '_', '.', '/', '-'"
+            "conflict", f"'{shorten(prefix)}' is not a valid prefix", hint="use letters, digits and '_', '.', '/', '-'"
         )
     return prefix
 
@@ -215,11 +218,10 @@ class AttachSpec(Model):
     description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
     args: Arguments = Field({}, description="Arguments of the xacro file.")
     parent: str = Field(description="The link that it is welded to.")
-    pose: PoseSpec = Field(PoseSpec(), description="Of its root link in `parent`. Default: coincident.")
+    pose: PoseSpec = Field(PoseSpec(), description="Pose of its root link in `parent`. Default: identity.")
     prefix: Annotated[str, AfterValidator(_begins_names)] = Field(
         "",
-        description="Put before each of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: "
-        "nothing.",
+        description="Prefix of its link and joint names: letters, digits, `_`, `.`, `/`, `-`. Default: none.",
     )
 
 
@@ -231,39 +233,41 @@ class ToolSpec(Model):
     """The tool frame T: a pose in a link. Its +z is the approach direction of `pick`."""
 
     link: str = Field(description="The link that carries the tool.")
-    pose: PoseSpec = Field(PoseSpec(), description="Of the tool frame in the link. Default: the link's own frame.")
+    pose: PoseSpec = Field(PoseSpec(), description="Pose of the tool frame in the link. Default: identity.")
 
 
 class RobotSpec(Model):
-    """A robot: its description, and what URDF cannot say."""
+    """A robot: its description, and data that URDF does not hold."""
 
     robot: str = Field(description="The name of the robot.", min_length=1)
     version: Version = None
     description: str = Field(description="URDF or xacro file: a path relative to this file, or `package://NAME/...`.")
     args: Arguments = Field({}, description="Arguments of the xacro file.")
-    mount: PoseSpec = Field(PoseSpec(), description="Of the root link in the world. Default: the origin.")
+    mount: PoseSpec = Field(PoseSpec(), description="Pose of the root link in the world. Default: identity.")
     attach: tuple[AttachSpec, ...] = Field((), description="Further descriptions, welded on.")
     groups: dict[str, GroupSpec] = Field({}, description="Groups of joints, by name.")
     poses: dict[str, dict[str, PosePart]] = Field({}, description="Named poses: per group, joint values or a name.")
     tool: ToolSpec | None = Field(None, description="The tool frame. Default: the tip of the first group.")
-    limits: dict[str, LimitsSpec] = Field({}, description="Limits by joint: what URDF cannot say, or narrower ones.")
+    limits: dict[str, LimitsSpec] = Field(
+        {}, description="Limits by joint, which complete or narrow those of the URDF."
+    )
     transmissions: dict[str, TransmissionSpec] = Field(
-        {}, description="Transmissions by name, beside those of the description or instead of them."
+        {}, description="Transmissions by name, which add to those of the description or replace them."
     )
     actuators: dict[str, ActuatorSpec] = Field(
-        {}, description="What the actuators of transmissions can do, by name. Default: anything."
+        {}, description="Actuators of the transmissions, by name. Default: ideal actuators."
     )
     default_acceleration: Annotated[JointAcceleration, Field(gt=0)] = Field(
-        10.0, description="Limit of joints without their own [rad/s^2 or m/s^2], above 0. Default 10."
+        10.0, description="Acceleration limit of joints without one [rad/s^2 or m/s^2], above 0. Default 10."
     )
     collision_ignore: tuple[tuple[str, str], ...] = Field((), description="Pairs of links that may touch.")
     friction: Annotated[float, Field(ge=0)] = Field(
-        1.0, description="Coefficient of the robot's surfaces; the engine multiplies it by the other body's. Default 1."
+        1.0, description="Friction coefficient of the robot; the engine multiplies it by the other body's. Default 1."
     )
     compat: Literal["ros1", "ros2"] | None = Field(
         None,
-        description="Whose rules where ROS 1 and 2 differ: when the integral of a PID acts (in ROS 1 a step earlier), "
-        "what follows an abort (in ROS 1 the trajectory goes on), what goal_time 0 means (in ROS 2 to wait without "
-        "end), what becomes of a goal that another replaces, and the efforts of a four-bar linkage (in ROS 1 they do "
-        "not keep power). Default: the safer one of each.",
+        description="Whose behaviour to follow where ROS 1 and ROS 2 differ: when the integral of a PID acts (ROS 1: "
+        "one step earlier), what follows an abort (ROS 1: the trajectory continues), what goal_time 0 means (ROS 2: no "
+        "time limit), what happens to a replaced goal, and the efforts of a four-bar linkage (ROS 1: power is not "
+        "conserved). Default: the safer behaviour in each case.",
     )

@@ -1,4 +1,4 @@
-"""JSON Schema of the three files, for editors and for reference; the same text for the same members."""
+"""JSON Schema of task, robot and controllers files, for editors and reference; deterministic."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _REFERENCE = r"\$[A-Za-z_]"
 
 
 def task_schema(model: type[TaskSpec]) -> str:
-    """Of a task file (`unions.task_model`): verbs are `oneOf`, any number may be an expression with `$name`."""
+    """Schema of a task file (`unions.task_model`): verbs are `oneOf`; any number may be an expression with `$name`."""
     schema = _schema(model, "manipcli task")
     _allow_expressions(schema)
     return _dump(schema)
 
 
 def robot_schema() -> str:
-    """Of a robot file."""
+    """Schema of a robot file."""
     return _dump(_schema(RobotSpec, "manipcli robot"))
 
 
 def controllers_schema(model: type[ControllersSpec]) -> str:
-    """Of a controllers file in our form (`unions.controllers_model`)."""
+    """Schema of a controllers file in our form (`unions.controllers_model`)."""
     return _dump(_schema(model, "manipcli controllers"))
 
 
@@ -40,11 +40,11 @@ def _schema(model: type[BaseModel], title: str) -> dict[str, Plain]:
 
 
 def _tidy(node: Plain, *, named: bool) -> None:
-    """Pydantic's own words for limits to those of JSON Schema, and no titles that only repeat a key.
+    """Replaces pydantic's keywords for limits by those of JSON Schema, and removes titles that repeat a key.
 
     Args:
-        node: changed in place.
-        named: its keys are names of properties or definitions, not words of JSON Schema.
+        node: schema, changed in place.
+        named: whether its keys are names of properties or definitions instead of keywords.
     """
     if isinstance(node, list):
         for item in node:

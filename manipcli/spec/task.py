@@ -1,7 +1,7 @@
-"""The task file: which robot and controllers, what stands around, what to do, what to expect.
+"""Spec of a task file: robot, controllers, scene, steps and expectations.
 
-`steps`, `until` and `expect` hold members of seams; the loader builds their unions from the registry, so this module
-imports no member. A step is a mapping with exactly one verb key beside the common keys of `StepSpec`.
+`steps`, `until` and `expect` hold members of seams; `unions` builds their unions from the registry, so this module
+imports no member. A step is a mapping with exactly one verb key and the common keys of `StepSpec`.
 """
 
 from __future__ import annotations
@@ -35,18 +35,20 @@ Size = Annotated[Length, Field(ge=1e-6, le=100.0)]
 class SimulationSpec(Model):
     """Engine and clock. `control_period` is a whole multiple of `step`; `settle` is simulated before the start."""
 
-    engine: str = Field("pybullet", description="Which engine: `pybullet` (physics), `kinematic` (commands come true).")
+    engine: str = Field(
+        "pybullet", description="Engine: `pybullet` (physics) or `kinematic` (ideal tracking, no physics)."
+    )
     step: Annotated[Time, Field(ge=1e-6, le=0.02, description="Physics step, 1 us to 20 ms. Default 1 ms.")] = 0.001
     control_period: Annotated[
-        Time, Field(gt=0, le=0.05, description="Control tick, a whole multiple of `step`, to 50 ms. Default 1 ms.")
+        Time, Field(gt=0, le=0.05, description="Control period, a whole multiple of `step`, up to 50 ms. Default 1 ms.")
     ] = 0.001
-    seed: Annotated[int, Field(ge=0, description="Of the planner and of samples, 0 or more. Default 0.")] = 0
+    seed: Annotated[int, Field(ge=0, description="Seed of the planner and of samples, 0 or more. Default 0.")] = 0
     gravity: tuple[Acceleration, Acceleration, Acceleration] = Field(
-        EARTH_GRAVITY, description="Acceleration of free fall in the world [m/s^2]. Default [0, 0, -9.81]."
+        EARTH_GRAVITY, description="Gravity in the world frame [m/s^2]. Default [0, 0, -9.81]."
     )
-    settle: Annotated[Time, Field(ge=0, le=60, description="Simulated before the start, 0 to 60 s. Default 0.5 s.")] = (
-        0.5
-    )
+    settle: Annotated[
+        Time, Field(ge=0, le=60, description="Time simulated before the start, 0 to 60 s. Default 0.5 s.")
+    ] = 0.5
 
     @model_validator(mode="after")
     def _whole_steps(self) -> SimulationSpec:
@@ -70,14 +72,14 @@ class BoxSpec(Model):
 class SphereSpec(Model):
     """A solid sphere; its frame is at its centre."""
 
-    radius: Size = Field(description="[m], 1 um to 100 m.")
+    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
 
 
 class CylinderSpec(Model):
     """A solid upright cylinder; its frame is in the middle of its bottom."""
 
-    radius: Size = Field(description="[m], 1 um to 100 m.")
-    height: Size = Field(description="[m], 1 um to 100 m.")
+    radius: Size = Field(description="Radius [m], 1 um to 100 m.")
+    height: Size = Field(description="Height [m], 1 um to 100 m.")
 
 
 class CupSpec(Model):
@@ -97,7 +99,7 @@ class TraySpec(Model):
 
 
 class MeshSpec(Model):
-    """A mesh file (STL, OBJ, Collada), used as its convex hull; the engine makes one of each part of an OBJ."""
+    """A mesh file (STL, OBJ, Collada), used as its convex hull; the engine uses one hull per part of an OBJ."""
 
     file: str = Field(description="Path, relative to this file, or `package://NAME/...`.")
     scale: Annotated[float, Field(ge=1e-6, le=1e6, description="Factor on all three axes, 1e-6 to 1e6. Default 1.")] = (
@@ -112,10 +114,10 @@ class UrdfSpec(Model):
 
 
 class BodySpec(Model):
-    """One thing in the scene: exactly one shape key, one way to place it, and how it behaves in contact.
+    """A body of the scene: exactly one shape key, one placement, and contact parameters.
 
     Placement: `pose` (world), or `rests_on: BODY` with `at: [x, y]` (world; yaw by `yaw`), or `inside: CONTAINER`, in
-    its middle or `at: [x, y]` from there.
+    its middle or offset from it by `at: [x, y]`.
     """
 
     box: BoxSpec | None = Field(None, description="Shape: a solid box.")
@@ -125,27 +127,38 @@ class BodySpec(Model):
     tray: TraySpec | None = Field(None, description="Shape: an open tray.")
     mesh: MeshSpec | None = Field(None, description="Shape: the convex hull of a mesh file.")
     urdf: UrdfSpec | None = Field(None, description="Shape, mass and inertia from a single-link URDF.")
-    pose: PoseSpec | None = Field(None, description="Where its frame starts, in the world.")
-    rests_on: str | None = Field(None, description="The body that it stands on, which is not tilted; `at` says where.")
+    pose: PoseSpec | None = Field(None, description="Start pose of its frame in the world.")
+    rests_on: str | None = Field(
+        None, description="The body it rests on, which must not be tilted; `at` gives the position."
+    )
     at: tuple[Length, Length] | None = Field(
         None,
-        description="x, y [m]: of `rests_on`, which needs it, in the world; of `inside` from its middle, "
-        "along its axes.",
+        description="x, y [m]. With `rests_on`, which needs it: in the world. With `inside`: from the middle of the "
+        "container, along its axes.",
     )
-    yaw: Turn = Field(0.0, description="About the world's z axis [rad]; with `inside` from the container's. Default 0.")
-    inside: str | None = Field(None, description="The container on whose floor it lies; one that is not tilted.")
-    fixed: bool = Field(False, description="Never moves; what can is 10 m long at most. Default false.")
+    yaw: Turn = Field(
+        0.0, description="Rotation about the world's z axis [rad]; with `inside`, the container's. Default 0."
+    )
+    inside: str | None = Field(None, description="The container on whose floor it lies; it must not be tilted.")
+    fixed: bool = Field(
+        False, description="Whether it never moves; a movable body is at most 10 m long. Default false."
+    )
     mass: Annotated[Mass, Field(gt=0, le=1e5)] | None = Field(
-        None, description="[kg], above 0 to 100 t; needed unless `fixed`, `urdf`."
+        None, description="Mass [kg], above 0 to 100 t; required unless `fixed` or `urdf`."
     )
     friction: Annotated[float, Field(ge=0)] = Field(
         0.8,
-        description="Coefficient of sliding, 0 or more; the engine multiplies it by the other body's. Default 0.8.",
+        description="Sliding friction coefficient, 0 or more; the engine multiplies it by the other body's. "
+        "Default 0.8.",
     )
-    rolling_friction: Annotated[float, Field(ge=0, description="Coefficient of rolling, 0 or more. Default 0.")] = 0.0
-    spinning_friction: Annotated[float, Field(ge=0, description="Coefficient of turning on the spot. Default 0.")] = 0.0
+    rolling_friction: Annotated[
+        float, Field(ge=0, description="Rolling friction coefficient, 0 or more. Default 0.")
+    ] = 0.0
+    spinning_friction: Annotated[
+        float, Field(ge=0, description="Spinning friction coefficient, 0 or more. Default 0.")
+    ] = 0.0
     restitution: Fraction = Field(
-        0.0, description="Bounce, 0 to 1; the engine multiplies it by the other body's. Default 0."
+        0.0, description="Coefficient of restitution, 0 to 1; the engine multiplies it by the other body's. Default 0."
     )
     color: tuple[Fraction, Fraction, Fraction, Fraction] | None = Field(
         None, description="Red, green, blue, opacity, each 0 to 1; only for pictures."
@@ -156,32 +169,32 @@ class FrameSpec(Model):
     """A named frame, fixed in `parent`: `world` or a body of the scene."""
 
     parent: str = Field("world", description="`world` or a body. Default `world`.")
-    pose: PoseSpec = Field(PoseSpec(), description="Of the frame in its parent. Default: the parent's own.")
+    pose: PoseSpec = Field(PoseSpec(), description="Pose of the frame in its parent. Default: identity.")
 
 
 Rate = Annotated[Frequency, Field(gt=0)]
 SLOWEST: Final = 20.0
-"""[Hz] below which the end of a run could not be judged."""
+"""Lowest rate [Hz] at which the end of a run can be judged."""
 
 
 class RatesSpec(Model):
-    """How often topics are recorded [Hz]: the control rate, or a whole part of it."""
+    """Recording rates of topics [Hz]: the control rate divided by a whole number."""
 
     joint_states: Rate | None = Field(None, description="Measured joints [Hz], 20 or more. Default: the control rate.")
     tf: Rate | None = Field(None, description="Links and bodies [Hz], 20 or more. Default: the control rate.")
     controller_state: Rate | None = Field(
-        None, description="Of every controller [Hz], 20 or more. Default: the control rate."
+        None, description="State of every controller [Hz], 20 or more. Default: the control rate."
     )
-    reference: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
-    error: Rate | None = Field(None, description="Of every controller, for plots [Hz]. Default 100 Hz.")
+    reference: Rate | None = Field(None, description="Reference of every controller, for plots [Hz]. Default 100 Hz.")
+    error: Rate | None = Field(None, description="Error of every controller, for plots [Hz]. Default 100 Hz.")
     actuator_states: Rate | None = Field(
-        None, description="Behind the transmissions [Hz]; efforts as they reach the gears. Default 100 Hz."
+        None, description="Actuators, behind the transmissions [Hz]; efforts at the gears. Default 100 Hz."
     )
-    wrench: Rate | None = Field(None, description="Of every force sensor [Hz]. Default: the control rate.")
+    wrench: Rate | None = Field(None, description="Wrench of every force sensor [Hz]. Default: the control rate.")
 
     @property
     def given(self) -> dict[str, float]:
-        """Those that are not left to the default."""
+        """Rates that are set, by topic."""
         rates = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: rate for name, rate in rates.items() if rate is not None}
 
@@ -189,17 +202,17 @@ class RatesSpec(Model):
 ChosenTopic = Literal[
     "joint_states", "tf", "controller_state", "reference", "error", "actuator_states", "wrench", "contacts", "goals"
 ]
-"""Topics that a task may leave out; `goals` are the action topics of the controllers."""
+"""Optional topics; `goals` are the action topics of the controllers."""
 JUDGED: Final = ("joint_states", "tf", "controller_state")
-"""What the judge looks at together: at the ticks at which all of them are recorded."""
+"""Topics that the judge reads together, at the ticks at which all of them are recorded."""
 
 
 class RecordSpec(Model):
-    """What the log holds, and how often. What is small, or happens once, is always there; so are the joints."""
+    """Recorded topics and their rates. Small topics, one-time messages and joint states are always recorded."""
 
     rates: RatesSpec = Field(RatesSpec(), description="How often topics are recorded.")
     topics: tuple[ChosenTopic, ...] | None = Field(
-        None, description="Of these topics no others are recorded; `joint_states` always is. Default: all."
+        None, description="The optional topics to record; `joint_states` is always recorded. Default: all."
     )
 
     @model_validator(mode="after")
@@ -208,8 +221,8 @@ class RecordSpec(Model):
             if name in self.left_out:
                 raise problem("conflict", f"'{name}' has a rate, but is not among `topics`", at=("rates", name))
             if name in JUDGED and rate < SLOWEST:
-                message = f"'{name}' at {rate:g} Hz is too rare to judge the run by"
-                raise problem("conflict", message, at=("rates", name), hint=f"record it at {SLOWEST:g} Hz at least")
+                message = f"'{name}' is recorded at {rate:g} Hz; judging needs at least {SLOWEST:g} Hz"
+                raise problem("conflict", message, at=("rates", name), hint=f"record it at {SLOWEST:g} Hz or more")
         return self
 
     def strides(self, period: float) -> dict[str, int]:
@@ -218,7 +231,7 @@ class RecordSpec(Model):
 
     @property
     def left_out(self) -> frozenset[str]:
-        """What is not recorded."""
+        """Topics that are not recorded."""
         return frozenset() if self.topics is None else frozenset(get_args(ChosenTopic)) - {*self.topics, "joint_states"}
 
 
@@ -227,50 +240,50 @@ _NAME = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
 
 
 class StepSpec(KeyedSpec):
-    """What every step has beside its one verb key. `body` is the validated block under the verb."""
+    """Common keys of every step. `body` is the validated block under the verb."""
 
     id: str | None = Field(None, description="Names the step in logs and reports. Default: the verb and a number.")
     until: ConditionSpec | None = Field(
         None,
-        description="What the step waits for when it has moved (`pour`: in its dwell; a `guarded` `move`: on its way, "
-        "too), 30 s or until its `timeout`.",
+        description="Condition that the step waits for after its motion (`pour`: in its dwell; a `guarded` `move`: "
+        "also during the motion), for 30 s or until its `timeout`.",
     )
     timeout: Annotated[Pause, Field(gt=0)] | None = Field(
-        None, description="Fails the step after this [s], above 0 to 1 h."
+        None, description="Time after which the step fails [s], above 0 to 1 h."
     )
     on_fail: OnFail = Field(
         "stop",
-        description="After a failure: `stop` ends the run, `continue` goes on (the step does not count then), "
-        "`{retry: n, with: {param: value}}` tries again. Default `stop`.",
+        description="After a failure: `stop` ends the run, `continue` goes on (the failure has no effect on the "
+        "verdict), `{retry: n, with: {param: value}}` re-plans and retries the step. Default `stop`.",
     )
 
     @property
     def retry(self) -> RetrySpec | None:
-        """How it is tried again, if it is."""
+        """How the step is retried; None if it is not."""
         return self.on_fail if isinstance(self.on_fail, RetrySpec) else None
 
     @property
     def may_fail(self) -> bool:
-        """Whether the run goes on after the last attempt has failed."""
+        """Whether the run goes on after the last attempt failed."""
         return (self.on_fail if self.retry is None else self.retry.then) == "continue"
 
     @property
     def verb(self) -> str:
-        """Which step this is."""
+        """Verb of the step."""
         return self.word
 
     @field_validator("id", mode="after")
     @classmethod
     def _id(cls, own: str | None) -> str | None:
         if own is not None and not ID.fullmatch(own):
-            raise problem("conflict", f"'{own}' cannot be an id", hint=ID_HINT)
+            raise problem("conflict", f"'{own}' is not a valid id", hint=ID_HINT)
         return own
 
 
 def _usable(name: str) -> str:
     if not PARAM.fullmatch(name):
-        hint = "`$name` is letters, digits and '_', and begins with a letter from a to z or with '_'"
-        raise problem("conflict", f"'{escape(name)}' cannot be the name of a parameter", key=True, hint=hint)
+        hint = "use letters, digits and '_'; begin with a letter from a to z or '_'"
+        raise problem("conflict", f"'{escape(name)}' is not a valid parameter name", key=True, hint=hint)
     return name
 
 
@@ -278,103 +291,103 @@ ParamName = Annotated[str, AfterValidator(_usable)]
 
 
 class TaskSpec(Model):
-    """A task: with which robot, where things stand, what to do, and what must come of it."""
+    """A task: robot, controllers, scene, steps and expectations."""
 
-    # The loader replaces `steps` and `expect` by the unions that the registries offer.
-    task: str = Field(description="The name of the task; names its log.", min_length=1)
+    # `unions.task_model` replaces `steps`, `expect` and `watch` by unions of the registered members.
+    task: str = Field(description="The name of the task and of its log.", min_length=1)
     version: Version = None
     robot: str = Field(description="Path of the robot file, relative to this file.", min_length=1)
     controllers: str = Field(description="Path of the controllers file, relative to this file.", min_length=1)
-    description: str = Field("", description="What it is for, in words.")
-    tags: tuple[str, ...] = Field((), description="Words that choose it among tests: `-k slow`; markers in pytest.")
+    description: str = Field("", description="Purpose of the task, in words.")
+    tags: tuple[str, ...] = Field((), description="Words that select it among tests: `-k slow`; markers in pytest.")
     params: dict[ParamName, bool | int | float | str] = Field(
         {}, description="Values for `$name` anywhere below, also in arithmetic: `2 * $tilt + 5 deg`."
     )
     simulation: SimulationSpec = Field(SimulationSpec(), description="Engine and clock.")
-    record: RecordSpec = Field(RecordSpec(), description="What the log holds, and how often.")
+    record: RecordSpec = Field(RecordSpec(), description="Recorded topics and their rates.")
     floor: bool = Field(True, description="Whether there is a floor at z = 0. Default true.")
     scene: dict[str, BodySpec] = Field({}, description="The bodies, by name.")
     frames: dict[str, FrameSpec] = Field({}, description="Named frames, for poses to refer to.")
     start: str | None = Field(
         None,
-        description="The named pose that the robot starts in. Default: `home` if it has one; else every joint at 0, or "
-        "at the limit nearest to 0.",
+        description="Named pose in which the robot starts. Default: `home` if the robot has it; else every joint at 0, "
+        "or at the limit nearest to 0.",
     )
     replan: bool | ReplanSpec = Field(
         True,
-        description="Whether a step is planned again where things are not as it was planned for, and from which "
-        "difference on. Default true.",
+        description="Whether a step is re-planned when its measured start differs from the planned one, and the "
+        "tolerances of that comparison. Default true.",
     )
     vary: dict[str, VarySpec] = Field(
         {},
-        description="What `--sample N` draws, by the path of a number as after `--set`; `*` for every name: "
+        description="Values that `--sample N` draws, by path as for `--set`; `*` stands for every name: "
         "`scene.cup.at: {offset: {uniform: [-2 cm, 2 cm]}}`.",
     )
-    baseline: BaselineSpec = Field(BaselineSpec(), description="How much worse than its baseline a run may be.")
-    steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb a step.")
-    expect: tuple[ExpectationSpec, ...] = Field((), description="What must hold: at the end, all the time, in a step.")
+    baseline: BaselineSpec = Field(BaselineSpec(), description="Allowed changes relative to the blessed baseline.")
+    steps: tuple[StepSpec, ...] = Field(min_length=1, description="What to do, in order; one verb per step.")
+    expect: tuple[ExpectationSpec, ...] = Field(
+        (), description="What must hold: at the end, at all times, or in a step."
+    )
     watch: tuple[WatchSpec, ...] = Field(
         (),
-        description="What stops the robot and ends the run where it is broken: `never` or `always`, all the time or "
-        "`during` steps.",
+        description="Conditions that stop the robot and end the run when violated: `never` or `always`, at all times "
+        "or `during` steps.",
     )
 
     @property
     def judged(self) -> tuple[ExpectationSpec, ...]:
-        """What the recording is asked: what is expected, then what was watched."""
+        """Everything judged from the recording: expectations, then watches."""
         return (*self.expect, *self.watch)
 
     @property
     def judged_at(self) -> tuple[tuple[str, int], ...]:
-        """Where in the file each of `judged` stands."""
+        """Location in the file of each of `judged`."""
         return tuple((key, k) for key in ("expect", "watch") for k in range(len(getattr(self, key))))
 
     @model_validator(mode="after")
     def _recordable(self) -> TaskSpec:
-        """Every rate is that of the control tick, or a whole part of it."""
+        """Checks that every rate divides the control rate, and that the judged topics coincide often enough."""
         period = self.simulation.control_period
         strides = self.record.strides(period)
         for name, rate in self.record.rates.given.items():
             ticks = 1.0 / (rate * period)
             if abs(ticks - strides[name]) > 1e-6 * ticks:
                 most = 1.0 / period
-                message = f"{rate:g} Hz is no whole part of the control rate ({most:g} Hz)"
+                message = f"{rate:g} Hz does not divide the control rate, {most:g} Hz"
                 strides_near = range(max(1, int(ticks / 2)), int(2 * ticks) + 2)
                 plain = [most / n for n in strides_near if abs(most / n - round(most / n, 3)) < 1e-9 * most]
-                near = min(plain or [most / max(1, round(ticks))], key=lambda one: abs(one - rate))
+                near = min(plain or [most / max(1, round(ticks))], key=lambda choice: abs(choice - rate))
                 hint = f"write '{near:.10g} Hz'" + (", the control rate" if near == most else "")
                 raise problem("conflict", message, at=("record", "rates", name), hint=hint)
         common = math.lcm(*(strides.get(name, 1) for name in JUDGED if name not in self.record.left_out))
         if common * period > 1.0 / SLOWEST + 1e-9:
-            message = f"these rates meet only every {common * period:g} s, too rarely to judge the run by"
-            raise problem(
-                "conflict", message, at=("record", "rates"), hint="choose rates of which one divides the other"
-            )
+            message = f"these rates coincide every {common * period:g} s; judging needs {1.0 / SLOWEST:g} s or less"
+            raise problem("conflict", message, at=("record", "rates"), hint="choose rates that divide each other")
         return self
 
     @field_validator("tags", mode="after")
     @classmethod
     def _words(cls, tags: tuple[str, ...]) -> tuple[str, ...]:
-        """Each can be a marker of pytest."""
+        """Checks that each tag is a valid pytest marker."""
         for k, tag in enumerate(tags):
             if not TAG.fullmatch(tag):
-                hint = "a tag is letters, digits and '_', and begins with a letter"
-                raise problem("conflict", f"{tag[:100]!r} cannot be a tag", at=(k,), hint=hint)
+                hint = "use letters, digits and '_'; begin with a letter"
+                raise problem("conflict", f"{tag[:100]!r} is not a valid tag", at=(k,), hint=hint)
         return tags
 
     @field_validator("task", mode="after")
     @classmethod
     def _file_name(cls, name: str) -> str:
-        """The name is that of a file, too, on every system, and must not lead elsewhere."""
+        """Checks that the name is a valid file name on every system, without a folder."""
         if not _NAME.fullmatch(name):
-            hint = "a task is called by letters, digits, '_', '-', '+', '.' and spaces inside, 100 at most"
-            raise problem("conflict", f"{name[:100]!r} cannot be the name of a task: it names its log", hint=hint)
+            hint = "use at most 100 letters, digits, '_', '-', '+', '.' and inner spaces"
+            raise problem("conflict", f"{name[:100]!r} is not a valid task name: it names the log file", hint=hint)
         return name
 
     @field_validator("steps", mode="after")
     @classmethod
     def _named(cls, steps: tuple[StepSpec, ...]) -> tuple[StepSpec, ...]:
-        """Every step gets an id: its own, or its verb and the next free number."""
+        """Gives every step an id: its own, or its verb and the next free number."""
         given = {step.id for step in steps}
         counts: dict[str, int] = {}
         named: list[StepSpec] = []

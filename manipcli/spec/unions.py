@@ -1,10 +1,9 @@
-"""The unions of a task and of a controllers file, made from the members of the seams: one model for each verb, each
-condition and each type of controller.
+"""Discriminated unions of steps, conditions and controllers, built from the registered members.
 
-A step is a mapping with exactly one verb key beside the common keys `id`, `until` and `timeout`; a condition is a
-mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with one under
-it, beside the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`. A controller is a mapping
-whose key `type` names the member.
+A step is a mapping with exactly one verb key and the common keys `id`, `until`, `timeout` and `on_fail`; a condition is
+a mapping with its name as the only key; an expectation is a condition, or `always`, `never`, `eventually` with a
+condition, and the common keys `id`, `at`, `during` and `within`; a watch is `always` or `never`. The key `type` of a
+controller names the member.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from manipcli.spec.task import StepSpec, TaskSpec
 
 
 class SpecMember(Protocol):
-    """What the unions ask of a member: the word in YAML, and what stands under it."""
+    """A step or condition as the unions need it: its key in YAML, and the spec of the block under it."""
 
     @property
     def name(self) -> str: ...
@@ -46,7 +45,7 @@ class SpecMember(Protocol):
 
 
 class ControllerSpecMember(Protocol):
-    """What the union of controllers asks of a member: the word under `type`, and the whole block."""
+    """A controller as the union needs it: its `type` in YAML, and the spec of the whole block."""
 
     @property
     def name(self) -> str: ...
@@ -64,7 +63,7 @@ _EXPECTATION = tuple(ExpectationSpec.model_fields)
 
 
 def task_model(steps: Seam[S], conditions: Seam[C]) -> type[TaskSpec]:
-    """`TaskSpec` whose steps, `until` and `expect` are those of the seams; the same class for the same members."""
+    """`TaskSpec` with the steps and conditions of the seams; the same class for the same members."""
     return _task_model(_members(steps), _members(conditions))
 
 
@@ -79,10 +78,10 @@ def _members(seam: Seam[S]) -> Members:
 def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
     condition = _conditions(conditions)
     expectation = _expectations(conditions, condition)
-    until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`|` is no operator of `object`)
+    until = (Optional[condition], StepSpec.model_fields["until"])  # noqa: UP045  (`object` has no operator `|`)
     steps_of = [_wrapped(StepSpec, name, spec, {"until": until}) for name, spec in steps]
     step = _union("verb", steps_of, common=_STEP)
-    # These types are made at run time, which annotations cannot follow.
+    # These types exist only at run time; type checkers cannot follow them.
     model = create_model(
         "TaskSpec",
         __base__=TaskSpec,
@@ -95,7 +94,7 @@ def _task_model(steps: Members, conditions: Members) -> type[TaskSpec]:
 
 
 def controllers_model(controllers: Seam[L]) -> type[ControllersSpec]:
-    """`ControllersSpec` whose entries are of the members' types; the same class for the same members."""
+    """`ControllersSpec` with the types of the members; the same class for the same members."""
     return _controllers_model(tuple((member.name, member.spec) for member in controllers))
 
 
@@ -105,7 +104,7 @@ def _controllers_model(members: tuple[tuple[str, type[ControllerSpec]], ...]) ->
     any_of: object = reduce(or_, specs[1:], specs[0])
     if len(specs) > 1:
         any_of = Annotated[any_of, Field(discriminator="type")]
-    # This type is made at run time, which annotations cannot follow.
+    # This type exists only at run time; type checkers cannot follow it.
     model = create_model(
         "ControllersSpec",
         __base__=ControllersSpec,
@@ -117,19 +116,19 @@ def _controllers_model(members: tuple[tuple[str, type[ControllerSpec]], ...]) ->
 
 
 def _conditions(members: Members) -> object:
-    """Any condition, and `all`, `any`, `not` of any, however deep."""
+    """Union of all conditions, and of `all`, `any`, `not` over conditions, recursively."""
     own = ForwardRef(_CONDITION)
     leaves = [_wrapped(ConditionSpec, name, spec, {}) for name, spec in members]
     combined = [_combined(ConditionSpec, name, own) for name in COMBINATIONS]
     condition = _union("condition", [*leaves, *combined], common=())
-    alias = TypeAliasType(_CONDITION, condition)  # type: ignore[misc]  # a type of its own, that can speak of itself
+    alias = TypeAliasType(_CONDITION, condition)  # type: ignore[misc]  # a named type, which can refer to itself
     for model in combined:
         model.model_rebuild(_types_namespace={_CONDITION: alias})
     return alias
 
 
 def _expectations(members: Members, condition: object) -> object:
-    """Any condition or combination with its time, and `always`, `never`, `eventually` of any."""
+    """Union of conditions and combinations with their time, and of `always`, `never`, `eventually` over conditions."""
     models = [_wrapped(ExpectationSpec, name, spec, {}) for name, spec in members]
     models += [_combined(ExpectationSpec, name, condition) for name in COMBINATIONS]
     models += [_keyed(ExpectationSpec, name, condition, text) for name, text in QUANTIFIERS.items()]
@@ -137,7 +136,7 @@ def _expectations(members: Members, condition: object) -> object:
 
 
 def _watches(names: Sequence[str], condition: object) -> object:
-    """`never` and `always` of any condition."""
+    """Union of `never` and `always` over any condition."""
     models = [_keyed(WatchSpec, name, condition, QUANTIFIERS[name]) for name in WATCHED]
     return _union("watch", models, common=("id", "during"), below=(*names, *COMBINATIONS))
 
@@ -146,16 +145,16 @@ _CONDITION = "Condition"
 
 
 def _combined(base: type[KeyedSpec], name: str, condition: object) -> type[KeyedSpec]:
-    """`base` with the field `all`, `any` (a list of conditions) or `not` (one)."""
-    # `condition` is a type only at run time, which annotations cannot follow.
+    """`base` with the field `all`, `any` (a list of conditions) or `not` (a condition)."""
+    # `condition` is a type only at run time; type checkers cannot follow it.
     listed = Annotated[tuple[condition, ...], Field(min_length=1)]  # type: ignore[valid-type]
     return _keyed(base, name, condition if name == "not" else listed, COMBINATIONS[name])
 
 
 def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str], below: Sequence[str] = ()) -> object:
-    """`Annotated[A | B | ..., which key, one key]` of models that are each known by one key.
+    """Annotated union of models, each identified by one key; validates that exactly one such key is given.
 
-    `below`: words that are no such key, but may stand below any of them.
+    `below`: keys that belong inside any of the models.
     """
     names = tuple(model.word for model in models)
     tagged = [Annotated[model, Tag(_tag(model.word))] for model in models]
@@ -166,20 +165,20 @@ def _union(kind: str, models: Sequence[type[KeyedSpec]], *, common: Sequence[str
 
 
 def _tag(name: str) -> str:
-    """What pydantic puts into locations for a branch: never a key, so that the two cannot be confused."""
+    """Pydantic's name of a branch in locations; the brackets keep it apart from keys."""
     return f"<{name}>"
 
 
 def _wrapped(base: type[KeyedSpec], name: str, spec: type[Model], fields: dict[str, object]) -> type[KeyedSpec]:
-    """`base` with the one field `name`, which holds the member's spec."""
+    """`base` with the single field `name`, which holds the member's spec."""
     empty = not any(field.is_required() for field in spec.model_fields.values())
     default = BeforeValidator(_nothing_is_default, json_schema_input_type=spec | None if empty else spec)
     return _keyed(base, name, Annotated[spec, default], about(spec), **fields)
 
 
 def _keyed(base: type[KeyedSpec], name: str, holds: object, text: str, **fields: object) -> type[KeyedSpec]:
-    """`base` with the one field `name` of any type."""
-    # Fields whose names are only known at run time: no overload of create_model has those.
+    """`base` with the single field `name` of any type."""
+    # The field names are only known at run time: no overload of create_model fits.
     made = create_model(  # type: ignore[call-overload]
         "".join(word.capitalize() for word in name.split("_")) + base.__name__.removesuffix("Spec"),
         __base__=base,
@@ -193,7 +192,7 @@ def _keyed(base: type[KeyedSpec], name: str, holds: object, text: str, **fields:
 
 
 def _nothing_is_default(body: object) -> object:
-    """`- release:` with nothing under it means all defaults."""
+    """`- release:` without a value means all defaults."""
     return {} if body is None else body
 
 
@@ -209,7 +208,7 @@ def _key_of(names: tuple[str, ...]) -> Callable[[object], str | None]:
 def _check(
     kind: str, names: tuple[str, ...], common: tuple[str, ...], below: tuple[str, ...]
 ) -> Callable[[object], object]:
-    """Exactly one of `names` among the keys; what else is wrong the member's model tells."""
+    """Validator: exactly one of `names` among the keys. The member's model checks the rest."""
 
     kinds = f"{kind}es" if kind.endswith("ch") else f"{kind}s"
     what, its = ("a step", "verb") if kind == "verb" else (f"an {kind}" if kind[0] in "aeiou" else f"a {kind}", "name")
@@ -218,8 +217,8 @@ def _check(
         if isinstance(value, Model):
             return value
         if not isinstance(value, dict):
-            forgot = isinstance(value, str) and value in names
-            hint = f"write `{value}:` with a colon" if forgot else f"{kinds}: {listed(names)}"
+            without_colon = isinstance(value, str) and value in names
+            hint = f"write `{value}:` with a colon" if without_colon else f"{kinds}: {listed(names)}"
             raise problem("verb", f"expected {what}: a mapping with one {its}", hint=hint)
         found = [key for key in value if key in names]
         others = [str(key) for key in value if key not in names and key not in common]
@@ -234,7 +233,7 @@ def _check(
             message = f"unknown {kind} '{escape(others[0])}', expected one of {listed(names, most=30)}"
             raise problem("name", message, at=(others[0],), key=True, hint=near)
         if not found:
-            raise problem("verb", f"{what} without a {its}, expected one of {listed(names, most=30)}")
+            raise problem("verb", f"{what} needs a {its}: one of {listed(names, most=30)}")
         return value
 
     return check

@@ -1,6 +1,6 @@
-"""`vary:` of a task: which numbers are drawn anew for each sample, and from what.
+"""Spec of `vary:`: the numbers that are drawn for each sample, and their distributions.
 
-What a text such as `2 cm` must be is known only once the path is: here amounts stay as they are written.
+The dimension of an amount such as `2 cm` depends on the path, so amounts stay as written here.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from pydantic_core import CoreSchema
 from manipcli.spec.base import Model, or_short, problem
 
 Amount = float | str
-"""A number (SI), or a text with a unit."""
+"""A number (SI), or a string with a unit."""
 Value = Amount | tuple[Amount, ...]
-"""Of a vector: an amount for all its components, or one for each."""
+"""An amount; for a vector, one amount for all components or one per component."""
 WORDS = ("uniform", "normal", "choice", "grid")
 
 
 class NormalSpec(Model):
-    """A normal distribution; `[mean, sd]` is short for it."""
+    """A normal distribution; short form `[mean, sd]`."""
 
-    mean: Value = Field(description="The middle.")
-    sd: Value = Field(description="The standard deviation, above 0.")
+    mean: Value = Field(description="Mean.")
+    sd: Value = Field(description="Standard deviation, above 0.")
 
     @model_validator(mode="before")
     @classmethod
@@ -37,50 +37,52 @@ class NormalSpec(Model):
 
 
 class DistributionSpec(Model):
-    """Exactly one distribution. Of a vector each component is drawn on its own, unless lists are what is chosen."""
+    """Exactly one distribution. Components of a vector are drawn independently, unless the items are lists."""
 
     keys: ClassVar[tuple[str, ...]] = WORDS
 
     uniform: tuple[Value, Value] | None = Field(
-        None, description="[least, most]: every value between them alike; of a whole number each of them alike."
+        None, description="[least, most]: uniform over this interval; for whole numbers, over its integers."
     )
     normal: NormalSpec | None = Field(
         None,
-        description="{mean, sd} or [mean, sd], cut off at the field's bounds (a mass at 0); whole numbers rounded.",
+        description="{mean, sd} or [mean, sd], truncated at the field's bounds (a mass at 0); whole numbers rounded.",
     )
     choice: Annotated[tuple[Value, ...], Field(min_length=1)] | None = Field(
-        None, description="One of these, each alike."
+        None, description="One of these values, with equal probability."
     )
     grid: Annotated[tuple[Value, ...], Field(min_length=1)] | None = Field(
         None,
-        description="One of these after the other. Sample 0 has the first of every grid, the last grid of the file "
-        "goes on first, and after all combinations they begin again.",
+        description="These values in turn. Sample 0 takes the first value of every grid, the last grid of the file "
+        "advances fastest, and after all combinations they start over.",
     )
 
     @property
     def word(self) -> str:
-        """Which of `keys` it is."""
+        """The key that is set."""
         return next(key for key in self.keys if getattr(self, key) is not None)
 
     @model_validator(mode="after")
     def _one(self) -> DistributionSpec:
         given = [key for key in self.keys if getattr(self, key) is not None]
         if len(given) != 1:
-            found = f"not both '{given[0]}' and '{given[1]}'" if given else "not none"
+            found = f"not both '{given[0]}' and '{given[1]}'" if given else "got none"
             message = f"expected exactly one of {', '.join(self.keys)}, {found}"
             raise problem("conflict", message, at=(given[1],) if given else (), key=bool(given))
         return self
 
 
 class VarySpec(DistributionSpec):
-    """From what a number is drawn: the value itself, or what is added to it, or by what it is multiplied."""
+    """Distribution of a number: of its value, or of an offset or a factor applied to the value in the file."""
 
     keys: ClassVar[tuple[str, ...]] = (*WORDS, "offset", "scale")
 
-    offset: DistributionSpec | None = Field(None, description="Drawn, and added to the value in the file.")
-    scale: DistributionSpec | None = Field(None, description="Drawn, and multiplied with the value in the file.")
+    offset: DistributionSpec | None = Field(
+        None, description="Distribution of an amount that is added to the value in the file."
+    )
+    scale: DistributionSpec | None = Field(None, description="Distribution of a factor on the value in the file.")
 
     @property
     def distribution(self) -> DistributionSpec:
-        """What is drawn, wherever it stands."""
+        """The distribution, whether of the value, an offset or a factor."""
         return self.offset or self.scale or self

@@ -1,4 +1,4 @@
-"""The three files of a task with other numbers in them, and what of a `vary:` they would refuse."""
+"""The three files of a task with varied values, and the values of `vary:` that they refuse."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manipcli.task.vary import Varied, bind
 M = TypeVar("M", bound=Model)
 
 INSIDE = 1e-9
-"""Share of a uniform law between its end and what is surely drawn."""
+"""Distance from the ends of a uniform law, as a share of its width, that is certainly drawn."""
 Changes = Sequence[tuple[Varied, Number]]
 
 
@@ -34,14 +34,19 @@ class Files:
     controllers: Located[ControllersSpec]
 
     def changed(self, changes: Changes) -> Files:
-        """With these values in their places.
+        """The files with these values.
 
         Raises:
-            InvalidInput: one of them is refused; told where it is varied.
+            InvalidInput: a value is refused; the place is its entry in `vary:`.
         """
         overrides = [
-            Override(one.area, one.parts, _node(value, place := self.task.source.key_place("vary", one.key)), place)
-            for one, value in changes
+            Override(
+                quantity.area,
+                quantity.parts,
+                _node(value, place := self.task.source.key_place("vary", quantity.key)),
+                place,
+            )
+            for quantity, value in changes
         ]
         return Files(
             _changed(self.task, overrides), _changed(self.robot, overrides), _changed(self.controllers, overrides)
@@ -49,10 +54,10 @@ class Files:
 
 
 def bound(files: Files) -> tuple[Varied, ...]:
-    """Everything that the task varies, in the order of its file.
+    """All varied quantities of a task, in the order of its file.
 
     Raises:
-        InvalidInput: every key and every range of `vary:` that the files refuse.
+        InvalidInput: all keys and ranges of `vary:` that the files refuse.
     """
     varied, wrong = bind(files.task, files.robot, files.controllers)
     findings = (*wrong, *out_of_range(files, varied))
@@ -62,33 +67,39 @@ def bound(files: Files) -> tuple[Varied, ...]:
 
 
 def out_of_range(files: Files, varied: Sequence[Varied]) -> tuple[Diagnostic, ...]:
-    """What the fields of the files refuse of the ends and items of each law; a normal law has no ends.
+    """Errors for ends and items of each law that the fields of the files refuse; a normal law has no ends.
 
-    All laws take their ends together, the shorter ones their last one again, so that fields which must fit each other
-    are not compared with values that are never drawn.
+    The laws are tested together, end by end (a shorter law repeats its last one), so that fields that constrain each
+    other are not tested against values that are never drawn.
     """
-    written = {files.task.source.key_place("vary", one.key) for one in varied}
+    written = {files.task.source.key_place("vary", quantity.key) for quantity in varied}
 
     def refused(area: Area, k: int, inside: float) -> tuple[Diagnostic, ...]:
-        ends = ((one, one.ends(inside)) for one in varied if one.area == area)
+        ends = ((quantity, quantity.ends(inside)) for quantity in varied if quantity.area == area)
         try:
-            files.changed([(one, values[min(k, len(values) - 1)]) for one, values in ends if values])
+            files.changed([(quantity, values[min(k, len(values) - 1)]) for quantity, values in ends if values])
         except InvalidInput as invalid:
-            return tuple(one for one in invalid.findings if one.severity == "error" and one.place in written)
+            return tuple(
+                finding for finding in invalid.findings if finding.severity == "error" and finding.place in written
+            )
         return ()
 
     found: list[Diagnostic] = []
-    for area, k in product(get_args(Area), range(max((len(one.ends()) for one in varied), default=0))):
-        told = refused(area, k, 0.0)
+    for area, k in product(get_args(Area), range(max((len(quantity.ends()) for quantity in varied), default=0))):
+        at_ends = refused(area, k, 0.0)
         # The ends themselves are never drawn: a mass from [0, 1 kg] is above 0.
-        places = {finding.place for finding in refused(area, k, INSIDE)} if told else set()
-        found += [replace(one, message=f"{one.message}, which may be drawn") for one in told if one.place in places]
+        places = {finding.place for finding in refused(area, k, INSIDE)} if at_ends else set()
+        found += [
+            replace(finding, message=f"{finding.message} (a value that `vary` may draw)")
+            for finding in at_ends
+            if finding.place in places
+        ]
     return tuple(dict.fromkeys(found))
 
 
 def _changed(file: Located[M], overrides: Iterable[Override]) -> Located[M]:
     source = file.source
-    mine = [one for one in overrides if one.area == source.area]
+    mine = [override for override in overrides if override.area == source.area]
     if not mine:
         return file
     root, findings = apply(source.root, mine, type(file.spec), source.area)
@@ -99,5 +110,5 @@ def _changed(file: Located[M], overrides: Iterable[Override]) -> Located[M]:
 
 def _node(value: Number, place: Place) -> Node:
     if isinstance(value, tuple):
-        return SequenceNode(tuple(ScalarNode(one, place) for one in value), place)
+        return SequenceNode(tuple(ScalarNode(number, place) for number in value), place)
     return ScalarNode(value, place)

@@ -1,4 +1,4 @@
-"""Whether the files of a task go together: each may be sound, and what one speaks of may not be in another."""
+"""Consistency checks across the files of a task: names, units, controllers and engine."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ NOT_SWITCHED: Final = 233
 GUARDED: Final = 242
 MOTIONLESS: Final = 244
 UNFELT: Final = 245
-"""Numbers of findings about a task."""
+"""Numbers of the codes of findings about a task."""
 OF_NAMES: Final = frozenset({"CTRL102", "CTRL104", "CTRL143", "CTRL144", "CTRL146"})
-"""Findings about a controllers file that speak of joints which are not there, or not its own."""
+"""Codes of findings on a controllers file about joints that are missing or not its own."""
 
 
 def consistent(
     task: Located[TaskSpec], controllers: Located[ControllersSpec], robot: RobotModel, scene: Scene
 ) -> tuple[Diagnostic, ...]:
-    """Warnings and notes about three sound files together.
+    """Warnings and notes about three valid files together.
 
     Raises:
-        InvalidInput: every error of `disagreements`.
+        InvalidInput: all errors of `disagreements`.
     """
     found = disagreements(task, controllers, robot, scene)
     errors = [finding for finding in found if finding.severity == "error"]
@@ -60,8 +60,8 @@ def consistent(
 def disagreements(
     task: Located[TaskSpec], controllers: Located[ControllersSpec] | None, robot: RobotModel, scene: Scene
 ) -> tuple[Diagnostic, ...]:
-    """What files that are sound by themselves do not have together: names that are not there, units that fit no joint,
-    what the engine refuses, what no controller commands. Warnings and notes are among it."""
+    """All findings about the files together: missing names, units that fit no joint, robots that the engine refuses,
+    joints without a controller. Includes warnings and notes."""
     claimed = _misclaimed(controllers, robot, task.spec) if controllers else ()
     misclaimed = any(finding.severity == "error" for finding in claimed)
     claims = None
@@ -78,8 +78,8 @@ def disagreements(
 def not_there(
     task: Located[TaskSpec], robot: RobotModel, scene: Scene, claims: Claims | None = None
 ) -> Iterator[Diagnostic]:
-    """What steps, conditions and expectations speak of and that is not there; of steps also what no controller could
-    carry out, where it is known who `claims` what."""
+    """Errors for missing names in steps, conditions and expectations; with `claims`, also for steps that no controller
+    can execute."""
     spec, kept = task.spec, task.source.kept
     known = tuple(step.id for step in spec.steps if step.id is not None)
     ids = intended_ids(task.source, STEPS.names) if kept else known
@@ -88,20 +88,20 @@ def not_there(
     for number, loc, p in (*of_steps, *_of_expectations(spec, context)):
         yield task.source.finding(number, (*loc, *p.loc), p.message, hint=p.hint)
     for k in range(0 if kept else len(spec.steps)):
-        told = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
-        yield from _tried_again(task, k, context, told)
+        reported = {p.message for number, loc, p in of_steps if number == ABSENT and loc[1] == k}
+        yield from _in_retry(task, k, context, reported)
     poses = [pose.name for pose in robot.poses]
     if spec.start is not None and spec.start not in poses:
         message = f"robot '{robot.name}' has no pose '{spec.start}'"
         yield task.source.finding(ABSENT, ("start",), message, hint=f"poses: {', '.join(poses)}")
     if spec.simulation.engine not in ENGINES.names:
-        message = f"there is no engine '{spec.simulation.engine}'"
+        message = f"unknown engine '{spec.simulation.engine}'"
         hint = f"engines: {', '.join(ENGINES.names)}"
         yield task.source.finding(ABSENT, ("simulation", "engine"), message, hint=hint)
 
 
 def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> Iterator[tuple[int, Loc, Problem]]:
-    """What is wrong with each step, and with what it waits for; after a switch of controllers others claim."""
+    """Problems of each step and its `until`; a switch of controllers changes the claims of later steps."""
     robot = context.robot
     for k, step in enumerate(spec.steps):
         member, at = STEPS[step.verb], ("steps", k, step.verb)
@@ -124,31 +124,31 @@ def _of_steps(spec: TaskSpec, context: CheckContext, claims: Claims | None) -> I
 
 
 def _unguarded(step: StepSpec, spec: TaskSpec) -> Iterator[Problem]:
-    """What a guarded step lacks."""
+    """Problems of a guarded step: a missing `until`, or disabled re-planning."""
     if step.until is None:
-        hint = "beside the verb: `until: {contact_force: {pair: [robot, BODY], above: 5 N, mean_over: 50 ms}}`"
-        yield Problem(("guarded",), "nothing says where it stops: the step has no `until`", hint)
+        hint = "next to the verb, add `until: {contact_force: {pair: [robot, BODY], above: 5 N, mean_over: 50 ms}}`"
+        yield Problem(("guarded",), "a guarded move needs an `until`; the step has none", hint)
     if spec.replan is False:
-        message = "where it stops is not known beforehand, and `replan: false` forbids to plan what follows from there"
-        yield Problem(("guarded",), message, "leave `replan` out")
+        message = "a guarded move needs re-planning, since its end is not known in advance; `replan` is false"
+        yield Problem(("guarded",), message, "remove `replan: false`")
 
 
 def _unfelt(task: Located[TaskSpec]) -> Iterator[Diagnostic]:
-    """Moves that may touch something, wait for its force, and look for that only when they have gone all their way."""
+    """Warnings for unguarded moves into contact whose `until` waits for a force: it is checked only at their end."""
     for k, step in enumerate(task.spec.steps):
         body = step.body
         if not isinstance(body, MoveSpec) or not body.touch or body.guarded or step.until is None:
             continue
         if _is_for_a_force(step.until):
-            message = "`until` is looked at when the move has gone all its way, however hard it presses by then"
-            hint = "`guarded: true` in the move stops it where `until` holds"
+            message = "`until` is checked only at the end of the move, whatever the contact force before"
+            hint = "add `guarded: true` to the move to stop it when `until` holds"
             yield task.source.finding(UNFELT, ("steps", k, "until"), message, hint=hint, severity="warning")
 
 
 def _is_for_a_force(until: ConditionSpec, *, opposite: bool = False) -> bool:
-    """Whether something in it, or in its `opposite`, comes to hold by pressing harder."""
+    """Whether a larger contact force can make the condition, or its `opposite`, hold."""
     if until.combines:
-        return any(_is_for_a_force(one, opposite=opposite != (until.name == "not")) for one in until.members)
+        return any(_is_for_a_force(member, opposite=opposite != (until.name == "not")) for member in until.members)
     match until.body:
         case ContactForceSpec(above=above, below=below):
             return (below if opposite else above) is not None
@@ -166,38 +166,40 @@ def _of_expectations(spec: TaskSpec, context: CheckContext) -> Iterator[tuple[in
                 yield ABSENT, (key, k), p
 
 
-def _tried_again(task: Located[TaskSpec], k: int, context: CheckContext, told: Collection[str]) -> Iterator[Diagnostic]:
-    """What is wrong with a step only when it is tried again with other values: not what was `told` of it already."""
+def _in_retry(
+    task: Located[TaskSpec], k: int, context: CheckContext, reported: Collection[str]
+) -> Iterator[Diagnostic]:
+    """Problems of a step with the other parameters of its retry, without those already `reported`."""
     step = task.spec.steps[k]
     try:
-        again = retried(task, k)
+        changed = retried(task, k)
     except InvalidInput as invalid:
-        yield from (replace(one, message=f"{one.message}, when it is tried again") for one in invalid.findings)
+        yield from (replace(finding, message=f"{finding.message} (in a retry)") for finding in invalid.findings)
         return
-    if again is step:
+    if changed is step:
         return
-    wrong = STEPS[again.verb].check(again.body, context.robot, context.scene)
-    wrong += () if again.until is None else until_problems(again.until, step.id, context, CONDITIONS)
-    for p in wrong:
-        if p.message not in told:
+    problems = STEPS[changed.verb].check(changed.body, context.robot, context.scene)
+    problems += () if changed.until is None else until_problems(changed.until, step.id, context, CONDITIONS)
+    for p in problems:
+        if p.message not in reported:
             yield task.source.finding(ABSENT, ("steps", k, "on_fail", "with"), p.message, hint=p.hint)
 
 
 def _named_as_links(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Diagnostic]:
-    """Bodies and frames that have the name of a link."""
-    links = {link.name for link in robot.links} - {*RESERVED}  # which are told without a robot
+    """Errors for bodies and frames with the name of a link."""
+    links = {link.name for link in robot.links} - {*RESERVED}  # which are reported without a robot
     for number, key, named in ((220, "scene", scene.bodies), (227, "frames", scene.frames)):
-        message, hint = f"robot '{robot.name}' has a link of this name", "choose another: a log has one frame of a name"
+        message, hint = f"robot '{robot.name}' has a link of this name", "rename it: frame names are unique in a log"
         yield from (
-            task.source.finding(number, (key, one.name), message, hint=hint) for one in named if one.name in links
+            task.source.finding(number, (key, thing.name), message, hint=hint) for thing in named if thing.name in links
         )
 
 
 def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Diagnostic, ...]:
-    """Why the robot can do no task, or the engine cannot hold it: told at the link, or where the task names it."""
+    """Errors for a robot without movable joints, or that the engine refuses."""
     if not robot.moving_joints:
-        message = f"robot '{robot.name}' has no joint that moves"
-        hint = "a thing that stands or is taken is a body of the scene, `urdf: {file: ...}`"
+        message = f"robot '{robot.name}' has no movable joint"
+        hint = "write a passive object as a body of the scene: `urdf: {file: ...}`"
         return (task.source.finding(MOTIONLESS, ("robot",), message, hint=hint),)
     engine = task.spec.simulation.engine
     if engine not in ENGINES.names:
@@ -208,8 +210,7 @@ def _refused(task: Located[TaskSpec], robot: RobotModel) -> tuple[Diagnostic, ..
 
 
 def _misclaimed(file: Located[ControllersSpec], robot: RobotModel, task: TaskSpec) -> tuple[Diagnostic, ...]:
-    """What is wrong with who commands what, and what is only to be told; of a file from which something was left out
-    nothing but names."""
+    """Findings on the claims of controllers; only those on names if values were removed from the file."""
     period = task.simulation.control_period
     found = controller_findings(file.spec, robot, period, place=lambda loc: file.place(*loc))
-    return found if file.source.untouched() else tuple(one for one in found if one.code in OF_NAMES)
+    return found if file.source.untouched() else tuple(finding for finding in found if finding.code in OF_NAMES)

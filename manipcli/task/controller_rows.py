@@ -1,4 +1,4 @@
-"""The controllers of a task, for whoever asks who claims what."""
+"""The controllers of a task and the interfaces that they claim, for tables."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class ControllerRow:
 
     Attributes:
         name, type: as in the controllers file.
-        active: whether it is, at the start.
-        joints: that it commands or reads.
-        interfaces: that it claims of each of its joints while it is active.
+        active: at the start.
+        joints: joints that it commands or reads.
+        interfaces: command interfaces that it claims on each joint while active.
         update_rate: [Hz].
     """
 
@@ -34,7 +34,7 @@ class ControllerRow:
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """The `joint/interface` that it claims while it is active."""
+        """The interfaces `joint/interface` that it claims while active."""
         return tuple(f"{joint}/{interface}" for joint in self.joints for interface in self.interfaces)
 
 
@@ -47,6 +47,13 @@ def controllers_of(path: Path) -> tuple[ControllerRow, ...]:
     task = load_task(path)
     every = 1.0 / task.spec.simulation.control_period
     return tuple(
-        ControllerRow(name, one.type, one.active, one.joints, one.interfaces, one.update_rate or every)
-        for name, one in task.controllers.controllers.items()
+        ControllerRow(
+            name,
+            controller.type,
+            controller.active,
+            controller.joints,
+            controller.interfaces,
+            controller.update_rate or every,
+        )
+        for name, controller in task.controllers.controllers.items()
     )

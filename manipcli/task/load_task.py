@@ -1,4 +1,4 @@
-"""Task file to checked task: one column of calls. What goes wrong is reported by `second_chances`."""
+"""Loading of a task file and its robot and controllers files. `second_chances` collects all errors."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class FileOptions(TypedDict, total=False):
     Attributes:
         overrides: `scene.cup.mass=80 g`, as after `--set`.
         seed: replaces the seed of the task.
-        package_path: more folders in which packages are looked for.
-        allow_outside: files may lie outside packages and the folders of the files that name them.
+        package_path: additional folders to search for packages.
+        allow_outside: allow files outside packages and outside the folders of the files that name them.
     """
 
     overrides: Sequence[str]
@@ -39,18 +39,18 @@ class FileOptions(TypedDict, total=False):
 
 
 class LoadOptions(FileOptions, total=False):
-    """The same, and which sample of the task is meant.
+    """`FileOptions`, and the sample of the task.
 
     Attributes:
-        sample: a number from 0, of `vary:`; None for the task as written. What `overrides` set is not drawn; its
-            `offset` or `scale` is, about the value that they set.
+        sample: index of a sample of `vary:`, from 0; None for the task as written. Values set by `overrides` are not
+            drawn; their `offset` or `scale` is, relative to the value set.
     """
 
     sample: int | None
 
 
 def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOptions]) -> Task:
-    """Read a task and everything it names.
+    """Loads a task and all files that it names.
 
     Args:
         path: the task file.
@@ -58,8 +58,8 @@ def load_task(path: Path, *, sample: int | None = None, **options: Unpack[FileOp
         options: see `FileOptions`.
 
     Raises:
-        InvalidInput: every error of all three files at once; errors of the scene's geometry once the task file is
-            sound. Or there is no such sample, or a drawn value is refused.
+        InvalidInput: all errors of all three files at once; errors of the scene's geometry only if the task file is
+            valid. Also if the sample does not exist, or a drawn value is refused.
     """
     try:
         task, varied = _as_written(path, **options)
@@ -86,7 +86,7 @@ def _as_written(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> tuple[Task, tuple[Varied, ...]]:
-    """The task as its files state it, and what `vary:` changes.
+    """The task as written, and the quantities of `vary:`.
 
     Raises:
         InvalidInput: the errors of the first stage that has any.

@@ -15,7 +15,7 @@ def named_file(task: Located[TaskSpec], path: Path, key: str) -> Path:
     """The file that the task at `path` names under `key`.
 
     Raises:
-        InvalidInput: there is no such file; with the place where it is named.
+        InvalidInput: the file does not exist; the place is where it is named.
     """
     named: str = getattr(task.spec, key)
     found = Path(os.path.normpath(path.parent / named))

@@ -1,5 +1,7 @@
-"""What stands in for a scene or a robot that cannot be built, so that the names that a task gets wrong are told with
-the mistakes that keep it from being built. Nothing is planned or simulated with these."""
+"""Placeholders for a scene or robot that cannot be built, to check the names of a task nevertheless.
+
+Nothing is planned or simulated with them.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,15 @@ from manipcli.spec.task import TaskSpec
 
 
 def named_scene(spec: TaskSpec) -> Scene:
-    """The names of a scene that cannot be built. Its bodies could be anything but the floor, so that only unknown names
-    are told."""
-    one = Box((1.0, 1.0, 1.0))
+    """A scene with the names of the task's bodies and frames. Every body fits every use, so that only unknown names
+    are reported."""
+    box = Box((1.0, 1.0, 1.0))
     origin = Transform.identity()
     bodies = tuple(
         Body(
             name=name, kind="", geometries=(), mass=1.0, X_OI=origin, inertia=frozen(np.eye(3)), friction=0.0,
             rolling_friction=0.0, spinning_friction=0.0, restitution=0.0, fixed=name not in spec.scene, X_WO=origin,
-            interior=Interior(X_OS=origin, shape=one), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
+            interior=Interior(X_OS=origin, shape=box), size=frozen([1.0, 1.0, 1.0]), centre=frozen([0.0, 0.0, 0.0]),
         )
         for name in (*(("floor",) if spec.floor else ()), *spec.scene)
     )  # fmt: skip
@@ -34,8 +36,8 @@ def named_scene(spec: TaskSpec) -> Scene:
 
 
 def named_robot(spec: TaskSpec) -> RobotModel:
-    """A robot of which nothing is known: every word of the task is a pose, a group, a joint and a link of it, so that
-    only what is wrong with any robot is told."""
+    """A robot that accepts every name: each word of the task is a pose, a group, a joint and a link, so that only
+    errors with any robot are reported."""
     words = tuple(dict.fromkeys(_words(spec.model_dump(serialize_as_any=True))))
     links = dict.fromkeys(name for word in words for name in (word, word.removeprefix(f"{ROBOT}/")))
     limits = JointLimits(lower=-np.inf, upper=np.inf, velocity=np.inf, effort=np.inf)

@@ -1,4 +1,4 @@
-"""The whole task planned before anything moves: every step from the predicted end of the one before."""
+"""Planning of a whole task before it runs: each step starts at the predicted end of the previous one."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from manipcli.task.task import Task
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """A step as written (`place`: file:line:column), and what was planned for it, by none of `grasps`, R_WT (3, 3) of
-    the tool, which lead nowhere."""
+    """A step (`place`: file:line:column) and its plan. `grasps`: excluded tool orientations R_WT (3, 3), after which a
+    later step has no plan."""
 
     id: str
     verb: str
@@ -50,8 +50,8 @@ class PlannedMotion:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What will be done. `planner` can plan a step again from what was measured; `judged`: where expectations and
-    watches were written, for the log."""
+    """The plan of a task. `planner` re-plans steps from measured states; `judged`: places of expectations and watches,
+    for the log."""
 
     steps: tuple[PlannedStep, ...]
     start: PlanningState
@@ -69,31 +69,34 @@ class Plan:
 
     @property
     def outline(self) -> PlanOutline:
-        """What the log carries."""
+        """The plan as the log stores it."""
         return PlanOutline(
-            tuple(StepOutline(one.id, one.verb, one.place, one.plan.duration, one.plan.motions) for one in self.steps),
+            tuple(
+                StepOutline(step.id, step.verb, step.place, step.plan.duration, step.plan.motions)
+                for step in self.steps
+            ),
             self.judged,
         )
 
 
-def plan_task(task: Task, *, doing: Callable[[str], None] = lambda _: None) -> Plan:
-    """Plan every step.
+def plan_task(task: Task, *, on_progress: Callable[[str], None] = lambda _: None) -> Plan:
+    """Plans every step.
 
     Args:
-        task: whose steps.
-        doing: told of each step before it is planned.
+        task: the task.
+        on_progress: callback with a message before each step is planned.
 
     Raises:
-        NotPlannable: names the step and why; no later step was planned.
+        NotPlannable: names the step and the cause; later steps are not planned.
     """
     planner = _planner(task)
     start = PlanningState(position=start_position(task), bodies=tuple(body.X_WO for body in task.scene.movable))
     judged = tuple(task.log_place(*key) for key in task.spec.judged_at)
-    return Plan(steps=_steps(task, planner, start, doing), start=start, planner=planner, judged=judged)
+    return Plan(steps=_steps(task, planner, start, on_progress), start=start, planner=planner, judged=judged)
 
 
 def refused(task: Task, refusal: NotPlannable) -> Verdict:
-    """The verdict on a task that was never run, because one of its steps cannot be planned."""
+    """The verdict on a task that did not run because a step cannot be planned."""
     reason = "a step cannot be planned"
     return Verdict(
         task=task.name,
@@ -124,7 +127,11 @@ def refused(task: Task, refusal: NotPlannable) -> Verdict:
 
 
 def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Sequence[Array] = ()) -> StepPlan:
-    """Plan one step, by none of `grasps`; whatever refuses it is told with its id."""
+    """Plans one step, excluding `grasps`.
+
+    Raises:
+        NotPlannable: with the id of the step.
+    """
     member = STEPS[step.verb]
     try:
         if state.at_start:
@@ -137,34 +144,36 @@ def plan_step(planner: Planner, step: StepSpec, state: PlanningState, grasps: Se
 
 
 def start_position(task: Task) -> Array:
-    """(n) where the robot starts: the task's `start` pose, else `home` if there is one, else zero within the limits."""
+    """Start configuration (n,) [rad or m]: the task's `start` pose, else `home`, else zero clamped to the limits."""
     return configuration(task.robot, task.spec.start)
 
 
-def _steps(task: Task, planner: Planner, start: PlanningState, doing: Callable[[str], None]) -> tuple[PlannedStep, ...]:
-    """Every step from the predicted end of the one before; with another grasp where one leads nowhere."""
+def _steps(
+    task: Task, planner: Planner, start: PlanningState, on_progress: Callable[[str], None]
+) -> tuple[PlannedStep, ...]:
+    """Plans each step from the predicted end of the previous one; backtracks to other grasps."""
     done: list[PlannedStep] = []
     regrasps = GraspBacktracking(planner)
     while (k := len(done)) < len(task.spec.steps):
         grasps = regrasps.of(k)
-        again = ", with another grasp" if grasps else ""
-        doing(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{again}")
+        retry = ", with another grasp" if grasps else ""
+        on_progress(f"planning step {k + 1} of {len(task.spec.steps)}, '{task.spec.steps[k].id}'{retry}")
         try:
             done.append(_planned(task, planner, k, done[-1].plan.end if done else start, grasps))
         except NotPlannable as refusal:
-            del done[regrasps.back(refusal, [(one.verb, one.plan.end) for one in done]) :]
+            del done[regrasps.back(refusal, [(step.verb, step.plan.end) for step in done]) :]
     return tuple(done)
 
 
 def _planned(task: Task, planner: Planner, k: int, start: PlanningState, grasps: tuple[Array, ...]) -> PlannedStep:
-    """Step `k` of the task, by none of `grasps`; a refusal tells where it is written."""
+    """Plans step `k`, excluding `grasps`; a refusal has the place of the step."""
     step = task.spec.steps[k]
     try:
         planned = plan_step(planner, step, start, grasps)
     except NotPlannable as refusal:
         at = task.file.place("steps", k, *((step.verb, *refusal.loc) if refusal.loc else ()))
-        told = NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at, loc=refusal.loc)
-        raise told from refusal
+        located = NotPlannable(refusal.cause, step=refusal.step, hint=refusal.hint, place=at, loc=refusal.loc)
+        raise located from refusal
     return PlannedStep(str(step.id), step.verb, planned, task.log_place("steps", k), grasps)
 
 

@@ -1,4 +1,4 @@
-"""A robot file and the robot that it describes."""
+"""Loading of a robot file and its robot."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from manipcli.task.second_chances import every_robot_finding
 def read_robot(
     path: Path, *, package_path: Sequence[Path] = (), allow_outside: bool = False
 ) -> tuple[Located[RobotSpec], RobotModel, tuple[Diagnostic, ...]]:
-    """The file, the robot, and the warnings and notes of both.
+    """Loads a robot file; returns the file, the robot, and the warnings and notes of both.
 
     Args:
         path: the robot file.
-        package_path: more folders in which packages are looked for.
-        allow_outside: files may lie outside packages and the folder of the robot file.
+        package_path: additional folders to search for packages.
+        allow_outside: allow files outside packages and outside the folder of the robot file.
 
     Raises:
-        InvalidInput: every error of the file and of what it names.
+        InvalidInput: all errors of the file and of the files it names.
     """
     try:
         file = load_robot(path)

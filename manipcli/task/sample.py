@@ -1,8 +1,8 @@
-"""One sample of a task that varies: what is planned with, and what only the world knows.
+"""Sampling of a task with `vary:`: the model for planning and the ground truth for simulation.
 
-Where things are, how large they are, limits and the clock are seen by planner and controllers. Masses, coefficients of
-contact, gravity, actuators and everything of the controllers act in the world alone: planner and the models of
-controllers keep what the files say (`Varied.only_world`).
+Poses, sizes, limits and the clock change for planner and controllers, too. Masses, contact coefficients, gravity,
+actuators and controller parameters change in the simulation only: the planner and the models of controllers keep the
+values in the files (`Varied.only_world`).
 """
 
 from __future__ import annotations
@@ -41,19 +41,20 @@ def draw_sample(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> Task:
-    """Sample `number` of a task; what `overrides` set is not drawn, but its `offset` or `scale` is.
+    """Sample `number` of a task. Values set by `overrides` are not drawn; their `offset` or `scale` is.
 
     Args:
-        task: as its files state it.
-        varied: what its `vary:` changes.
-        number: which sample, from 0.
-        path: the task file; `overrides`, `package_path`, `allow_outside`: as it was loaded.
+        task: the task as written.
+        varied: the quantities of its `vary:`.
+        number: index of the sample, from 0.
+        path: the task file.
+        overrides, package_path, allow_outside: the options with which the task was loaded.
 
     Raises:
-        InvalidInput: there is no such sample, or a drawn value is refused.
+        InvalidInput: the sample does not exist, or a drawn value is refused.
     """
     if number < 0:
-        message = f"there is no sample {number}: they count from 0"
+        message = f"there is no sample {number}: samples count from 0"
         raise InvalidInput([Diagnostic("TASK235", message, task.file.place("task"))])
     if not varied:
         message = f"there is no sample {number}: task '{task.name}' has no `vary:`"
@@ -80,16 +81,17 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
     """The task with drawn values.
 
     Args:
-        task: as it is written.
-        varied: what varies, and `drawn`: the value of each.
-        robot_of, scene_of: build what a changed file means.
+        task: the task as written.
+        varied: the varied quantities.
+        drawn: the value of each.
+        robot_of, scene_of: build the robot and the scene of a changed file.
 
     Raises:
-        InvalidInput: a drawn value is out of range, or no scene can be built with it.
+        InvalidInput: a drawn value is out of range, or the scene cannot be built with it.
     """
     values = dict(drawn.values)
-    changes = [(one, values[one.path]) for one in varied if one.path in values]
-    seen = [(one, value) for one, value in changes if not one.only_world]
+    changes = [(quantity, values[quantity.path]) for quantity in varied if quantity.path in values]
+    seen = [(quantity, value) for quantity, value in changes if not quantity.only_world]
     written = Files(task.file, task.robot_file, task.controllers_file)
     try:
         planned = written.changed(seen)
@@ -102,26 +104,28 @@ def sampled(task: Task, varied: Sequence[Varied], drawn: Drawn, *, robot_of: Rob
             controllers=true.controllers,
         )
     except InvalidInput as invalid:
-        told = [replace(one, message=f"{one.message} (sample {drawn.number})") for one in invalid.findings]
-        raise InvalidInput(told) from None
+        findings = [
+            replace(finding, message=f"{finding.message} (sample {drawn.number})") for finding in invalid.findings
+        ]
+        raise InvalidInput(findings) from None
     return replace(
         task, file=planned.task, robot_file=planned.robot, robot=robot, scene=scene, drawn=drawn, truth=truth
     )
 
 
 def _but_for(drawn: Drawn, varied: Sequence[Varied], overrides: Sequence[Override]) -> Drawn:
-    """Without the values that somebody set, alone or with what is around or in them."""
+    """Removes drawn values that an override sets, directly or through a block around or inside them."""
 
-    def is_set(one: Varied) -> bool:
+    def is_set(quantity: Varied) -> bool:
         return any(
-            override.area == one.area and all(a == b for a, b in zip(override.path, one.parts, strict=False))
+            override.area == quantity.area and all(a == b for a, b in zip(override.path, quantity.parts, strict=False))
             for override in overrides
         )
 
-    kept = {one.path for one in varied if one.how or not is_set(one)}
+    kept = {quantity.path for quantity in varied if quantity.how or not is_set(quantity)}
     return replace(drawn, values=tuple((path, value) for path, value in drawn.values if path in kept))
 
 
 def _same(changes: Changes, seen: Changes, area: str) -> bool:
-    """Whether of this file nothing changes that is not seen."""
-    return sum(one.area == area for one, _ in changes) == sum(one.area == area for one, _ in seen)
+    """Whether all changes of this file are visible to the planner."""
+    return sum(quantity.area == area for quantity, _ in changes) == sum(quantity.area == area for quantity, _ in seen)

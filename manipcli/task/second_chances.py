@@ -1,7 +1,7 @@
-"""Every error of a task or robot file at once, after loading it has failed.
+"""Collection of all errors of a task or robot file after loading it failed.
 
-A file that is refused is read once more without its faulty values, so that one mistake hides no other: names are
-checked against what is left, or against placeholders. Nothing here is ever planned or simulated.
+A refused file is read a second time without its invalid values, so that one error does not hide others: names are
+checked against the rest of the file, or against placeholders. The result is never planned or simulated.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def every_finding(
 
     Args:
         path: the task file.
-        first: why loading it stopped.
-        overrides, seed, package_path, allow_outside: as it was loaded.
+        first: the error that stopped loading.
+        overrides, seed, package_path, allow_outside: the options with which it was loaded.
     """
     errors = _Errors()
     model = task_spec()
@@ -93,14 +93,14 @@ def every_robot_finding(
 
 
 class _Errors:
-    """Findings of several stages. `unknown`: places whose value is not known, as of `Source`."""
+    """Findings of several stages. `unknown`: places of unknown values, see `Source`."""
 
     def __init__(self) -> None:
         self.found: list[Diagnostic] = []
         self.unknown: frozenset[Place] = frozenset()
 
     def of(self, stage: Callable[[], T]) -> T | None:
-        """The result of a stage, or None where it refused its input."""
+        """The result of a stage; None if it refused its input."""
         try:
             return stage()
         except InvalidInput as invalid:
@@ -108,7 +108,7 @@ class _Errors:
             return None
 
     def refusal(self, first: InvalidInput) -> InvalidInput:
-        """All findings in the order of files and lines; `first` where reading once more finds none."""
+        """All findings in the order of files and lines; `first` if the second reading finds none."""
         if not self.found:
             return first
         files = list(dict.fromkeys(finding.place.file for finding in self.found if finding.place is not None))
@@ -122,8 +122,8 @@ class _Errors:
 
 @dataclass(frozen=True, slots=True)
 class _Robot:
-    """A robot file and its robot. `file` is None where the file is refused; `model` is None where a name that others
-    use may be missing from it."""
+    """A robot file and its robot. `file` is None if it is refused; `model` is None if names that a task uses may be
+    missing."""
 
     file: Located[RobotSpec] | None
     model: RobotModel | None
@@ -149,20 +149,20 @@ class _Robot:
                 partial.spec, file=path, package_path=package_path, allow_outside=allow_outside, source=partial.source
             )
         )
-        # Notes on values that are not stated may be about values that were left out.
-        errors.found += [one for one in building.found if file is not None or one.severity == "error"]
+        # Notes on missing values may concern values that were removed.
+        errors.found += [finding for finding in building.found if file is not None or finding.severity == "error"]
         return cls(file, built[0] if built is not None and is_whole(partial) else None)
 
 
 def _named(errors: _Errors, task: Located[TaskSpec], path: Path, key: str) -> Path | None:
-    """The file that the task names; None where it is missing, or the name itself was refused."""
+    """The file that the task names; None if it is missing or its name was refused."""
     return errors.of(lambda: named_file(task, path, key)) if task.source.untouched(key) else None
 
 
 def _controllers(
     errors: _Errors, path: Path | None, overrides: Sequence[str]
 ) -> tuple[Located[ControllersSpec] | None, Located[ControllersSpec] | None]:
-    """The controllers file, and what is left of it where it is refused."""
+    """The controllers file (None if refused), and its valid part."""
     if path is None:
         return None, None
     file = errors.of(lambda: load.load_controllers(path, model=controllers_spec(), overrides=overrides))

@@ -1,4 +1,4 @@
-"""Switches of controllers, foreseen by the rules by which the manager carries them out."""
+"""Prediction of controller switches, by the same rules as the controller manager."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from manipcli.spec.task import StepSpec
 
 
 def foreseen(switch: Switch, claims: Claims, robot: RobotModel) -> tuple[tuple[Problem, ...], Claims]:
-    """Why a switch would be refused, and who is active after it; after one that is refused, whoever was.
+    """Problems of a switch, and the claims after it; a refused switch leaves the claims unchanged.
 
     Args:
-        switch: what a step asks for.
-        claims: the controllers, before it.
+        switch: the switch that a step requests.
+        claims: the controllers before it.
         robot: the robot.
     """
     controllers: dict[str, tuple[Claim, ControllerState]] = {
-        one.name: (one, "active" if one.active else "inactive") for one in claims.controllers
+        claim.name: (claim, "active" if claim.active else "inactive") for claim in claims.controllers
     }
     decision = decided(controllers, switch, robot.joint_names, robot.following)
     if decision.ok:
         return (), claims.switched(decision.activated, decision.deactivated)
-    hint = "say `to` for those that shall be active: it deactivates who is in their way" if not switch.to else None
+    hint = "name the controllers to activate under `to`: it deactivates conflicting ones" if not switch.to else None
     return tuple(Problem((), message, hint) for message in decision.messages), claims
 
 
 def active_in(steps: Sequence[StepSpec], claims: Claims, robot: RobotModel) -> Iterator[frozenset[str]]:
-    """Names of the controllers that are active before the first step, and in each step."""
+    """Names of the active controllers before the first step, then during each step."""
     yield _active(claims)
     for step in steps:
         switch = STEPS[step.verb].request(step.body)
@@ -42,4 +42,4 @@ def active_in(steps: Sequence[StepSpec], claims: Claims, robot: RobotModel) -> I
 
 
 def _active(claims: Claims) -> frozenset[str]:
-    return frozenset(one.name for one in claims.controllers if one.active)
+    return frozenset(claim.name for claim in claims.controllers if claim.active)

@@ -1,4 +1,4 @@
-"""A checked task: what the user wrote, and what it means for this robot and scene."""
+"""A checked task: its files, robot and scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manipcli.spec.task import TaskSpec
 
 @dataclass(frozen=True, slots=True)
 class GroundTruth:
-    """What is simulated, where planning knows something else: robot and scene of the engine, controllers and gains."""
+    """Robot, scene and controllers of the simulation, if they differ from those known to the planner."""
 
     robot: RobotModel
     scene: Scene
@@ -27,10 +27,13 @@ class GroundTruth:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task that can be planned: the three files as written, and the robot and scene that they mean.
+    """A task that can be planned: its three files, and the robot and scene built from them.
 
-    `findings` are warnings and notes; errors do not get here. `places`: where steps, expectations and watches were
-    written, of a task that was read from a log.
+    Attributes:
+        findings: warnings and notes; errors are raised.
+        places: places of steps, expectations and watches, for a task read from a log.
+        drawn: the drawn values of a sample.
+        truth: the ground truth of a sample, if it differs.
     """
 
     file: Located[TaskSpec]
@@ -45,17 +48,17 @@ class Task:
 
     @property
     def true(self) -> GroundTruth:
-        """What is simulated."""
+        """The ground truth of the simulation."""
         return self.truth or GroundTruth(self.robot, self.scene, self.controllers_file)
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        """Its findings without notes."""
+        """The findings without notes."""
         return tuple(finding for finding in self.findings if finding.severity == "warning")
 
     @property
     def name(self) -> str:
-        """As in `task:`."""
+        """The name under `task:`."""
         return self.file.spec.task
 
     @property
@@ -69,7 +72,7 @@ class Task:
         return self.controllers_file.spec
 
     def log_place(self, *path: str | int) -> str:
-        """`pour.yaml:21:5`: no folder of this machine gets into a log."""
+        """A place without its folder, for logs: `pour.yaml:21:5`."""
         if path in self.places:
             return self.places[path]
         place = self.file.place(*path)

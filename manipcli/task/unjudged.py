@@ -1,4 +1,4 @@
-"""Conditions that a task leaves without evidence: told before the run."""
+"""Warnings before a run for conditions that cannot be evaluated."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from manipcli.spec.located import Located
 from manipcli.spec.task import TaskSpec
 
 TOPICS: Final[dict[Seen, str]] = {"bodies": "tf", "contacts": "contacts", "references": "controller_state"}
-"""The words of `record: {topics: ...}` without which nothing is known of each."""
+"""Topic of `record:` that each kind of evidence needs."""
 
 
 def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterator[Diagnostic]:
-    """A warning for each expectation and watch that needs a topic which `record:` leaves out, and for each `until` that
-    the engine cannot answer; an error where a move is guarded by it."""
+    """Warnings for expectations and watches that need a topic left out of `record:`, and for each `until` that the
+    engine cannot evaluate; an error if it guards a move."""
     left_out = {seen: topic for seen, topic in TOPICS.items() if topic in task.spec.record.left_out}
     physics = task.spec.simulation.engine not in ENGINES.names or ENGINES[task.spec.simulation.engine].physics == "full"
     if not left_out and physics:
         return
     nothing = np.zeros(())
-    start = WorldState(*([nothing] * 8))  # no condition is asked for a margin here
+    start = WorldState(*([nothing] * 8))  # no margin is computed here
     steps = tuple(step.id for step in task.spec.steps if step.id is not None)
     world = World(robot, scene, start, unrecorded=left_out, steps=steps)
     for key, expectations in (("expect", task.spec.expect), ("watch", task.spec.watch)):
@@ -40,7 +40,7 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
             if topic in left_out.values():
                 yield Diagnostic(
                     "TASK236",
-                    f"'{expected.condition.name}' cannot be judged, and so fails: `record:` leaves '{topic}' out",
+                    f"'{expected.condition.name}' cannot be judged and fails: `record:` leaves '{topic}' out",
                     task.place(key, k),
                     hint=f"add {topic} to record.topics",
                     severity="warning",
@@ -50,6 +50,6 @@ def unjudged(task: Located[TaskSpec], robot: RobotModel, scene: Scene) -> Iterat
         reason = None if step.until is None else absent(step.until, live, CONDITIONS)
         if reason is not None:
             guarded = STEPS[step.verb].guarded(step.body)
-            message = f"`until` is not waited for{', by which this move is guarded' if guarded else ''}: {reason}"
-            severity: Severity = "error" if guarded else "warning"  # it would go all its way, which nobody planned for
+            message = f"`until` {'cannot guard this move' if guarded else 'is not waited for'}: {reason}"
+            severity: Severity = "error" if guarded else "warning"  # it would not stop where the plan expects it to
             yield Diagnostic("TASK237", message, task.place("steps", k, "until"), severity=severity)

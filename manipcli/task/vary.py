@@ -1,10 +1,10 @@
-"""`vary:` bound to the numbers of a task's files, and drawn.
+"""Binding of `vary:` to numbers in the files of a task, and drawing of samples.
 
 A sample is a pure function of seed, sample number and path: the uniform deviate of component k of a path is
 
     u = (first 52 bits of SHA-256("seed/sample/path/k") + 1/2) / 2^52
 
-so that no path changes the draws of another, and no library's version those of any. From it `uniform` is a + (b - a) u,
+so that draws are independent of other paths and of library versions. From it `uniform` is a + (b - a) u,
 `normal` the quantile of F(least) + (F(most) - F(least)) u, where F is its distribution and least and most
 are the field's bounds, `choice` item floor(n u).
 """
@@ -34,11 +34,11 @@ from manipcli.spec.task import TaskSpec
 from manipcli.spec.vary import Amount, DistributionSpec, Value, VarySpec
 
 EVERY: Final = "*"
-"""In a path: each name of a mapping, or each item of a list."""
+"""Wildcard in a path: all names of a mapping, or all items of a list."""
 LARGEST: Final = 1e100
-"""Amounts are below this [SI]: what is drawn stays finite."""
+"""Bound on amounts [SI], so that drawn values stay finite."""
 RAREST: Final = 1e-3
-"""A normal distribution has at least this share where the field may be."""
+"""Minimum share of a normal distribution within the bounds of the field."""
 _TASK_KEYS: Final = ("scene", "frames", "simulation")
 _CONTACT: Final = frozenset({"mass", "friction", "rolling_friction", "spinning_friction", "restitution"})
 
@@ -47,11 +47,14 @@ Path = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """What is drawn for one path: `rows` of amounts [SI], one a component.
+    """A distribution bound to a path.
 
-    They are least and most of `uniform`, mean and deviation of `normal`, the items of `choice` and `grid`; of these the
-    components are drawn `together` where an item was written as a list. What `normal` draws of each component lies
-    `between` two amounts: the bounds that the field states.
+    Attributes:
+        word: `uniform`, `normal`, `choice` or `grid`.
+        rows: amounts [SI], one per component: least and most of `uniform`, mean and standard deviation of `normal`,
+            the items of `choice` and `grid`.
+        together: whether the components of an item are drawn together, because items are lists.
+        between: bounds of `normal` per component, from the bounds of the field.
     """
 
     word: str
@@ -65,12 +68,14 @@ class Varied:
     """A number or vector of a file that is drawn.
 
     Attributes:
-        path: as after `--set`; `key`: as in `vary:`, where `*` may stand for several.
+        key: the key in `vary:`, where `*` may stand for several paths.
+        path: path as for `--set`.
         area, parts: the file, and the path in it.
-        nominal: the value in the file, one number a component; `vector`: whether it is written as a list.
-        whole: it is a whole number.
-        how: `offset`, `scale`, or nothing where the value itself is drawn.
-        law: from what.
+        nominal: the value in the file, one number per component.
+        vector: whether the value is a list.
+        whole: whether it is a whole number.
+        how: `offset`, `scale`, or "" if the value itself is drawn.
+        law: the distribution.
     """
 
     key: str
@@ -85,8 +90,8 @@ class Varied:
 
     @property
     def only_world(self) -> bool:
-        """Whether planner and models of controllers keep the value in the file: it changes how things move, not where
-        they are."""
+        """Whether only the simulation uses the drawn value: it changes dynamics, not geometry, so the planner and the
+        models of controllers keep the value in the file."""
         match self.area, self.parts:
             case ("CTRL", _) | ("TASK", ("simulation", "gravity", *_)) | ("ROBOT", ("friction" | "actuators", *_)):
                 return True
@@ -96,13 +101,13 @@ class Varied:
 
     @property
     def axes(self) -> tuple[int, ...]:
-        """How many items each of its grids has."""
+        """Number of items of each of its grids."""
         return (
             (len(self.law.rows),) * (1 if self.law.together else len(self.nominal)) if self.law.word == "grid" else ()
         )
 
     def ends(self, inside: float = 0.0) -> tuple[Number, ...]:
-        """The ends of `uniform`, by a share `inside` of it; each item of `choice`, `grid`; () of `normal`: no end."""
+        """The ends of `uniform`, moved inward by the share `inside`; the items of `choice`, `grid`; () for `normal`."""
         rows = self.law.rows
         if self.law.word == "normal":
             return ()
@@ -112,16 +117,16 @@ class Varied:
         return tuple(self._written(row) for row in rows)
 
     def value(self, seed: int, sample: int, items: Sequence[int]) -> Number:
-        """What is drawn; `items`: of each of its grids, which one."""
+        """The drawn value; `items`: index of the item of each of its grids."""
         return self._written([self._component(k, seed, sample, items) for k in range(len(self.nominal))])
 
     def _written(self, drawn: Sequence[float]) -> Number:
-        """The value in the file, from what is drawn of each component."""
+        """The value for the file, from the drawn components."""
         if self.how == "offset":
             drawn = [a + b for a, b in zip(self.nominal, drawn, strict=True)]
         elif self.how == "scale":
             drawn = [a * b for a, b in zip(self.nominal, drawn, strict=True)]
-        values = [round(one) if self.whole else one for one in drawn]
+        values = [round(number) if self.whole else number for number in drawn]
         return tuple(values) if self.vector else values[0]
 
     def _component(self, k: int, seed: int, sample: int, items: Sequence[int]) -> float:
@@ -143,29 +148,29 @@ class Varied:
 
 
 def deviate(seed: int, sample: int, path: str, component: int) -> float:
-    """Uniform in (0, 1)."""
+    """The deterministic uniform deviate in (0, 1) of a component; see the module."""
     digest = sha256(f"{seed}/{sample}/{path}/{component}".encode()).digest()
     return ((int.from_bytes(digest[:8], "big") >> 12) + 0.5) / 2.0**52
 
 
 def draw(varied: Sequence[Varied], seed: int, sample: int) -> Drawn:
-    """Sample `sample` of what is varied, in its order."""
+    """Draws sample `sample` of all quantities, in their order."""
     rest = sample
     items: list[int] = []
-    for size in reversed([size for one in varied for size in one.axes]):
+    for size in reversed([size for quantity in varied for size in quantity.axes]):
         rest, item = divmod(rest, size)
         items.insert(0, item)
     values: list[tuple[str, Number]] = []
-    for one in varied:
-        own = len(one.axes)
-        values.append((one.path, one.value(seed, sample, items[:own])))
+    for quantity in varied:
+        own = len(quantity.axes)
+        values.append((quantity.path, quantity.value(seed, sample, items[:own])))
         items = items[own:]
     return Drawn(sample, tuple(values))
 
 
 @dataclass(frozen=True, slots=True)
 class _Problem(Exception):
-    """Why a path or an amount cannot be meant; `loc`: where below the path's own block, () for the path itself."""
+    """An invalid path or amount; `loc`: location in the path's block, () for the path itself."""
 
     message: str
     hint: str | None = None
@@ -174,7 +179,7 @@ class _Problem(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Leaf:
-    """What stands at the end of a path."""
+    """The value at the end of a path, with its unit and bounds."""
 
     parts: Path
     value: object
@@ -185,14 +190,14 @@ class _Leaf:
 def bind(
     task: Located[TaskSpec], robot: Located[RobotSpec], controllers: Located[ControllersSpec]
 ) -> tuple[tuple[Varied, ...], tuple[Diagnostic, ...]]:
-    """Everything that the task varies, in the order of its file; and what cannot be meant."""
+    """All varied quantities of a task, in the order of its file, and the errors of invalid entries."""
     found: list[Varied] = []
     findings: list[Diagnostic] = []
     for key, spec in task.spec.vary.items():
         try:
             new = _bound(key, spec, task.spec, robot.spec, controllers.spec)
-            for one in new:
-                _refuse_overlap(one, found)
+            for quantity in new:
+                _refuse_overlap(quantity, found)
         except _Problem as problem:
             loc = ("vary", key, *problem.loc)
             findings.append(task.source.finding(234, loc, problem.message, hint=problem.hint, key=not problem.loc))
@@ -222,20 +227,20 @@ def _bound(
 def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Varied:
     vector = isinstance(leaf.value, tuple)
     values = leaf.value if isinstance(leaf.value, tuple) else (leaf.value,)
-    nominal = tuple(one for one in values if isinstance(one, int | float) and not isinstance(one, bool))
+    nominal = tuple(number for number in values if isinstance(number, int | float) and not isinstance(number, bool))
     if leaf.value is None:
-        raise _Problem(f"there is no value at '{path}' that could vary", _to_write(leaf.parts))
+        raise _Problem(f"there is no value at '{path}'", _to_write(leaf.parts))
     if len(nominal) != len(values) or not nominal:
-        raise _Problem(f"'{path}' is no number, and no list of numbers")
-    whole = all(isinstance(one, int) for one in nominal)
+        raise _Problem(f"'{path}' is not a number or a list of numbers")
+    whole = all(isinstance(number, int) for number in nominal)
     how = spec.word if spec.word in ("offset", "scale") else ""
     dimensions = (NUMBER,) if how == "scale" or leaf.unit is None else leaf.unit.dimensions
     law = _law(spec.distribution, len(nominal), vector, dimensions, (how,) if how else ())
     if whole and how != "scale" and law.word != "normal":
-        broken = next((one for row in law.rows for one in row if not float(one).is_integer()), None)
+        broken = next((amount for row in law.rows for amount in row if not float(amount).is_integer()), None)
         if broken is not None:
             loc = (*((how,) if how else ()), law.word)
-            raise _Problem(f"'{path}' is a whole number, which {broken:g} is not", loc=loc)
+            raise _Problem(f"{broken:g} is not a whole number, as '{path}' must be", loc=loc)
     _refuse_too_large(law, nominal, how)
     if law.word == "normal":
         law = replace(law, between=tuple(_between(leaf.bounds, value, how) for value in nominal))
@@ -244,16 +249,18 @@ def _varied(key: str, path: str, area: Area, leaf: _Leaf, spec: VarySpec) -> Var
 
 
 def _refuse_too_large(law: Law, nominal: Sequence[float], how: str) -> None:
-    """Amounts so large that what is drawn would be infinite."""
+    """Refuses amounts whose drawn values could be infinite."""
     for row in law.rows:
         for amount, value in zip(row, nominal, strict=True):
             reach = amount * value if how == "scale" else amount + (value if how == "offset" else 0.0)
             if not max(abs(amount), abs(reach)) < LARGEST:
-                raise _Problem(f"{amount:g} is too large an amount", loc=(*((how,) if how else ()), law.word))
+                raise _Problem(
+                    f"{amount:g} exceeds the largest magnitude, {LARGEST:g}", loc=(*((how,) if how else ()), law.word)
+                )
 
 
 def _between(bounds: tuple[float, float], nominal: float, how: str) -> tuple[float, float]:
-    """Between what an amount must lie so that the value in the file keeps its bounds."""
+    """Bounds of an amount for which the value in the file keeps its bounds."""
     if how == "offset":
         return bounds[0] - nominal, bounds[1] - nominal
     if how == "scale":
@@ -263,11 +270,11 @@ def _between(bounds: tuple[float, float], nominal: float, how: str) -> tuple[flo
 
 
 def _refuse_too_rare(law: Law, path: str, how: str) -> None:
-    """A normal distribution that has next to nothing where the field may be."""
+    """Refuses a normal distribution with almost no share within the bounds of the field."""
     for mean, sd, (least, most) in zip(*law.rows, law.between, strict=True):
         normal = NormalDist(mean, sd)
         if normal.cdf(most) - normal.cdf(least) < RAREST:
-            message = f"less than one in a thousand of these is what '{path}' may be"
+            message = f"less than {RAREST:.1%} of this distribution is in the range of '{path}'"
             raise _Problem(message, loc=(*((how,) if how else ()), law.word))
 
 
@@ -281,8 +288,11 @@ def _law(
     else:
         written = tuple((value, (*loc, word, k)) for k, value in enumerate(getattr(spec, word)))
     rows = tuple(_row(value, count, vector, dimensions, at) for value, at in written)
-    if word == "uniform" and any(a > b for a, b in zip(*rows, strict=True)):
-        raise _Problem("the least value is above the most", "write [least, most]", (*loc, word))
+    for least, most in zip(*rows, strict=True) if word == "uniform" else ():
+        if least > most:
+            raise _Problem(
+                f"the least value, {least:g}, is above the most, {most:g}", "write [least, most]", (*loc, word)
+            )
     if word == "normal" and not all(sd > 0.0 for sd in rows[1]):
         raise _Problem("the standard deviation must be above 0", loc=(*loc, word))
     lists = word in ("choice", "grid") and any(isinstance(value, tuple) for value, _ in written)
@@ -290,14 +300,14 @@ def _law(
 
 
 def _row(value: Value, count: int, vector: bool, dimensions: tuple[Dimension, ...], loc: Loc) -> tuple[float, ...]:
-    """One amount a component, in SI."""
+    """One amount per component, in SI."""
     if not isinstance(value, tuple):
         return (_si(value, dimensions, loc),) * count
     if not vector:
-        raise _Problem("a list of amounts for a single number", "write a number, or a text with a unit", loc)
+        raise _Problem("expected a single amount, got a list", "write a number, or a text with a unit", loc)
     if len(value) != count:
         raise _Problem(f"expected {count} amounts, got {len(value)}", loc=loc)
-    return tuple(_si(one, dimensions, (*loc, k)) for k, one in enumerate(value))
+    return tuple(_si(amount, dimensions, (*loc, k)) for k, amount in enumerate(value))
 
 
 def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: Loc) -> float:
@@ -309,18 +319,18 @@ def _si(amount: Amount, dimensions: tuple[Dimension, ...], loc: Loc) -> float:
         raise _Problem(error.cause, error.hint, loc) from None
 
 
-def _refuse_overlap(one: Varied, before: Sequence[Varied]) -> None:
+def _refuse_overlap(quantity: Varied, before: Sequence[Varied]) -> None:
     for other in before:
-        shorter = min(len(one.parts), len(other.parts))
-        if one.area == other.area and one.parts[:shorter] == other.parts[:shorter]:
-            raise _Problem(f"'{one.path}' is varied by '{other.key}' already")
+        shorter = min(len(quantity.parts), len(other.parts))
+        if quantity.area == other.area and quantity.parts[:shorter] == other.parts[:shorter]:
+            raise _Problem(f"'{quantity.path}' is already varied by '{other.key}'")
 
 
 def _leaves(root: BaseModel, parts: Path) -> list[_Leaf]:
-    """What stands at the end of a path, or of each path that its `*` stand for.
+    """The values at the end of a path; with `*`, of all matching paths.
 
     Raises:
-        _Problem: nothing does.
+        _Problem: there is no value.
     """
     return list(_below(root, type(root), (), (), parts))
 
@@ -334,29 +344,29 @@ def _below(value: object, annotation: object, metadata: Sequence[object], done: 
     if part == EVERY and not isinstance(value, BaseModel):
         there = [leaf for name, child in known.items() for leaf in _tried(*child, (*done, name), further)]
         if not there:
-            raise _Problem(f"nothing stands at '{'.'.join((*done, *rest))}'", _to_write((*done, *rest)))
+            raise _Problem(f"there is no value at '{'.'.join((*done, *rest))}'", _to_write((*done, *rest)))
         yield from there
         return
     if part not in known:
         where = f"'{'.'.join(done)}'" if done else "the file"
         if not known:
-            raise _Problem(f"{where} has nothing in it", _to_write((*done, *rest)) if value in (None, {}) else None)
-        raise _Problem(f"there is no '{escape(part)}' in {where}", did_you_mean(part, known, kind="there are"))
+            raise _Problem(f"{where} is empty", _to_write((*done, *rest)) if value in (None, {}) else None)
+        raise _Problem(f"there is no '{escape(part)}' in {where}", did_you_mean(part, known, kind="known"))
     yield from _below(*known[part], (*done, part), further)
 
 
 def _to_write(parts: Path) -> str:
-    """What the file lacks: `write it into the robot file first, as actuators: {NAME: {latency: ...}}`."""
+    """Hint for a missing value: `add it to the robot file first, as actuators: {NAME: {latency: ...}}`."""
     file = "task" if parts[0] in _TASK_KEYS else "controllers" if parts[0] == "controllers" else "robot"
     *above, last = ("NAME" if part == EVERY else escape(part) for part in parts)
     written = f"{last}: ..."
     for part in reversed(above):
         written = f"{part}: {{{written}}}"
-    return f"write it into the {file} file first, as `{written}`"
+    return f"add it to the {file} file first, as `{written}`"
 
 
 def _tried(value: object, annotation: object, metadata: Sequence[object], done: Path, rest: Path) -> list[_Leaf]:
-    """What one of many names leads to: not each of them needs to have all of the path."""
+    """The values below one match of `*`; empty if the rest of the path does not exist there."""
     try:
         return [leaf for leaf in _below(value, annotation, metadata, done, rest) if leaf.value is not None]
     except _Problem:

@@ -1,4 +1,4 @@
-"""Files to what can be looked at: a description, a robot file or a task."""
+"""Loading of a description, a robot file or a task for viewing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manipcli.task.robot_file import read_robot
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """A robot, the scene around it (of a task), where its joints (n,) start, and warnings and notes."""
+    """A robot, its scene (for a task), its start configuration `q` (n,) [rad or m], and warnings and notes."""
 
     robot: RobotModel
     scene: Scene | None
@@ -37,33 +37,33 @@ def load_sight(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> Sight:
-    """Read what is to be shown.
+    """Loads a file for viewing.
 
     Args:
         path: URDF, xacro, robot file or task.
-        arguments: of a xacro file, `NAME:=VALUE`.
+        arguments: arguments of a xacro file, `NAME:=VALUE`.
         package_path, allow_outside: see `load_task`.
 
     Raises:
-        InvalidInput: every error of the file.
+        InvalidInput: all errors of the file.
     """
     if path.suffix.lower() in DESCRIPTIONS:
-        load.read_bytes(path)  # tells a file that is not there as for every other kind
+        load.read_bytes(path)  # same error for a missing file as for every other kind
         spec = RobotSpec(robot=path.name.partition(".")[0], description=path.name, args=dict(arguments))
         robot, notes = build_robot(spec, file=path, package_path=package_path, allow_outside=allow_outside)
-        # Acceleration limits are a matter of robot files.
+        # Only robot files set acceleration limits.
         return Sight(robot, None, configuration(robot), tuple(note for note in notes if note.code != "ROBOT330"))
     if arguments:
         names = ", ".join(arguments)
         raise InvalidInput(
-            [Diagnostic("VIEW002", f"only a description has arguments; given: {names}", Place(str(path), 0, 0))]
+            [Diagnostic("VIEW002", f"arguments need a URDF or xacro file; given: {names}", Place(str(path), 0, 0))]
         )
     kind = load.kind_of(path)
     if kind == "task":
         task = load_task(path, package_path=package_path, allow_outside=allow_outside)
         return Sight(task.robot, task.scene, start_position(task), task.findings)
     if kind == "controllers":
-        message = "a controllers file has nothing to look at; give a robot, a description or a task"
+        message = "a controllers file cannot be viewed; give a robot file, a description or a task"
         raise InvalidInput([Diagnostic("VIEW003", message, Place(str(path), 0, 0))])
     _, robot, findings = read_robot(path, package_path=package_path, allow_outside=allow_outside)
     return Sight(robot, None, configuration(robot), findings)

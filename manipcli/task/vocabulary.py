@@ -1,4 +1,4 @@
-"""The words of task and controllers files: what the members of the seams add to the specs."""
+"""Specs and words of task and controllers files, from the registered members."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from manipcli.spec.unions import controllers_model, task_model
 
 
 def task_spec() -> type[TaskSpec]:
-    """`TaskSpec` with all verbs and conditions; the same class each time."""
+    """`TaskSpec` with all verbs and conditions; always the same class."""
     return task_model(STEPS, CONDITIONS)
 
 
 def controllers_spec() -> type[ControllersSpec]:
-    """`ControllersSpec` with all types of controllers; the same class each time."""
+    """`ControllersSpec` with all types of controllers; always the same class."""
     return controllers_model(CONTROLLERS)
 
 
 def meanings(kind: str) -> Mapping[str, str]:
-    """What each word of a kind of `flow.check.words` means, in one line; empty where the words alone are told."""
-    conditions = {one.name: about(one.spec) for one in CONDITIONS} | COMBINATIONS
-    told = {
-        "steps": {one.name: about(one.spec) for one in STEPS},
+    """One-line description of each word of a kind (`steps`, `conditions`, `expectations`); empty for other kinds."""
+    conditions = {member.name: about(member.spec) for member in CONDITIONS} | COMBINATIONS
+    descriptions = {
+        "steps": {member.name: about(member.spec) for member in STEPS},
         "conditions": conditions,
         "expectations": conditions | QUANTIFIERS,
     }
-    return told.get(kind, {})
+    return descriptions.get(kind, {})

@@ -215,7 +215,7 @@ def test_a_pipe_is_no_task_and_holds_nobody_up(tmp_path: Path) -> None:
     hung = threading.Timer(5.0, lambda: os.close(os.open(tmp_path / "x.yaml", os.O_WRONLY | os.O_NONBLOCK)))
     hung.start()  # ends a wait for who writes, so that this fails and does not hang
     assert task_files([tmp_path]) == ()
-    with pytest.raises(InvalidInput, match="no regular file"):
+    with pytest.raises(InvalidInput, match="not a regular file"):
         task_files([tmp_path / "x.yaml"])
     assert hung.is_alive()
     hung.cancel()

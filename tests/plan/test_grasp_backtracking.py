@@ -75,7 +75,7 @@ def test_only_what_depends_on_the_grasp_is_planned_again_and_not_for_ever(tmp_pa
     )
     told: list[str] = []
     with pytest.raises(NotPlannable) as refused:
-        plan_task(task, doing=told.append)
+        plan_task(task, on_progress=told.append)
     assert told[0].startswith("planning step 1 of 4") and not any(
         one.startswith("planning step 1 ") for one in told[1:]
     )
@@ -95,7 +95,7 @@ def test_no_other_grasp_is_tried_for_a_value_that_is_wrong_with_each(tmp_path: P
     place = "  - place: {object: block, at: [1.5, 0.0], onto: table}\n"
     task = task_of(tmp_path, PICK.replace("block", "block, approach: {from: top}") + LIFT + place)
     with pytest.raises(NotPlannable) as refused:
-        plan_task(task, doing=told.append)
+        plan_task(task, on_progress=told.append)
     assert len(told) == 3
     assert refused.value.cause == "[1.5, 0] m lies beside 'table', whose middle is at [0.55, 0] m"
     assert refused.value.hint == "`at` is in the world; 'table' offers 0.6 m x 0.8 m about its middle"
@@ -112,7 +112,7 @@ def test_a_refusal_with_an_empty_hand_or_of_the_only_grasp_is_told_as_it_is(tmp_
         PICK + "  - release: {}\n  - move: {pose: {xyz: [2, 0, 1]}}\n",
     ):
         with pytest.raises(NotPlannable) as refused:
-            plan_task(task_of(tmp_path, steps), doing=told.append)
+            plan_task(task_of(tmp_path, steps), on_progress=told.append)
         assert "grasps" not in refused.value.cause
     assert not any("another grasp" in one for one in told)
 

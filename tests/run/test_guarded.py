@@ -39,12 +39,14 @@ def test_a_guarded_move_needs_a_condition_and_leave_to_plan_again(tmp_path: Path
     guarded = "steps:\n  - move: {to: home, guarded: true}\n"
     assert told(task_file(tmp_path, f"{ARM}{guarded}{until}")) == []
     (missing,) = told(task_file(tmp_path, f"{ARM}{guarded}"))
-    assert missing == "TASK242 5 steps[0].move.guarded: nothing says where it stops: the step has no `until`"
+    assert missing == "TASK242 5 steps[0].move.guarded: a guarded move needs an `until`; the step has none"
     (fixed,) = told(task_file(tmp_path, f"{ARM}replan: false\n{guarded}{until}"))
-    assert fixed.startswith("TASK242 6 steps[0].move.guarded: where it stops is not known beforehand")
+    assert fixed.startswith(
+        "TASK242 6 steps[0].move.guarded: a guarded move needs re-planning, since its end is not known in advance"
+    )
     touch = guarded + "    until: {contact_force: {of: robot, above: 5 N}}\n"
     (deaf,) = told(task_file(tmp_path, f"{ARM}simulation: {{engine: kinematic}}\n{touch}"))
-    assert deaf.startswith("TASK237 7 `until` is not waited for, by which this move is guarded: ")
+    assert deaf.startswith("TASK237 7 `until` cannot guard this move: ")
     assert told(task_file(tmp_path, f"{ARM}replan: false\nsteps:\n  - move: {{to: home}}\n{until}")) == []
 
 

@@ -243,7 +243,7 @@ def test_the_same_attempts_make_the_same_bytes(run: Run, tmp_path: Path) -> None
     ("text", "place", "words"),
     [
         ("    on_fail: {retry: 1, with: {nea: 1}}\n", "9:32", "unknown parameter 'nea'"),
-        ("    on_fail: {retry: 1, with: {near: 5 s}}\n", "8:24", "when it is tried again"),
+        ("    on_fail: {retry: 1, with: {near: 5 s}}\n", "8:24", "(in a retry)"),
         ("    on_fail: {retry: 0}\n", "9:22", "must be at least 1, not 0"),
         ("    on_fail: retry\n", "9:14", "'stop'"),
         (
@@ -252,7 +252,7 @@ def test_the_same_attempts_make_the_same_bytes(run: Run, tmp_path: Path) -> None
             "'dwon' is not a pose",
         ),
         ("watch:\n  - upright: {object: cup}\n", "10:5", "expected one of never, always"),
-        ("watch:\n  - never: {duration: {below: 1 s}}\n    at: end\n", "11:9", "expected nothing"),
+        ("watch:\n  - never: {duration: {below: 1 s}}\n    at: end\n", "11:9", "expected no value"),
         ("watch:\n  - never: {duration: {below: 1 s}}\n    during: wait_7\n", "11:13", "no step 'wait_7'"),
         ("replan: maybe\n", "9:9", "expected true or false, or a mapping"),
     ],

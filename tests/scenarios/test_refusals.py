@@ -116,7 +116,7 @@ def test_an_invalid_file_is_told_with_its_place(call: Call, tmp_path: Path, case
 
 def test_a_file_that_is_not_there_is_no_traceback(call: Call, tmp_path: Path) -> None:
     written(tmp_path, "", "pour.yaml")
-    for path, told in (("poor.yaml", "did you mean 'pour.yaml'"), (".", "folder"), ("/dev/null", "no regular file")):
+    for path, told in (("poor.yaml", "did you mean 'pour.yaml'"), (".", "folder"), ("/dev/null", "not a regular file")):
         assert told in refused(call("run", path), 4)
 
 

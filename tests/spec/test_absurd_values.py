@@ -53,7 +53,7 @@ def refused(written: str, instead: str) -> Diagnostic:
         (
             "steps:",
             "watch: [{never: {collision: [robot, block]}, within: 3 s}]\nsteps:",
-            "watch[0].within: expected nothing, not '3 s'",
+            "watch[0].within: expected no value, not '3 s'",
         ),
         (
             "steps:",

@@ -23,11 +23,11 @@ def refused(path: Path) -> tuple[Diagnostic, ...]:
 @pytest.mark.parametrize(
     ("robot", "controllers", "told"),
     [
-        (CONTROLLERS, CONTROLLERS, "this is a controllers file; a robot file was expected"),
-        (TASK, CONTROLLERS, "this is a task file; a robot file was expected"),
-        (URDF, CONTROLLERS, "this is a robot description; a robot file was expected"),
-        (ROBOT, ROBOT, "this is a robot file; a controllers file was expected"),
-        (ROBOT, TASK, "this is a task file; a controllers file was expected"),
+        (CONTROLLERS, CONTROLLERS, "expected a robot file, not a controllers file"),
+        (TASK, CONTROLLERS, "expected a robot file, not a task file"),
+        (URDF, CONTROLLERS, "expected a robot file, not a robot description"),
+        (ROBOT, ROBOT, "expected a controllers file, not a robot file"),
+        (ROBOT, TASK, "expected a controllers file, not a task file"),
     ],
 )
 def test_a_file_named_in_the_place_of_another(tmp_path: Path, robot: Path, controllers: Path, told: str) -> None:
@@ -44,7 +44,7 @@ def test_a_file_named_in_the_place_of_another(tmp_path: Path, robot: Path, contr
 )
 def test_a_file_run_as_a_task(path: Path, kind: str) -> None:
     (finding,) = refused(path)
-    assert finding.message == f"this is a {kind}; a task file was expected"
+    assert finding.message == f"expected a task file, not a {kind}"
 
 
 def test_a_task_that_lacks_its_name_and_steps_is_told_what_it_lacks(tmp_path: Path) -> None:

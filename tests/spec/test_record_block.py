@@ -27,10 +27,10 @@ def test_rates_are_ticks_between_messages_and_topics_leave_the_others_out() -> N
 @pytest.mark.parametrize(
     ("block", "expected", "hint"),
     [
-        ("{rates: {tf: 300 Hz}}", "300 Hz is no whole part of the control rate (1000 Hz)", "250 Hz"),
-        ("{rates: {tf: 2 kHz}}", "2000 Hz is no whole part", "1000 Hz', the control rate"),
-        ("{rates: {tf: 10 Hz}}", "'tf' at 10 Hz is too rare to judge the run by", "20 Hz at least"),
-        ("{rates: {tf: 40 Hz, joint_states: 125 Hz}}", "meet only every 0.2 s", "one divides the other"),
+        ("{rates: {tf: 300 Hz}}", "300 Hz does not divide the control rate, 1000 Hz", "250 Hz"),
+        ("{rates: {tf: 2 kHz}}", "2000 Hz does not divide the control rate", "1000 Hz', the control rate"),
+        ("{rates: {tf: 10 Hz}}", "'tf' is recorded at 10 Hz; judging needs at least 20 Hz", "20 Hz or more"),
+        ("{rates: {tf: 40 Hz, joint_states: 125 Hz}}", "coincide every 0.2 s", "divide each other"),
         ("{rates: {error: 10 Hz}, topics: [tf]}", "'error' has a rate, but is not among `topics`", ""),
         ("{rates: {tff: 10 Hz}}", "tff", "tf"),
         ("{topics: [contact]}", "contact", "contacts"),

@@ -77,10 +77,8 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
     assert (arm.constraints.joints["a"].goal, arm.constraints.joints["a"].trajectory) == (None, 0.1)
     assert list(located.spec.controllers) == ["joint_state_broadcaster", "arm"]
     assert lines(located.findings) == [
-        "c.yaml:3:5: note[CTRL214]: controller_manager: the control rate is the task's, not this 'update_rate': "
-        "left out",
-        "c.yaml:10:62: warning[CTRL214]: arm.gains.a: ROS knows 'normalize_error', manipcli does not serve it: "
-        "left out",
+        "c.yaml:3:5: note[CTRL214]: controller_manager: 'update_rate' has no effect: the task sets the control rate",
+        "c.yaml:10:62: warning[CTRL214]: arm.gains.a: ROS parameter 'normalize_error' is not supported: left out",
     ]
 
 
@@ -115,12 +113,12 @@ def test_the_form_of_ros_2_loads_and_names_what_is_not_served() -> None:
         ),
         (
             PAPER.replace("effort_controllers", "efort_controllers"),
-            "c.yaml:2:9: error[CTRL203]: controller 'arm_controller': the type "
-            "'efort_controllers/JointTrajectoryController' is not known",
+            "c.yaml:2:9: error[CTRL203]: controller 'arm_controller': unknown type "
+            "'efort_controllers/JointTrajectoryController'",
         ),
         (
             ROS2 + "amr: {ros__parameters: {}}\n",
-            "c.yaml:12:1: error[CTRL203]: the controller_manager names no controller 'amr'",
+            "c.yaml:12:1: error[CTRL203]: the controller_manager does not declare controller 'amr'",
         ),
         ("", "c.yaml:1:1: error[CTRL200]: expected a mapping"),
         ("[1]", "c.yaml:1:1: error[CTRL200]: expected a mapping"),
@@ -182,7 +180,7 @@ def test_a_robot_file_loads_and_comes_back_equal() -> None:
         (
             "arm: home",
             "arm: 3",
-            "r.yaml:7:15: error[ROBOT205]: poses.same.arm: expected a list, a mapping, or a text, not 3",
+            "r.yaml:7:15: error[ROBOT205]: poses.same.arm: expected a list, a mapping, or a string, not 3",
         ),
         ("lower: -1", "lower: 2", "r.yaml:8:21: error[ROBOT208]: limits.j.lower: lower (2) is above upper (1)"),
         ("velocity", "velocty", "r.yaml:8:35: error[ROBOT201]: limits.j: unknown key 'velocty'"),
@@ -195,7 +193,7 @@ def test_a_robot_file_loads_and_comes_back_equal() -> None:
         (
             "robot: arm\n",
             "robot: arm\nmount: {rpy: [0, 0, 0], quat_xyzw: [0, 0, 0, 1]}\n",
-            "r.yaml:2:25: error[ROBOT208]: mount: the rotation is said twice",
+            "r.yaml:2:25: error[ROBOT208]: mount: the rotation is given twice",
         ),
     ],
 )

@@ -248,7 +248,7 @@ def test_an_integral_that_ros_1_would_not_let_act_is_told() -> None:
     _, findings = loaded(ROS_1.replace(", i_clamp: 1", ""))
     assert told(findings) == [
         "c.yaml:8:19: warning[CTRL216]: arm.gains.a: in ROS 1 an 'i' without 'i_clamp' has no effect; "
-        "here it is not clamped"
+        "here it acts unclamped"
     ]
 
 
@@ -256,9 +256,9 @@ def test_a_tolerance_that_no_joint_can_miss_is_not_enforced_and_told() -> None:
     controllers, findings = loaded(ROS_1.replace("{trajectory: 0.1, goal: 0}", "{trajectory: 15, goal: 3.1}"))
     assert controllers["arm"]["constraints"]["joints"] == {"a": {"goal": 3.1}}
     assert told(findings) == [
-        "c.yaml:9:39: warning[CTRL214]: arm.constraints.a: 'trajectory: 15', in rad or m, is never missed: not enforced"
+        "c.yaml:9:39: warning[CTRL214]: arm.constraints.a: 'trajectory: 15' (rad or m) is above 3.1416: not enforced"
     ]
-    assert findings[0].hint == "in degrees? ROS takes radians"
+    assert findings[0].hint == "in degrees? write radians"
 
 
 OWN = "{ros__parameters: {joints: [a], command_interfaces: [effort]}}"
@@ -386,7 +386,7 @@ def test_a_parameter_that_ros_knows_of_other_controllers_is_ignored_as_ros_does(
     assert controllers == plain
     (line,) = [str(one) for one in findings if one not in before]
     key = name.partition(":")[0]
-    assert f"warning[CTRL214]: x: ROS knows '{key}' of other controllers and ignores it here: left out" in line
+    assert f"warning[CTRL214]: x: '{key}' is a parameter of other ROS controllers: left out" in line
 
 
 def test_our_own_words_are_not_ignored_where_they_do_not_belong() -> None:
@@ -450,10 +450,10 @@ def test_values_that_say_no_more_than_nothing_are_not_told(given: str) -> None:
 def test_a_value_that_ros_knows_and_manipcli_does_not_is_a_warning() -> None:
     _, findings = loaded(f"x: {{{JTC}, joints: [a], gains: {{a: {{p: 1, antiwindup_strategy: legacy}}}}}}")
     (line,) = told(findings)
-    assert "x.gains.a: ROS knows 'antiwindup_strategy: legacy', manipcli does not serve it" in line
+    assert "x.gains.a: ROS parameter 'antiwindup_strategy: legacy' is not supported" in line
     _, findings = loaded(f"x: {{{JTC}, joints: [a], positions_upsampling: {{enable: true, policy_frequency: 30.0}}}}")
     (line,) = told(findings)
-    assert "x.positions_upsampling: ROS knows 'policy_frequency', manipcli does not serve it" in line
+    assert "x.positions_upsampling: ROS parameter 'policy_frequency' is not supported" in line
 
 
 def test_types_that_manipcli_does_not_serve_are_left_out_and_unknown_ones_are_errors() -> None:
@@ -461,7 +461,7 @@ def test_types_that_manipcli_does_not_serve_are_left_out_and_unknown_ones_are_er
         controllers, findings = loaded(f"base: {{type: {word}, wheels: 4}}\nx: {{{JTC}, joints: [a]}}")
         assert list(controllers) == ["x"]
         (line,) = told(findings)
-        assert f"warning[CTRL214]: controller 'base': ROS knows the type '{word}'" in line
+        assert f"warning[CTRL214]: controller 'base': ROS type '{word}'" in line
     (line,) = refused("x: {type: joint_trajectry_controller/JointTrajectoryController, joints: [a]}")
     assert "did you mean 'joint_trajectory_controller/JointTrajectoryController'?" in line
 
@@ -483,7 +483,7 @@ def test_the_type_of_a_vendor_is_left_out_with_a_warning_and_its_parameters_are_
     assert controllers == {"x": ARM}
     (line,) = told(findings)
     assert (
-        f"c.yaml:1:51: warning[CTRL214]: controller 'io': '{word}' is of the package '{word.partition('/')[0]}'" in line
+        f"c.yaml:1:51: warning[CTRL214]: controller 'io': type '{word}' of package '{word.partition('/')[0]}'" in line
     )
     assert (findings[0].hint or "").startswith("did you mean 'joint_traj") == word.endswith(
         "r/JointTrajectoryController"
@@ -507,7 +507,7 @@ def test_the_type_of_a_vendor_is_left_out_with_a_warning_and_its_parameters_are_
 )
 def test_a_slip_in_a_type_of_ros_is_an_error_with_the_right_name(word: str, near: str) -> None:
     (line,) = refused(f"x: {{type: {word}, joints: [a]}}")
-    assert line.endswith(f"error[CTRL203]: controller 'x': the type '{word}' is not known | did you mean '{near}'?")
+    assert line.endswith(f"error[CTRL203]: controller 'x': unknown type '{word}' | did you mean '{near}'?")
 
 
 def test_what_else_stands_in_such_files_is_left_out() -> None:
@@ -515,8 +515,8 @@ def test_what_else_stands_in_such_files_is_left_out() -> None:
     controllers, findings = loaded(text)
     assert list(controllers) == ["x"]
     assert told(findings) == [
-        "c.yaml:1:1: warning[CTRL214]: 'joint_limits' is no controller: left out",
-        "c.yaml:2:1: warning[CTRL214]: 'controller_list' is no controller: left out",
+        "c.yaml:1:1: warning[CTRL214]: 'joint_limits' is not a controller: left out",
+        "c.yaml:2:1: warning[CTRL214]: 'controller_list' is not a controller: left out",
     ]
 
 
@@ -532,7 +532,7 @@ controller_manager:
 """
     _, findings = loaded(text)
     assert [(f.severity, f.place.line if f.place else 0, f.hint) for f in findings] == [
-        ("note", 3, "say `simulation: {control_period: 0.002 s}` in the task"),
+        ("note", 3, "write `simulation: {control_period: 0.002 s}` in the task"),
         ("note", 4, None),
         ("warning", 6, None),
     ]
@@ -547,8 +547,8 @@ def test_what_does_nothing_on_the_positions_of_a_hand_is_told() -> None:
     controllers, findings = loaded(f"x: {{{hand}, max_effort: 50.0, gains: {{f: {{p: 5}}}}}}")
     assert controllers == {"x": {"type": "gripper", "joints": ("f",), "command_interface": "position"}}
     assert [one.partition("warning[CTRL214]: ")[2] for one in told(findings)] == [
-        "x: 'max_effort' does nothing on the position interface: left out",
-        "x: 'gains' does nothing on the position interface: left out",
+        "x: 'max_effort' has no effect on the position interface: left out",
+        "x: 'gains' has no effect on the position interface: left out",
     ]
     controllers, findings = loaded(f"x: {{{hand}, max_effort: 2, command_interface: effort, gains: {{f: {{p: 5}}}}}}")
     assert (controllers["x"]["max_effort"], controllers["x"]["gains"], findings) == (2.0, {"f": {"p": 5.0}}, ())
@@ -568,16 +568,14 @@ def test_a_forward_controller_of_another_hardware_s_interface_is_left_out(word: 
     assert list(controllers) == ["x"]
     (line,) = told(findings)
     assert line.partition("warning[CTRL214]: ")[2] == (
-        f"controller 'y': 'interface_name: {word}' is no interface that joints have here: left out"
+        f"controller 'y': joints have no interface '{word}' (interface_name): left out"
     )
 
 
 def test_a_slip_in_the_interface_of_a_forward_controller_is_an_error_under_its_own_key() -> None:
     forward = "type: forward_command_controller/ForwardCommandController, joints: [a], interface_name: Velocty"
     (line,) = refused(f"x: {{{forward}}}")
-    assert line.endswith(
-        "error[CTRL203]: controller 'x': interface_name: 'Velocty' is not known | did you mean 'velocity'?"
-    )
+    assert line.endswith("error[CTRL203]: controller 'x': unknown interface_name 'Velocty' | did you mean 'velocity'?")
 
 
 def test_what_a_launch_file_would_fill_in_is_one_error_beside_all_else_that_is_told() -> None:
@@ -590,8 +588,8 @@ io: {{type: ur_controllers/GPIOController, tf_prefix: "$(var tf_prefix)"}}
         load_controllers_text(text, "c.yaml", model=controllers_spec())
     assert [(f.code, f.severity) for f in caught.value.findings] == [("CTRL214", "warning"), ("CTRL217", "error")]
     (line,) = refused(text)
-    assert line.startswith("c.yaml:2:") and "'$(var tf_prefix)' is for a launch file to fill in" in line
-    assert "; it stands in 2 places" in line
+    assert line.startswith("c.yaml:2:") and "unresolved launch substitution '$(var tf_prefix)'" in line
+    assert " in 2 places" in line
     controllers, _ = loaded(text.replace(joint, "a"))
     assert list(controllers) == ["$(var tf_prefix)x"]
 

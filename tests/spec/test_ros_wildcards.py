@@ -64,7 +64,7 @@ def test_each_controller_takes_what_it_knows_and_of_the_joints_its_own() -> None
         all_and(f"{gains}, use_sim_time: true", manager, node("one", "joints: [a]"), node("two", "joints: [b]"))
     )
     assert [(one.severity, one.message) for one in findings] == [
-        ("note", "controller_manager: ROS knows 'use_sim_time', manipcli does not serve it: left out")
+        ("note", "controller_manager: ROS parameter 'use_sim_time' is not supported: left out")
     ]
     assert {name: one.get("gains") for name, one in controllers.items()} == {
         "one": {"a": {"p": 1.0}}, "two": {"b": {"p": 2.0}}, "states": None,
@@ -76,7 +76,7 @@ def test_each_controller_takes_what_it_knows_and_of_the_joints_its_own() -> None
 def test_a_wildcard_of_a_namespace_holds_there() -> None:
     text = all_and(JTC, node("/left/arm", "joints: [a]"), node("/right/arm", "joints: [b]"), wildcard="/left/**")
     (line,) = refused(text)
-    assert line.startswith("c.yaml:3:1: error[CTRL203]: the controller_manager names no controller 'arm'")
+    assert line.startswith("c.yaml:3:1: error[CTRL203]: the controller_manager does not declare controller 'arm'")
     controllers, _ = loaded("\n".join(text.splitlines()[:2]))
     assert controllers == {"arm": {"type": "joint_trajectory", "joints": ("a",)}}
 
@@ -86,18 +86,16 @@ def test_what_no_controller_takes_is_told() -> None:
     one = node("one", "joints: [a]")
     _, findings = loaded(all_and(f"{shared}, max_effort: 3.0", one))
     assert [(f.severity, f.message) for f in findings] == [
-        ("warning", "/**: ROS knows 'max_effort', no controller here takes it: left out")
+        ("warning", "/**: no controller here uses 'max_effort': left out")
     ]
     (line,) = refused(all_and(f"{shared}, comand_interfaces: [effort]", one))
     assert line.endswith("/**: unknown key 'comand_interfaces' | did you mean 'command_interfaces'?")
     (line, *_) = refused(all_and(shared))
-    assert line.startswith(
-        "c.yaml:1:25: error[CTRL203]: /**: no block names the controllers of this type | add `NAME: "
-    )
+    assert line.startswith("c.yaml:1:25: error[CTRL203]: /**: no controller block uses this type | add `NAME: ")
     assert loaded(all_and("anything: 3", node("io", "type: ur_controllers/GPIOController")))[0] == {}
 
 
 def test_a_node_that_is_no_controller_does_not_become_one() -> None:
     controllers, findings = loaded(all_and(JTC, node("one", "joints: [a]"), node("robot_state_publisher", "rate: 3")))
     assert list(controllers) == ["one"]
-    assert [f.message for f in findings] == ["'robot_state_publisher' is no controller: left out"]
+    assert [f.message for f in findings] == ["'robot_state_publisher' is not a controller: left out"]

@@ -168,16 +168,24 @@ def test_later_stages_can_point_at_any_value() -> None:
         ),
         (
             "near: {object: a, within: 1}\n    at: x\n    during: y",
-            "20:5: error[TASK208]: expect[1]: say either",
-            "a time",
+            "20:5: error[TASK208]: expect[1]: both `at` and `during` are given",
+            "for an interval",
         ),
-        ("never: {near: {object: a, within: 1}}\n    at: x", "19:5: error[TASK208]: expect[1]: `at` is one moment", ""),
+        (
+            "never: {near: {object: a, within: 1}}\n    at: x",
+            "19:5: error[TASK208]: expect[1]: `at` cannot be combined",
+            "",
+        ),
         (
             "near: {object: a, within: 1}\n    within: 2 s",
-            "19:5: error[TASK208]: expect[1]: `within` beside",
+            "19:5: error[TASK208]: expect[1]: `within` is only allowed",
             "eventually",
         ),
-        ("near: {object: a, within: 1}\n    id: 2nd", "19:9: error[TASK208]: expect[1].id: '2nd' cannot be an id", ""),
+        (
+            "near: {object: a, within: 1}\n    id: 2nd",
+            "19:9: error[TASK208]: expect[1].id: '2nd' is not a valid id",
+            "",
+        ),
         (
             "near: {object: a, within: 1}\n    id: x\n  - near: {object: a, within: 1}\n    id: x",
             "21:9: error[TASK210]",
@@ -216,7 +224,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
             "mass: 150 g",
             "mass: true",
             "t.yaml:6:53: error[TASK205]: scene.cup.mass: expected a mass: a number in kg, "
-            "or a text such as '5 g', not true",
+            "or a string such as '5 g', not true",
             "",
         ),
         (
@@ -253,7 +261,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "to: home",
             "to: 3",
-            "t.yaml:9:16: error[TASK205]: steps[0].move.to: expected a text, or a mapping, not 3",
+            "t.yaml:9:16: error[TASK205]: steps[0].move.to: expected a string, or a mapping, not 3",
             "",
         ),
         (
@@ -296,7 +304,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "- move: {to: home}",
             "- {timeout: 1}",
-            "t.yaml:9:5: error[TASK209]: steps[0]: a step without a verb, expected one of move, pour, wait",
+            "t.yaml:9:5: error[TASK209]: steps[0]: a step needs a verb: one of move, pour, wait",
             "",
         ),
         (
@@ -326,19 +334,19 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "until: {inside: {object: ball, of: cup}}",
             "until: {}",
-            "t.yaml:11:12: error[TASK209]: steps[1].until: a condition without a name, expected one of inside, near",
+            "t.yaml:11:12: error[TASK209]: steps[1].until: a condition needs a name: one of inside, near",
             "",
         ),
         ("of: cup}", "off: cup}", "t.yaml:11:21: error[TASK202]", ""),
         ("- id: last", "- id: move_1", "", ""),
-        ("- id: last", "- id: 'a b'", "t.yaml:13:9: error[TASK208]: steps[2].id: 'a b' cannot be an id", "letters"),
+        ("- id: last", "- id: 'a b'", "t.yaml:13:9: error[TASK208]: steps[2].id: 'a b' is not a valid id", "letters"),
         (
             "wait: 250 ms",
             "wait: 250 mm",
             "t.yaml:14:11: error[TASK207]: steps[2].wait: '250 mm' is a length; expected a time (s, ms, us, min, h)",
             "",
         ),
-        ("task: pour", "task: 3", "t.yaml:1:7: error[TASK205]: task: expected a text, not 3", "quotes make a text"),
+        ("task: pour", "task: 3", "t.yaml:1:7: error[TASK205]: task: expected a string, not 3", "put it in quotes"),
         ("task: pour\n", "", "t.yaml:1:1: error[TASK202]: the key 'task' is missing", "The name of the task"),
         (
             "task: pour",
@@ -374,7 +382,7 @@ def test_mistakes_in_expectations_are_told_where_they_are(written: str, message:
         (
             "xyz: [0.85, 0, 0.2]",
             "quat_xyzw: [1, 1, 0, 0]",
-            "t.yaml:7:58: error[TASK204]: scene.desk.pose.quat_xyzw: not a unit quaternion: its length is 1.41421",
+            "t.yaml:7:58: error[TASK204]: scene.desk.pose.quat_xyzw: not a unit quaternion: its norm is 1.41421",
             "x, y, z, w",
         ),
         (
@@ -470,7 +478,9 @@ def test_a_parameter_of_a_retry_that_the_task_does_not_have_is_told_with_what_to
 def test_an_id_is_taken_once() -> None:
     text = TASK.replace("- move: {to: home}", "- id: last\n    move: {to: home}")
     finding = only(text)
-    assert str(finding).startswith("t.yaml:14:9: error[TASK210]: steps[2].id: the id 'last' is taken by steps[0]")
+    assert str(finding).startswith(
+        "t.yaml:14:9: error[TASK210]: steps[2].id: duplicate id 'last': steps[0] has it already"
+    )
 
 
 def test_a_watch_has_no_id_of_an_expectation_for_reports_name_both_in_one_list() -> None:
@@ -479,8 +489,8 @@ def test_a_watch_has_no_id_of_an_expectation_for_reports_name_both_in_one_list()
     text += f"expect: [{{always: {near}, id: both}}]\n"
     text += f"watch: [{{always: {near}, id: both}}, {{always: {near}, id: own}}]\n"
     finding = only(text)
-    assert finding.message == "watch[0].id: the id 'both' is taken by expect[0]"
-    assert finding.hint == "expectations and watches share their ids: give another"
+    assert finding.message == "watch[0].id: duplicate id 'both': expect[0] has it already"
+    assert finding.hint == "choose another: expectations and watches share their ids"
 
 
 @pytest.mark.parametrize(
@@ -548,10 +558,10 @@ def test_arithmetic_needs_no_parameter(text: str, value: float) -> None:
     [
         ("30 deg + 5 mm", "cannot add an angle and a length; expected an angle", ""),
         ("30 mm + 5 mm", "'30 mm + 5 mm' is a length; expected an angle", ""),
-        ("30 + 5", "'30 + 5' has no unit; expected an angle", "give its numbers units"),
+        ("30 + 5", "'30 + 5' has no unit; expected an angle", "add units to its numbers"),
         ("30 deg / 0", "'30 deg / 0' divides by zero", ""),
         ("30 deg + 5 dge", "unknown unit 'dge'", "did you mean 'deg'?"),
-        ("30 deg * 1e308 * 1e308", "too large", ""),
+        ("30 deg * 1e308 * 1e308", "exceeds the largest number", ""),
         ("$$n + 5 deg", "'$n + 5 deg' is not a number with a unit", "write a number, a space and a unit"),
     ],
 )
@@ -579,13 +589,13 @@ def test_what_is_wrong_with_a_parameter_is_told_once_and_there() -> None:
     assert used in text
     found = sorted((str(f.place), f.message, f.hint or "") for f in findings(text))
     expected = [
-        ("13", "params.b: the parameter '$a' stands below", "move 'a' above 'b'"),
-        ("35", "params.c: the parameter '$c' is computed from itself", "value"),
+        ("13", "params.b: the parameter '$a' is used before it is defined", "move 'a' above 'b'"),
+        ("35", "params.c: the parameter '$c' depends on itself", "value"),
         ("42", "params.d: expected true or false", ""),
         ("53", "params.e: unknown parameter '$bb'", "did you mean 'b'?"),
-        ("69", "params: '1a' cannot be the name of a parameter", "begins with a letter"),
-        ("76", "params: 'ä' cannot", "from a to z"),
-        ("82", "params: 'a b' cannot", "letters, digits and '_'"),
+        ("69", "params: '1a' is not a valid parameter name", "begin with a letter"),
+        ("76", "params: 'ä' is not", "from a to z"),
+        ("82", "params: 'a b' is not", "letters, digits and '_'"),
     ]
     assert [place for place, _, _ in found] == [f"t.yaml:4:{column}" for column, _, _ in expected]
     for (_, message, hint), (_, start, part) in zip(found, expected, strict=True):
@@ -663,10 +673,10 @@ def test_an_override_sets_any_field(override: str, path: str, value: object) -> 
         ("simulation.sed.x=1", "--set simulation.sed.x=1: error[TASK212]: there is no 'sed' in 'simulation'", "'seed'"),
         ("steps.9.pour=3", "--set steps.9.pour=3: error[TASK212]: there is no item '9': 'steps' has 4 items", "last"),
         ("steps.por_1.pour=3", "--set steps.por_1.pour=3: error[TASK212]: there is no item 'por_1'", "'pour_1'"),
-        ("task.x=1", "--set task.x=1: error[TASK212]: 'task' is 'pour', which has no 'x' in it", ""),
-        ("nothing", "--set nothing: error[TASK212]: an override is PATH=VALUE", "--set scene.cup.mass"),
-        ("=3", "--set =3: error[TASK212]: an override is PATH=VALUE", ""),
-        ("scene..mass=3", "--set scene..mass=3: error[TASK212]: an override is PATH=VALUE", ""),
+        ("task.x=1", "--set task.x=1: error[TASK212]: 'task' has no 'x': it is 'pour'", ""),
+        ("nothing", "--set nothing: error[TASK212]: expected PATH=VALUE", "--set scene.cup.mass"),
+        ("=3", "--set =3: error[TASK212]: expected PATH=VALUE", ""),
+        ("scene..mass=3", "--set scene..mass=3: error[TASK212]: expected PATH=VALUE", ""),
         ("task=", "--set task=: error[TASK212]: the value is missing", ""),
         ("task=[1", "--set task=[1: error[YAML100]", ""),
         ("scene.cup.mass=$mas", "--set scene.cup.mass=$mas: error[TASK203]: scene.cup.mass: unknown parameter", ""),

@@ -93,9 +93,9 @@ expect:
     )
     told = [f"{line} {text}" for line, _, text in found]
     taken = [
-        "7 steps[1].id: the id 'a' is taken by steps[0]",
-        "9 steps[2].id: the id 'a'",
-        "16 expect[1].id: the id 'b'",
+        "7 steps[1].id: duplicate id 'a': steps[0] has it already",
+        "9 steps[2].id: duplicate id 'a'",
+        "16 expect[1].id: duplicate id 'b'",
     ]
     for start in (
         *taken,

@@ -94,5 +94,5 @@ def test_a_robot_that_cannot_move_does_no_task(tmp_path: Path) -> None:
         load_task(task)
     (found,) = [one for one in refused.value.findings if one.place is not None and one.place.line == 2]
     assert (found.code, found.place and found.place.column) == ("TASK244", 8)
-    assert "no joint that moves" in found.message
+    assert "no movable joint" in found.message
     assert "body of the scene" in (found.hint or "")

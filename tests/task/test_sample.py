@@ -56,7 +56,7 @@ def test_what_is_set_is_not_drawn_but_an_offset_or_scale_is_about_it() -> None:
 
 
 def test_samples_count_from_0() -> None:
-    with pytest.raises(InvalidInput, match="there is no sample -1: they count from 0"):
+    with pytest.raises(InvalidInput, match="there is no sample -1: samples count from 0"):
         _sample("{scene.block.mass: {choice: [1 kg]}}", -1)
 
 

@@ -76,17 +76,17 @@ def test_every_way_to_say_it_is_accepted(tmp_path: Path, step: str) -> None:
             "  - switch_controllers: {activate: [soft_arm]}\n",
             "TASK233 6 steps[0].switch_controllers: a joint cannot be commanded on all of these at once: "
             "joint_1/velocity (arm), joint_1/effort (soft_arm); the same of joint_2, joint_3, joint_4, and 3 more | "
-            "say `to` for those that shall be active: it deactivates who is in their way",
+            "name the controllers to activate under `to`: it deactivates conflicting ones",
         ),
         (
             "  - switch_controllers: {activate: [arm]}\n",
             "TASK233 6 steps[0].switch_controllers: cannot activate 'arm': it is active | "
-            "say `to` for those that shall be active: it deactivates who is in their way",
+            "name the controllers to activate under `to`: it deactivates conflicting ones",
         ),
         (
             "  - switch_controllers: soft_arm\n  - switch_controllers: {deactivate: [arm]}\n",
             "TASK233 7 steps[1].switch_controllers: cannot deactivate 'arm': it is inactive | "
-            "say `to` for those that shall be active: it deactivates who is in their way",
+            "name the controllers to activate under `to`: it deactivates conflicting ones",
         ),
         (
             "  - switch_controllers: {deactivate: [arm]}\n" + MOVE,

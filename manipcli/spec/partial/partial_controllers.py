@@ -1,7 +1,6 @@
-"""What remains of a controllers file once everything that is wrong in it is left out, value by value: so that the names
-in the rest can be checked, too.
+"""The valid part of a faulty controllers file, so that the names in it can be checked, too.
 
-As of tasks (`salvage.py`): the places stay those of the file, and nothing salvaged is ever planned or run.
+Invalid values are removed one by one. Places stay those of the file; the result is never planned or run.
 """
 
 from __future__ import annotations
@@ -17,12 +16,11 @@ from manipcli.spec.ros.substitutions import open_substitutions
 from manipcli.spec.source.tree import MappingNode, Node, child, without
 
 _ROUNDS = 5
-"""A value, the block that it leaves short, the controller, what pydantic looks at late."""
+"""A value, the block it belongs to, the controller, and errors that pydantic reports last."""
 
 
 def salvage_controllers(source: Source, model: type[ControllersSpec]) -> Located[ControllersSpec] | None:
-    """The controllers without the values that are wrong; None where names are for a launch file to complete, or
-    nothing coherent remains."""
+    """The controllers without invalid values; None if names contain launch substitutions, or nothing valid remains."""
     root = source.root
     if open_substitutions(root):
         return None
@@ -40,7 +38,7 @@ def salvage_controllers(source: Source, model: type[ControllersSpec]) -> Located
 
 
 def _without(root: MappingNode, path: Loc, *, missing: bool) -> MappingNode:
-    """Without the value at `path`, or the block that lacks it, unless it has gone already with what was around it."""
+    """Removes the value at `path`, or the block that lacks it, unless it is already removed."""
     inside = path[:-1] if missing else path
     node: Node | None = root
     for part in inside:

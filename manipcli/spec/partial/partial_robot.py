@@ -1,6 +1,6 @@
-"""What remains of a robot file once everything that is wrong in it is left out: so that the rest can be checked, too.
+"""The valid part of a faulty robot file, so that the rest can be checked, too.
 
-As of tasks (`salvage.py`): the places stay those of the file, and nothing salvaged is ever planned or run.
+Places stay those of the file; the result is never planned or run.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from manipcli.spec.robot import RobotSpec
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode, without
 
 _LINKS = ("description", "args", "attach")
-"""Without these it is not known which links and joints there are."""
+"""Keys without which the links and joints are unknown."""
 _NAMED = ("groups", "poses", "tool", "transmissions")
-"""What a task asks a robot for."""
+"""Keys whose names a task uses."""
 _ROUNDS = 5
 
 
 def salvage_robot(source: Source) -> Located[RobotSpec] | None:
-    """The robot file without what is wrong in it; None where it is not known what the rest speaks of."""
+    """The robot file without invalid values; None if the links and joints are unknown."""
     root = source.root
     for _ in range(_ROUNDS):
         if not isinstance(root, MappingNode):
@@ -31,16 +31,16 @@ def salvage_robot(source: Source) -> Located[RobotSpec] | None:
         try:
             return Located(RobotSpec.model_validate(left.plain()), left)
         except ValidationError as error:
-            faults = dict.fromkeys(one["loc"] for one in error.errors(include_url=False))
+            faults = dict.fromkeys(fault["loc"] for fault in error.errors(include_url=False))
             if any(fault[0] in _LINKS for fault in faults):
                 return None
-            # Groups last: what poses say of a lost one goes with it.
+            # Groups last: the poses of a removed group are removed with it.
             root = _without(root, sorted(faults, key=lambda fault: fault[0] == "groups"))
     return None
 
 
 def is_whole(file: Located[RobotSpec]) -> bool:
-    """Whether the robot has everything that a task may ask it for, though errors were left out of its file."""
+    """Whether no name that a task may use was removed from the file."""
     return all(file.source.untouched(key) for key in _NAMED)
 
 
@@ -60,13 +60,13 @@ def _without(root: MappingNode, faults: list[Loc]) -> MappingNode:
             root = without(root, fault[: 3 if head == "limits" else 2])
         if head == "groups":
             root = _ungrouped(root, *map(str, below[:1]))
-        if head == "transmissions":  # it is not known which actuators there are
+        if head == "transmissions":  # the actuators are then unknown
             root = root.without("actuators")
     return root
 
 
 def _unposed(root: MappingNode, pose: str, group: str | None = None) -> Node:
-    """The poses, of which this one (its part of one group) says nothing any more: others may name it."""
+    """The poses, with this pose (or its part for `group`) emptied: other poses may refer to it."""
     poses = root.entries["poses"].node
     assert isinstance(poses, MappingNode)
     old = poses.entries[pose].node
@@ -79,7 +79,7 @@ def _unposed(root: MappingNode, pose: str, group: str | None = None) -> Node:
 
 
 def _ungrouped(root: MappingNode, group: str | None = None) -> MappingNode:
-    """Without what poses say of a group that is not known any more, or of all of them."""
+    """Removes the entries of `group` from all poses; without `group`, removes all poses."""
     poses = root.get("poses")
     if not isinstance(poses, MappingNode) or group is None:
         return root.without("poses")

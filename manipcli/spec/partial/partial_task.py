@@ -1,6 +1,6 @@
-"""What remains of a task once everything that is wrong in it is left out: so that the rest can be checked, too.
+"""The valid part of a faulty task file, so that the rest can be checked, too.
 
-The places stay those of the file. Nothing salvaged is ever planned or run.
+Places stay those of the file; the result is never planned or run.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 from manipcli.spec.task import StepSpec, TaskSpec
 
 LISTS = ("steps", "expect", "watch")
-"""Their faulty items are left out one by one."""
+"""Lists whose invalid items are removed one by one."""
 NAMED = ("scene", "frames")
-"""Their faulty entries are replaced by a stand-in, since others may speak of them by name."""
+"""Mappings whose invalid entries become placeholders, since other entries may refer to them."""
 KEPT = ("task", "robot", "controllers")
-"""Without these there is no task: a text stands in for them."""
+"""Required keys: an invalid value becomes a placeholder."""
 REFERENCES = ("rests_on", "inside", "parent")
-"""The names that a stand-in still speaks of."""
+"""Names that a placeholder keeps."""
 CLOCK = ("step", "control_period")
-"""One says nothing without the other."""
+"""Keys that are only valid together."""
 _ROUNDS = 4
-"""What pydantic looks at late shows only once the rest is in order, and what a block needs only once it is short."""
+"""Pydantic reports some errors only once others are removed."""
 
 
 def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
-    """The task without its faulty steps and expectations, and with a stand-in for each faulty body or frame.
+    """The task without its invalid steps and expectations, with a placeholder for each invalid body or frame.
 
     Returns:
-        With the errors as `findings` that showed only when the others were out of the way; None where nothing coherent
+        The task, whose `findings` are errors that appeared only after the others were removed; None if nothing valid
         remains.
     """
     root = source.root
@@ -49,7 +49,7 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
         try:
             return Located(model.model_validate(left.plain()), left, tuple(late))
         except ValidationError as error:
-            faults = [one["loc"] for one in error.errors(include_url=False)]
+            faults = [fault["loc"] for fault in error.errors(include_url=False)]
             if number and faults == [()] and left.untouched("simulation", "control_period"):
                 late += explain(error, root, model, source.area)
             faults, root = (faults, root) if number else _without_fields(root, faults)
@@ -58,9 +58,9 @@ def salvage(source: Source, model: type[TaskSpec]) -> Located[TaskSpec] | None:
 
 
 def intended_ids(source: Source, verbs: Sequence[str]) -> tuple[str, ...]:
-    """The ids that the steps of the whole file would have, those that were left out with the verbs nearest to theirs.
+    """The ids of all steps of the file; a removed step gets the verb nearest to its own.
 
-    Of a step whose verb cannot be known (none, or several), every id that it could get.
+    For a step without a recognisable verb, every id that it could get.
     """
     steps = child(source.root if source.whole is None else source.whole, "steps")
     items = steps.items if isinstance(steps, SequenceNode) else ()
@@ -84,28 +84,28 @@ def intended_ids(source: Source, verbs: Sequence[str]) -> tuple[str, ...]:
 
 
 def _without_fields(root: MappingNode, faults: list[Loc]) -> tuple[list[Loc], MappingNode]:
-    """The tree without the faulty fields of steps, and the faults that are elsewhere: the names in the other fields are
-    still to be checked. A step that cannot be without its field is faulty again, and is left out then."""
+    """Removes the invalid fields of steps; returns the other faults and the tree. A step that requires its removed
+    field is removed in the next round."""
     steps = root.get("steps")
     if not isinstance(steps, SequenceNode):
         return faults, root
     items, others = [*steps.items], []
     for fault in faults:
-        field = fault[3:5] if fault[:1] == ("steps",) else ()  # behind the number of the step and which kind it is
+        field = fault[3:5] if fault[:1] == ("steps",) else ()  # after the index of the step and its union branch
         item = items[int(fault[1])] if field else None
         if fault == ("steps",) and len(faults) > 1:
-            continue  # none of the steps was sound; if none is now, that is told again
+            continue  # no step was valid; if none is valid now, the next round reports it
         if not isinstance(item, MappingNode) or field[0] in ("until", "on_fail", "id"):
             others.append(fault)
-        elif node_at(item, field) is not node_at(item, field[:-1]):  # of a value that may be this or that, once
+        elif node_at(item, field) is not node_at(item, field[:-1]):  # a union reports a value once per branch
             items[int(fault[1])] = without(item, field)
     return others, root.with_node("steps", SequenceNode(tuple(items), steps.place))
 
 
 def _without(root: MappingNode, faults: list[Loc], kept: dict[str, tuple[int, ...]]) -> MappingNode:
-    """The tree without what the faults are in; `kept` follows which items of the file remain."""
+    """The tree without the faulty blocks; `kept` tracks which items of the file remain."""
     heads = {str(fault[0]) for fault in faults if len(fault) == 1}
-    if heads & {*NAMED}:  # which names there are is not known
+    if heads & {*NAMED}:  # the names are then unknown
         heads |= {*LISTS, "frames"}
     items = {(fault[0], fault[1]) for fault in faults if len(fault) > 1 and fault[0] in (*LISTS, *NAMED)}
     for name in LISTS:
@@ -117,17 +117,17 @@ def _without(root: MappingNode, faults: list[Loc], kept: dict[str, tuple[int, ..
             root = root.with_node(name, SequenceNode(tuple(block.items[k] for k in remaining), block.place))
     steps = root.get("steps")
     if not isinstance(steps, SequenceNode) or not steps.items:
-        root = root.with_node("steps", _nothing_to_do(root if steps is None else steps))
+        root = root.with_node("steps", _minimal_steps(root if steps is None else steps))
         kept["steps"] = (0,)
     for name in NAMED:
         block = root.get(name)
         if isinstance(block, MappingNode):
             for key, old in block.entries.items():
                 if (name, key) in items:
-                    block = block.with_node(key, _stand_in(name, old.node))
+                    block = block.with_node(key, _placeholder(name, old.node))
             root = root.with_node(name, block)
     for fault in faults:
-        head = "record" if not fault else str(fault[0])  # of the whole task only the rates are looked at
+        head = "record" if not fault else str(fault[0])  # only the check of rates concerns the whole task
         block = root.get(head)
         if head in KEPT:
             root = root.with_node(head, ScalarNode("left out", root.place))
@@ -138,14 +138,14 @@ def _without(root: MappingNode, faults: list[Loc], kept: dict[str, tuple[int, ..
     return root.without(*(heads & {"frames", "scene", "expect", "watch"}))
 
 
-def _nothing_to_do(at: Node) -> Node:
-    """The least that a task may do."""
+def _minimal_steps(at: Node) -> Node:
+    """The minimal valid list of steps."""
     wait = MappingNode({"wait": Entry(at.place, ScalarNode(0.0, at.place))}, at.place)
     return SequenceNode((wait,), at.place)
 
 
-def _stand_in(block: str, faulty: Node) -> Node:
-    """A frame, or a body of no account, that refers to what the faulty one does."""
+def _placeholder(block: str, faulty: Node) -> Node:
+    """A placeholder frame or body that keeps the references of the faulty one."""
     place = faulty.place
     entries: dict[str, Entry] = {}
     for word in REFERENCES[2:] if block == "frames" else REFERENCES[:2]:

@@ -1,4 +1,4 @@
-"""Where the controllers of a file stand: below names of namespaces (ROS 1), or at nodes with parameters (ROS 2)."""
+"""Search for controllers in a ROS file: inside namespaces (ROS 1), or at nodes with parameters (ROS 2)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Path = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Something at `path` (namespaces, then its name: "" for what is said of all there), and where that is written."""
+    """A block at `path` (namespaces, then its name; "" for a wildcard), and the place of its key."""
 
     path: Path
     key_place: Place
@@ -23,30 +23,30 @@ class Found:
 
     @property
     def name(self) -> str:
-        """Without its namespaces."""
+        """The name without namespaces."""
         return self.path[-1] if self.path else ""
 
 
 def mapping(node: Node | None) -> MappingNode:
-    """`node`, or an empty mapping where it is none."""
+    """`node` if it is a mapping, else an empty mapping."""
     return node if isinstance(node, MappingNode) else MappingNode({}, Place("", 0, 0))
 
 
 def has_type(node: Node) -> bool:
-    """Whether this is a block with a text under `type`."""
+    """Whether this is a block with a string under `type`."""
     word = node.get("type") if isinstance(node, MappingNode) else None
     return isinstance(word, ScalarNode) and isinstance(word.value, str)
 
 
 def is_ros2(node: Node) -> bool:
-    """Whether there are parameters of ROS 2 at or below this."""
+    """Whether this node or one below it has ROS 2 parameters."""
     return isinstance(node, MappingNode) and (
         PARAMETERS in node.entries or any(is_ros2(entry.node) for entry in node.entries.values())
     )
 
 
 def in_namespaces(root: MappingNode, above: Path = ()) -> Iterator[Found]:
-    """The blocks of ROS 1; a block without a type whose inner ones have some is a namespace."""
+    """The blocks of ROS 1; a block without a type that contains typed blocks is a namespace."""
     for key, entry in root.entries.items():
         path = (*above, *_parts(key))
         if isinstance(entry.node, MappingNode) and not has_type(entry.node) and _is_namespace(entry.node):
@@ -57,12 +57,12 @@ def in_namespaces(root: MappingNode, above: Path = ()) -> Iterator[Found]:
 
 def _is_namespace(node: MappingNode) -> bool:
     inner = [entry.node for entry in node.entries.values()]
-    return any(has_type(one) or (isinstance(one, MappingNode) and _is_namespace(one)) for one in inner)
+    return any(has_type(block) or (isinstance(block, MappingNode) and _is_namespace(block)) for block in inner)
 
 
 def at_nodes(root: MappingNode, above: Path = ()) -> Iterator[Found]:
-    """The nodes of ROS 2 and their parameters; then what is no node. `*` and `**` are "" at the end of a path, and left
-    out before it.
+    """The ROS 2 nodes and their parameters, and all other blocks. `*` and `**` become "" at the end of a path, and are
+    dropped before it.
     """
     for key, entry in root.entries.items():
         path = (*above, *_parts(key))
@@ -80,7 +80,7 @@ def _parts(key: str) -> Path:
 
 
 def undotted(node: MappingNode) -> MappingNode:
-    """`gains.joint_1.p: 3` as the blocks that it means."""
+    """Dotted keys as nested blocks: `gains.joint_1.p: 3`."""
     entries: dict[str, Entry] = {}
     for key, entry in node.entries.items():
         inner = undotted(entry.node) if isinstance(entry.node, MappingNode) else entry.node
@@ -97,7 +97,7 @@ def undotted(node: MappingNode) -> MappingNode:
 
 
 def merged(a: MappingNode, b: MappingNode) -> MappingNode:
-    """Both, to the depth of their blocks; where they differ, `b`."""
+    """A recursive merge of both; `b` overrides `a`."""
     entries = dict(a.entries)
     for key, entry in b.entries.items():
         before = entries.get(key)
@@ -108,6 +108,6 @@ def merged(a: MappingNode, b: MappingNode) -> MappingNode:
 
 
 def named(found: list[Found]) -> list[tuple[str, Found]]:
-    """What each is called: its name alone, and with its namespaces where two have the same one."""
-    names = [one.name for one in found]
-    return [(one.name if names.count(one.name) == 1 else "/".join(one.path), one) for one in found]
+    """The name of each block, with its namespaces if another block has the same name."""
+    names = [item.name for item in found]
+    return [(item.name if names.count(item.name) == 1 else "/".join(item.path), item) for item in found]

@@ -1,4 +1,4 @@
-"""What no table can say: where a type of ROS stores the same thing in another shape."""
+"""Restructuring of ROS controller blocks that tables of parameters cannot express."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, Sequ
 
 
 def joint_trajectory(node: MappingNode) -> MappingNode:
-    """`velocity_ff` beside the gains goes into them; tolerances stand below `joints`, and 0 means not enforced."""
+    """Moves `velocity_ff` into the gains and tolerances under `joints`; removes tolerances of 0 (not enforced)."""
     node = _feed_forward(node)
     constraints = node.entries.get("constraints")
     if constraints is None or not isinstance(constraints.node, MappingNode):
@@ -25,22 +25,22 @@ def joint_trajectory(node: MappingNode) -> MappingNode:
 
 
 def one_joint(node: MappingNode) -> MappingNode:
-    """ROS 1 has controllers of one `joint`."""
+    """Replaces the single `joint` of ROS 1 by `joints`."""
     entry = node.entries.get("joint")
     if entry is None or "joints" in node.entries or not isinstance(entry.node, ScalarNode):
         return node
     listed: Node = SequenceNode((entry.node,), entry.node.place)
     return MappingNode(
         {
-            ("joints" if key == "joint" else key): (Entry(one.key_place, listed) if key == "joint" else one)
-            for key, one in node.entries.items()
+            ("joints" if key == "joint" else key): (Entry(value.key_place, listed) if key == "joint" else value)
+            for key, value in node.entries.items()
         },
         node.place,
     )
 
 
 def pid(node: MappingNode) -> MappingNode:
-    """ROS 1 writes `pid` beside the one `joint`, or below the name of each of several."""
+    """Moves `pid` of ROS 1, next to `joint` or under each joint name, into `gains`."""
     alone = node.get("joint")
     gains: dict[str, Entry] = {}
     if isinstance(alone, ScalarNode) and isinstance(alone.value, str) and "pid" in node.entries:
@@ -60,7 +60,7 @@ def pid(node: MappingNode) -> MappingNode:
 
 
 def without_zeros(block: MappingNode) -> MappingNode:
-    """Tolerances of 0 are not enforced in ROS: the same as none."""
+    """Removes tolerances of 0, which ROS does not enforce."""
     zeros = [
         key
         for key in ("goal", "trajectory")

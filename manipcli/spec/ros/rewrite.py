@@ -1,4 +1,4 @@
-"""From a tree in one of ROS's forms to one in ours, and what is to be told of it."""
+"""Rewriting of a tree in a form of ROS to our form, with diagnostics."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _CLAMPS = frozenset({"i_clamp", "i_clamp_min", "i_clamp_max"})
 
 
 def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node, list[Diagnostic]]:
-    """The tree in our form (`controllers: {NAME: ...}`) and findings; a tree in our form comes back as it is.
+    """The tree in our form (`controllers: {NAME: ...}`), and findings; a tree in our form is returned unchanged.
 
-    `types`: the specs of our controllers, by the word under `type`.
+    `types`: specs of our controllers, by type.
     """
     work = _Rewriting(types)
     if not isinstance(root, MappingNode) or not root.entries:
@@ -45,9 +45,9 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
     else:
         return root, []
     entries = {
-        name: Entry(one.key_place, node)
-        for name, one in named(found)
-        if (node := work.controller(name, one.node)) is not None
+        name: Entry(block.key_place, node)
+        for name, block in named(found)
+        if (node := work.controller(name, block.node)) is not None
     }
     inner = root.place if wrapped is None else wrapped.node.place
     made = MappingNode(work.started(entries), inner)
@@ -56,10 +56,10 @@ def rewrite(root: Node, types: Mapping[str, type[ControllerSpec]]) -> tuple[Node
 
 
 class _Rewriting:
-    """One file.
+    """The rewriting of one file.
 
-    `foreign`: the controllers that ROS's files do not say of whether they are started. `ros1`: it is not in the form of
-    ROS 2, so that a type of ROS is meant as in ROS 1.
+    `foreign`: controllers in a form of ROS, which does not state whether they are active. `ros1`: the file is not in
+    the form of ROS 2, so ROS types have their meaning in ROS 1.
     """
 
     def __init__(self, types: Mapping[str, type[ControllerSpec]]) -> None:
@@ -68,41 +68,45 @@ class _Rewriting:
         self.ros1 = False
         self.foreign: list[str] = []
 
-    def tell(
+    def report(
         self, code: str, place: Place, message: str, *, hint: str | None = None, severity: Severity = "error"
     ) -> None:
         self.findings.append(Diagnostic(code, message, place, hint=hint, severity=severity))
 
     def of_blocks(self, root: MappingNode) -> list[Found]:
-        """The controllers of ROS 1 or of our form without `controllers:`."""
+        """The controllers of a ROS 1 file, or of our form without `controllers:`."""
         found = []
-        for one in in_namespaces(root):
-            if one.name in OTHER_NODES and not has_type(one.node):
-                self.tell("CTRL214", one.key_place, f"'{one.name}' is no controller: left out", severity="warning")
+        for block in in_namespaces(root):
+            if block.name in OTHER_NODES and not has_type(block.node):
+                self.report(
+                    "CTRL214", block.key_place, f"'{block.name}' is not a controller: left out", severity="warning"
+                )
             else:
-                found.append(one)
+                found.append(block)
         return found
 
     def of_nodes(self, root: MappingNode) -> list[Found]:
-        """The controllers of ROS 2: their types stand at the controller manager, or at their own nodes."""
+        """The controllers of a ROS 2 file: their types are at the controller manager or at their own nodes."""
         nodes = list(at_nodes(root))
-        managers = [one for one in nodes if one.name in (MANAGER, "")]
-        wildcards = Wildcards([one for one in managers if not one.name], self.models)
-        own = [one for one in nodes if one not in managers]
+        managers = [node for node in nodes if node.name in (MANAGER, "")]
+        wildcards = Wildcards([node for node in managers if not node.name], self.models)
+        own = [node for node in nodes if node not in managers]
         declared = [found for manager in managers for found in self.declared(manager)]
         used: list[Found] = []
         found = []
-        for one in declared:
-            blocks = [node for node in own if node.path == one.path] or [n for n in own if _may_be(n, one)]
+        for controller in declared:
+            blocks = [node for node in own if node.path == controller.path] or [
+                n for n in own if _may_be(n, controller)
+            ]
             used += blocks
-            entries = dict(mapping(one.node).entries)
+            entries = dict(mapping(controller.node).entries)
             for block in blocks:
                 entries.update(mapping(block.node).entries)
-            # What is missing in a controller is missing in its own block, where there is one.
-            nearest = blocks[-1] if blocks else one
-            place = nearest.key_place if blocks else one.node.place
-            found.append(wildcards.given(Found(one.path, nearest.key_place, MappingNode(entries, place))))
-        names = [one.name for one in declared]
+            # A missing key is reported at the controller's own block, if it has one.
+            nearest = blocks[-1] if blocks else controller
+            place = nearest.key_place if blocks else controller.node.place
+            found.append(wildcards.given(Found(controller.path, nearest.key_place, MappingNode(entries, place))))
+        names = [controller.name for controller in declared]
         for node in own:
             if node in used:
                 continue
@@ -110,33 +114,35 @@ class _Rewriting:
             if has_type(given.node):
                 found.append(given)
             elif node.name in OTHER_NODES:
-                self.tell("CTRL214", node.key_place, f"'{node.name}' is no controller: left out", severity="warning")
+                self.report(
+                    "CTRL214", node.key_place, f"'{node.name}' is not a controller: left out", severity="warning"
+                )
             else:
                 hint = did_you_mean(node.name, names, kind="it names")
-                message = f"the controller_manager names no controller '{node.name}'"
-                self.tell("CTRL203", node.key_place, message, hint=hint)
+                message = f"the controller_manager does not declare controller '{node.name}'"
+                self.report("CTRL203", node.key_place, message, hint=hint)
         self.of_all(wildcards, found)
         return found
 
     def of_all(self, wildcards: Wildcards, found: list[Found]) -> None:
-        """Parameters of all nodes that no controller has taken."""
-        for one, key, entry in wildcards.left():
-            where = "/".join(("", *one.path[:-1], "**"))
+        """Reports wildcard parameters that no controller uses."""
+        for block, key, entry in wildcards.left():
+            where = "/".join(("", *block.path[:-1], "**"))
             if key == "type" and not found:
-                message = f"{where}: no block names the controllers of this type"
-                self.tell("CTRL203", entry.key_place, message, hint="add `NAME: {ros__parameters: {joints: [...]}}`")
+                message = f"{where}: no controller block uses this type"
+                self.report("CTRL203", entry.key_place, message, hint="add `NAME: {ros__parameters: {joints: [...]}}`")
             elif key in ELSEWHERE:
-                message = f"{where}: ROS knows '{key}', no controller here takes it: left out"
-                self.tell("CTRL214", entry.key_place, message, severity="warning")
+                message = f"{where}: no controller here uses '{key}': left out"
+                self.report("CTRL214", entry.key_place, message, severity="warning")
             elif key != "type":
                 kinds = {str(plain(kind)) for kind in (mapping(c.node).get("type") for c in found) if kind is not None}
                 tables = [BY_TYPE[kind] for kind in sorted(kinds) if kind in BY_TYPE]
                 known = [name for t in tables for name in (*self.models[t.own].model_fields, *t.parameters.names)]
                 hint = did_you_mean(key, [*known, *MANAGER_BLOCK.names, *(c.name for c in found)], kind="known")
-                self.tell("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
 
     def declared(self, manager: Found) -> list[Found]:
-        """The controllers that a manager names; its own parameters are told of."""
+        """The controllers that a manager declares; reports the manager's own parameters."""
         found, names = [], []
         above = manager.path[:-1]
         for key, entry in mapping(manager.node).entries.items():
@@ -145,22 +151,22 @@ class _Rewriting:
             else:
                 names.append(key)
         for key in names if manager.name else [key for key in names if key in MANAGER_BLOCK.names]:
-            self.managers_own(key, mapping(manager.node).entries[key], [one.name for one in found])
+            self.managers_own(key, mapping(manager.node).entries[key], [controller.name for controller in found])
         return found
 
     def managers_own(self, key: str, entry: Entry, declared: list[str]) -> None:
         if key == "update_rate":
             rate, hint = plain(entry.node), None
             if isinstance(rate, int | float) and not isinstance(rate, bool) and rate > 0:
-                hint = f"say `simulation: {{control_period: {1.0 / rate:g} s}}` in the task"
-            message = f"{MANAGER}: the control rate is the task's, not this 'update_rate': left out"
-            self.tell("CTRL214", entry.key_place, message, hint=hint, severity="note")
+                hint = f"write `simulation: {{control_period: {1.0 / rate:g} s}}` in the task"
+            message = f"{MANAGER}: 'update_rate' has no effect: the task sets the control rate"
+            self.report("CTRL214", entry.key_place, message, hint=hint, severity="note")
         elif not _neutral(MANAGER_BLOCK, key, entry.node) and not self.unserved(MANAGER, key, entry, MANAGER_BLOCK):
             hint = did_you_mean(key, [*MANAGER_BLOCK.names, *declared], kind="known")
-            self.tell("CTRL201", entry.key_place, f"{MANAGER}: unknown key '{key}'", hint=hint)
+            self.report("CTRL201", entry.key_place, f"{MANAGER}: unknown key '{key}'", hint=hint)
 
     def controller(self, name: str, node: Node) -> Node | None:
-        """One controller in our form; None when there is nothing to build for it."""
+        """A controller in our form; None if it is left out."""
         if not isinstance(node, MappingNode) or not has_type(node):
             return node
         word, entry = node.get("type"), node.entries["type"]
@@ -177,8 +183,8 @@ class _Rewriting:
         node = node.with_entry("type", Entry(entry.key_place, own))
         node = table.reshape(_implied(_renamed(node, table.parameters), table, word))
         if table.needs and table.needs not in node.entries:
-            message = f"controller '{name}': nothing says its '{table.needs}': left out"
-            self.tell("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
+            message = f"controller '{name}' has no '{table.needs}': left out"
+            self.report("CTRL214", word.place, message, hint=f"add `{table.needs}: ...`", severity="warning")
             return None
         self.foreign.append(name)
         node = self.effective(name, node, table)
@@ -187,59 +193,57 @@ class _Rewriting:
         return served
 
     def has_interface(self, name: str, node: MappingNode, table: Table) -> bool:
-        """Whether it commands what joints have here; else that is told, as an error where it looks like a slip."""
+        """Whether its command interface exists here; if not, reports it: as an error if it looks like a typo."""
         key = table.interface
         word = node.get(key) if key else None
         if not isinstance(word, ScalarNode) or not isinstance(word.value, str) or word.value in INTERFACES:
             return True
-        near = [one for one in INTERFACES if _slip(word.value, one)]
+        near = [interface for interface in INTERFACES if _is_typo(word.value, interface)]
         if near:
-            message = f"controller '{name}': {key}: '{word.value}' is not known"
-            self.tell("CTRL203", word.place, message, hint=did_you_mean(word.value, near))
+            message = f"controller '{name}': unknown {key} '{word.value}'"
+            self.report("CTRL203", word.place, message, hint=did_you_mean(word.value, near))
         else:
-            message = f"controller '{name}': '{key}: {word.value}' is no interface that joints have here: left out"
+            message = f"controller '{name}': joints have no interface '{word.value}' ({key}): left out"
             hint = f"interfaces: {', '.join(INTERFACES)}"
-            self.tell("CTRL214", word.place, message, hint=hint, severity="warning")
+            self.report("CTRL214", word.place, message, hint=hint, severity="warning")
         return False
 
     def effective(self, name: str, node: MappingNode, table: Table) -> MappingNode:
-        """Without what does nothing on the interface that it commands, which is told."""
+        """Removes and reports keys that have no effect on the commanded interface."""
         word = node.get("command_interface")
         interface = str(word.value) if isinstance(word, ScalarNode) else ""
         for key in table.idle.get(interface, ()):
             entry = node.entries.get(key)
             if entry is not None and not _neutral(table.parameters, key, entry.node):
-                message = f"{name}: '{key}' does nothing on the {interface} interface: left out"
-                hint = "on efforts, grips have a force: `command_interface: effort`, with `gains`"
-                self.tell("CTRL214", entry.key_place, message, hint=hint, severity="warning")
+                message = f"{name}: '{key}' has no effect on the {interface} interface: left out"
+                hint = "for a grip force, use `command_interface: effort` with `gains`"
+                self.report("CTRL214", entry.key_place, message, hint=hint, severity="warning")
                 node = node.without(key)
         return node
 
     def unclamped(self, name: str, gains: MappingNode) -> None:
-        """Integrals that do nothing in ROS 1, and much here."""
+        """Reports integral gains that have no effect in ROS 1 but act here."""
         for joint, entry in gains.entries.items() if self.ros1 else ():
             block = mapping(entry.node)
             gain = block.entries.get("i")
             if gain is None or plain(gain.node) in (0, 0.0) or _CLAMPS & block.entries.keys():
                 continue
-            message = f"{name}.gains.{joint}: in ROS 1 an 'i' without 'i_clamp' has no effect; here it is not clamped"
-            self.tell("CTRL216", gain.key_place, message, hint="add i_clamp, or leave i out", severity="warning")
+            message = f"{name}.gains.{joint}: in ROS 1 an 'i' without 'i_clamp' has no effect; here it acts unclamped"
+            self.report("CTRL216", gain.key_place, message, hint="add `i_clamp`, or remove `i`", severity="warning")
 
     def unknown_type(self, name: str, word: str, place: Place) -> None:
         if word in UNSERVED_TYPES:
-            message = f"controller '{name}': ROS knows the type '{word}', manipcli does not serve it: left out"
-            self.tell("CTRL214", place, message, severity="warning")
-        elif _of_vendor(word):
+            message = f"controller '{name}': ROS type '{word}' is not supported: left out"
+            self.report("CTRL214", place, message, severity="warning")
+        elif _is_vendor_type(word):
             package, _, own = word.partition("/")
-            message = (
-                f"controller '{name}': '{word}' is of the package '{package}', manipcli does not serve it: left out"
-            )
-            same = [one for one in BY_TYPE if one.partition("/")[2] == own]
-            hint = did_you_mean(word, same, kind="served")
-            self.tell("CTRL214", place, message, hint=hint, severity="warning")
+            message = f"controller '{name}': type '{word}' of package '{package}' is not supported: left out"
+            same = [known for known in BY_TYPE if known.partition("/")[2] == own]
+            hint = did_you_mean(word, same, kind="supported")
+            self.report("CTRL214", place, message, hint=hint, severity="warning")
         else:
-            hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="served")
-            self.tell("CTRL203", place, f"controller '{name}': the type '{word}' is not known", hint=hint)
+            hint = did_you_mean(word, [*BY_TYPE, *UNSERVED_TYPES], kind="supported")
+            self.report("CTRL203", place, f"controller '{name}': unknown type '{word}'", hint=hint)
 
     def served(
         self,
@@ -250,8 +254,8 @@ class _Rewriting:
         *,
         ignored: frozenset[str] = frozenset(),
     ) -> Node:
-        """`node` without the parameters that ROS knows and the spec does not have, or that ROS has `ignored` here; what
-        nobody knows is told.
+        """`node` without the ROS parameters that the spec does not have, and without those that ROS itself has
+        `ignored` here; reports unknown keys.
         """
         if not isinstance(node, MappingNode):
             return node
@@ -263,13 +267,13 @@ class _Rewriting:
                 continue
             given = plain(entry.node)
             if key in block.filled and given == []:
-                self.tell("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
+                self.report("CTRL206", entry.node.place, f"{where}.{key}: expected at least 1 item, got none")
             if isinstance(given, int | float) and given > block.most.get(key, math.inf):
-                message = f"{where}: '{key}: {given:g}', in rad or m, is never missed: not enforced"
-                self.tell("CTRL214", entry.key_place, message, hint="in degrees? ROS takes radians", severity="warning")
+                message = f"{where}: '{key}: {given:g}' (rad or m) is above {block.most[key]:g}: not enforced"
+                self.report("CTRL214", entry.key_place, message, hint="in degrees? write radians", severity="warning")
             elif given in block.unserved.get(key, ()):
-                message = f"{where}: ROS knows '{key}: {given}', manipcli does not serve it: left out"
-                self.tell("CTRL214", entry.key_place, message, severity="warning")
+                message = f"{where}: ROS parameter '{key}: {given}' is not supported: left out"
+                self.report("CTRL214", entry.key_place, message, severity="warning")
             elif block.joint is not None and isinstance(entry.node, MappingNode) and key not in fields:
                 inner = self.served(f"{where}.{key}", entry.node, block.joint, model)
                 kept[key] = Entry(entry.key_place, inner)
@@ -281,22 +285,22 @@ class _Rewriting:
                     inner = self.served(path, inner, below, model_below(model, key))
                 kept[key] = Entry(entry.key_place, inner)
             elif block.joint is not None:
-                kept[key] = entry  # no block: the validation says what was expected
+                kept[key] = entry  # not a block: validation reports it
             elif key in ignored and key not in block.names:
-                message = f"{where}: ROS knows '{key}' of other controllers and ignores it here: left out"
-                self.tell("CTRL214", entry.key_place, message, severity="warning")
+                message = f"{where}: '{key}' is a parameter of other ROS controllers: left out"
+                self.report("CTRL214", entry.key_place, message, severity="warning")
             elif not self.unserved(where, key, entry, block):
                 hint = did_you_mean(key, [*fields, *block.names], kind="known")
-                self.tell("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
+                self.report("CTRL201", entry.key_place, f"{where}: unknown key '{key}'", hint=hint)
         return MappingNode(kept, node.place)
 
     def unserved(self, where: str, key: str, entry: Entry, block: Block) -> bool:
-        """Whether ROS knows it; then it is left out, which is told."""
+        """Whether this is a ROS parameter; if so, reports that it is left out."""
         if key not in block.names:
             return False
         severity: Severity = "note" if key in block.quiet else "warning"
-        message = f"{where}: ROS knows '{key}', manipcli does not serve it: left out"
-        self.tell("CTRL214", entry.key_place, message, severity=severity)
+        message = f"{where}: ROS parameter '{key}' is not supported: left out"
+        self.report("CTRL214", entry.key_place, message, severity=severity)
         return True
 
     def role(self, node: Node) -> Role:
@@ -305,7 +309,7 @@ class _Rewriting:
         return "other" if model is None else model.role
 
     def started(self, entries: dict[str, Entry]) -> dict[str, Entry]:
-        """ROS's files do not say who is started: of several that command a joint, the first is that steps can use."""
+        """Activates one controller per joint, since ROS files do not state it: the first one that steps can use."""
         owners: dict[str, str] = {}
         result = dict(entries)
         for name in sorted(entries, key=lambda name: self.role(entries[name].node) == "other"):
@@ -316,8 +320,8 @@ class _Rewriting:
                 taken = next((joint for joint in joints if joint in owners), None)
                 if taken is not None:
                     message = f"controller '{name}' starts inactive: '{owners[taken]}' commands '{taken}'"
-                    hint = "say `active: true` or `false`, or add a step `switch_controllers`"
-                    self.tell("CTRL215", entry.key_place, message, hint=hint, severity="note")
+                    hint = "set `active`, or add a `switch_controllers` step"
+                    self.report("CTRL215", entry.key_place, message, hint=hint, severity="note")
                     off = Entry(entry.key_place, ScalarNode(False, entry.key_place))
                     entry = Entry(entry.key_place, node.with_entry("active", off))
                 else:
@@ -335,31 +339,31 @@ def _joints(node: MappingNode) -> list[str]:
 
 
 def _may_be(node: Found, controller: Found) -> bool:
-    """Whether these parameters are this controller's: the same name, and one of them does not say its namespace."""
+    """Whether these parameters belong to this controller: same name, and one of the two has no namespace."""
     return node.name == controller.name and 1 in (len(node.path), len(controller.path))
 
 
-def _of_vendor(word: str) -> bool:
-    """Whether this is `package/Class` of a package that is none of ROS's, nor one of those written wrong."""
+def _is_vendor_type(word: str) -> bool:
+    """Whether this is `package/Class` of a package that is not ROS's, and not a typo of one."""
     package = word.partition("/")[0]
-    return re.fullmatch(r"\w+/\w+", word) is not None and not any(_slip(package, known) for known in PACKAGES)
+    return re.fullmatch(r"\w+/\w+", word) is not None and not any(_is_typo(package, known) for known in PACKAGES)
 
 
-def _slip(given: str, known: str) -> bool:
-    """Whether no more than two letters differ, in upper or lower case."""
+def _is_typo(given: str, known: str) -> bool:
+    """Whether at most two letters differ, ignoring case."""
     match = difflib.SequenceMatcher(None, given.casefold(), known.casefold(), autojunk=False)
     return max(len(given), len(known)) - sum(block.size for block in match.get_matching_blocks()) <= 2
 
 
 def _implied(node: MappingNode, table: Table, word: ScalarNode) -> MappingNode:
-    """With what the type of ROS says beyond ours."""
+    """Adds the keys that the ROS type implies."""
     for key, words in table.types[str(word.value)].items():
         if key in node.entries or key.removesuffix("s") in node.entries:
             continue
         plural = key.endswith("interfaces")
-        items = tuple(ScalarNode(value(one), word.place) for one in words.split())
-        said: Node = SequenceNode(items, word.place) if plural else items[0]
-        node = node.with_entry(key, Entry(word.place, said))
+        items = tuple(ScalarNode(value(text), word.place) for text in words.split())
+        implied: Node = SequenceNode(items, word.place) if plural else items[0]
+        node = node.with_entry(key, Entry(word.place, implied))
     return node
 
 
@@ -369,7 +373,7 @@ def _neutral(block: Block, key: str, node: Node) -> bool:
 
 
 def _renamed(node: MappingNode, block: Block) -> MappingNode:
-    """With our names instead of ROS's; where both stand, ours counts and the other is unknown."""
+    """Renames ROS keys to ours; if both are given, ours is used and the other is unknown."""
     return MappingNode(
         {
             (key if (own := block.renamed.get(key)) is None or own in node.entries else own): entry

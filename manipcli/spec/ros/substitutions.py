@@ -1,4 +1,4 @@
-"""What a launch file would have put in: `$(arg prefix)`, `$(var tf_prefix)`."""
+"""Unresolved launch-file substitutions: `$(arg prefix)`, `$(var tf_prefix)`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _SUBSTITUTION = re.compile(r"\$\([a-z][^()]*\)")
 
 
 def open_substitutions(root: Node) -> list[Diagnostic]:
-    """An error for each one that stands in a controller (its name may hold one), at the first place of it.
+    """An error for each substitution in a controller or its name, at its first place.
 
     Args:
-        root: a tree in our form: what is left out of a file of ROS needs no filling in.
+        root: a tree in our form; parts of a ROS file that are left out need no values.
     """
     controllers = root.get("controllers") if isinstance(root, MappingNode) else None
     named = controllers.entries.values() if isinstance(controllers, MappingNode) else ()
@@ -26,17 +26,16 @@ def open_substitutions(root: Node) -> list[Diagnostic]:
     return [
         Diagnostic(
             "CTRL217",
-            f"'{word}' is for a launch file to fill in, and none does here"
-            + (f"; it stands in {len(at)} places" if len(at) > 1 else ""),
+            f"unresolved launch substitution '{word}'" + (f" in {len(at)} places" if len(at) > 1 else ""),
             at[min(at)],
-            hint="write what the launch file puts there; where that is nothing, take it out",
+            hint="replace it by its value; delete it if the value is empty",
         )
         for word, at in places.items()
     ]
 
 
 def _texts(node: Node) -> Iterator[tuple[str, Place]]:
-    """Every key and every text."""
+    """All keys and strings, with their places."""
     if isinstance(node, MappingNode):
         for key, entry in node.entries.items():
             yield key, entry.key_place

@@ -1,4 +1,4 @@
-"""What a table of ROS's parameters is, and which types of controllers there are to rewrite them to."""
+"""Tables of ROS parameters for one type of controller."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from pydantic import BaseModel
 from manipcli.spec.source.tree import MappingNode, Plain, Scalar
 
 Words = Mapping[str, str]
-"""What a type of ROS implies: our key -> its value; several values are separated by blanks."""
+"""Values that a ROS type implies: our key -> value; several values are separated by blanks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """The parameters of one block, as ROS knows them. Names that the spec has, too, need not stand here.
+    """The ROS parameters of one block. Names that our spec has need not be listed.
 
     Attributes:
-        known: names. Without a field in the spec they are left out with a warning.
-        quiet: those of which only a note is made, for they are about publishing or reading.
+        known: names; those without a field in the spec are left out with a warning.
+        quiet: names that are left out with a note only, since they concern publishing or reading.
         renamed: ROS's name -> ours.
         inner: blocks below, by key.
-        joint: the block of every other mapping: one a joint.
-        neutral: values that say no more than if the key were absent, as dumps of parameters have them.
-        unserved: values that ROS knows for a key and manipcli does not.
-        most: what a tolerance may be; one that is larger is never missed, and left out with a warning.
-        filled: lists that are not to be empty, though ours may be.
+        joint: the block of every other mapping: one per joint.
+        neutral: values with the same effect as a missing key, as in parameter dumps.
+        unserved: values of a key that ROS supports and manipcli does not.
+        most: largest tolerance; a larger one is left out with a warning.
+        filled: lists that must not be empty, though ours may be.
     """
 
     known: frozenset[str] = frozenset()
@@ -42,7 +42,7 @@ class Block:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Everything that ROS knows here."""
+        """All ROS parameters of the block."""
         return (*self.known, *self.quiet, *self.renamed, *self.inner)
 
 
@@ -52,17 +52,17 @@ def _same(node: MappingNode) -> MappingNode:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One type of ours, and ROS's that are rewritten to it.
+    """One of our types, and the ROS types that are rewritten to it.
 
     Attributes:
-        own: the word under `type`.
-        types: ROS's name -> what it implies.
-        parameters: of all of them.
-        reshape: controller after renaming -> what no table can say.
-        idle: command interface -> keys of ours that do nothing on it.
-        interface: ROS's key whose value may be an interface of any hardware; with one that manipcli does not have, the
-            controller is left out with a warning.
-        needs: a key without which ROS's block does not say enough; then it is left out with a warning.
+        own: our type.
+        types: ROS type -> values that it implies.
+        parameters: ROS parameters of all these types.
+        reshape: restructures a controller after renaming.
+        idle: command interface -> our keys that have no effect on it.
+        interface: ROS key that names a hardware interface; a controller with an interface that manipcli does not have
+            is left out with a warning.
+        needs: required key; a controller without it is left out with a warning.
     """
 
     own: str
@@ -75,7 +75,7 @@ class Table:
 
 
 def model_below(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:
-    """The model of what stands under `key`, or of each value of a mapping there; None for anything else."""
+    """The model under `key`, or of each value of a mapping there; None for anything else."""
     found = None if model is None else model.model_fields.get(key)
     return None if found is None else _model_in(found.annotation)
 
@@ -88,5 +88,5 @@ def _model_in(annotation: object) -> type[BaseModel] | None:
 
 
 def value(word: str) -> Scalar:
-    """What a word of `Words` says."""
+    """The value of a word of `Words`."""
     return {"true": True, "false": False}.get(word, word)

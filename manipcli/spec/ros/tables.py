@@ -1,6 +1,6 @@
-"""The tables: what ros_controllers and ros2_controllers know, a type of controller each.
+"""Tables of the parameters of ros_controllers and ros2_controllers, one per type of controller.
 
-Sources: the parameter definitions of ros2_controllers and what the controllers of ros_controllers read.
+Sources: the parameter definitions of ros2_controllers and the source code of ros_controllers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from manipcli.spec.ros.table import Block, Table
 from manipcli.spec.source.tree import Plain
 
 _EVERYWHERE: Final = frozenset({"use_sim_time", "publish_state", "state_publish_rate", "publish_rate"})
-"""About publishing and clocks: every log has every tick, and simulated time is the only one."""
+"""Parameters of publishing and clocks, without effect here: a log has every tick, and time is simulated."""
 _ANY: Final = frozenset(
     {"is_async", "async_parameters", "thread_priority", "cpu_affinity", "fallback_controllers", "params_file"}
 )
@@ -23,7 +23,7 @@ _NEUTRAL: Final[dict[str, tuple[Plain, ...]]] = {
     "is_async": (False,), "fallback_controllers": ([],), "params_file": ([], ""), "cpu_affinity": ([],),
     "update_rate": (0,),
 }  # fmt: skip
-"""In ROS 2 an update rate of 0 is that of the manager."""
+"""In ROS 2 an update rate of 0 means the rate of the manager."""
 _GAINS: Final = Block(
     known=frozenset(
         {
@@ -46,7 +46,7 @@ _WIDEST: Final = dict.fromkeys(("trajectory", "goal"), bounds_of(JointTolerance,
 JOINT_TRAJECTORY: Final = Table(
     own="joint_trajectory",
     types={
-        **{f"{one}_controllers/JointTrajectoryController": {"command_interfaces": one} for one in INTERFACES},
+        **{f"{name}_controllers/JointTrajectoryController": {"command_interfaces": name} for name in INTERFACES},
         "pos_vel_controllers/JointTrajectoryController": {"command_interfaces": "position velocity"},
         "pos_vel_acc_controllers/JointTrajectoryController": {"command_interfaces": "position velocity acceleration"},
         "joint_trajectory_controller/JointTrajectoryController": {},
@@ -150,7 +150,7 @@ JOINT_STATES: Final = Table(
         renamed={"interfaces": "state_interfaces"},
         neutral=_NEUTRAL | {
             "state_interfaces": ([],), "joints": ([],), "extra_joints": ([],),
-            "map_interface_to_joint_state": ({one: one for one in INTERFACES},),
+            "map_interface_to_joint_state": ({name: name for name in INTERFACES},),
         },
     ),
 )  # fmt: skip
@@ -189,7 +189,7 @@ ELSEWHERE: Final = frozenset(name for table in TABLES for name in table.paramete
     "static_covariance_linear_acceleration", "static_covariance_orientation", "tf", "wheel_radius",
     "wheel_separation",
 }  # fmt: skip
-"""What ROS knows of some controller, served or not; one that does not know it ignores it."""
+"""Parameters of any ROS controller, supported here or not; other controllers ignore them."""
 
 UNSERVED_TYPES: Final = frozenset(
     {
@@ -218,10 +218,10 @@ UNSERVED_TYPES: Final = frozenset(
         "velocity_controllers/ScaledJointTrajectoryController",
     }
 )
-"""Controllers that ROS has and manipcli does not: left out with a warning."""
+"""ROS controllers that manipcli does not support: left out with a warning."""
 
 PACKAGES: Final = frozenset(word.partition("/")[0] for word in (*BY_TYPE, *UNSERVED_TYPES)) | {"gripper_controllers"}
-"""ROS's own packages of controllers: all their types are known. Any other package is a vendor's."""
+"""ROS's own packages of controllers, whose types are all listed. Any other package is a vendor's."""
 
 MANAGER: Final = Block(
     known=frozenset(
@@ -251,4 +251,4 @@ OTHER_NODES: Final = frozenset(
         "ros_control_namespace", "rviz2", "servo_node", "sim_control_mode", "trajectory_execution", "use_sim_time",
     }
 )  # fmt: skip
-"""What else stands in files of ROS that hold controllers, and is none."""
+"""Other blocks of ROS files with controllers."""

@@ -1,4 +1,4 @@
-"""Parameters below `/**` or `/*`: every node of a namespace has them, unless it says otherwise itself."""
+"""ROS 2 wildcard parameters (`/**`, `/*`): defaults for every node of a namespace."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from manipcli.spec.ros.tables import BY_TYPE, MANAGER
 from manipcli.spec.source.tree import Entry, MappingNode, Node, ScalarNode, SequenceNode
 
 _BY_JOINT = ("gains", "constraints")
-"""Blocks with one block a joint, of which a controller reads those of its own joints."""
+"""Blocks with one block per joint; a controller reads those of its own joints."""
 
 
 class Wildcards:
-    """Those of one file, with what stands there for no controller left out; and which of them one has taken."""
+    """The wildcard parameters of one file, without those of other nodes; `taken`: keys that a controller uses."""
 
     def __init__(self, found: list[Found], models: Mapping[str, type[ControllerSpec]]) -> None:
         self.models = models
-        self.shared = [Found(one.path, one.key_place, _without_controllers(one.node)) for one in found]
+        self.shared = [Found(block.path, block.key_place, _without_controllers(block.node)) for block in found]
         self.taken: set[str] = set()
 
     def given(self, controller: Found) -> Found:
-        """The controller, with what it has from all; without a type when nothing says one."""
+        """The controller with its wildcard parameters; unchanged if it has no type."""
         shared = MappingNode({}, controller.key_place)
-        for one in self.shared:
-            space = one.path[:-1]
+        for block in self.shared:
+            space = block.path[:-1]
             if controller.path[: len(space)] == space:
-                shared = merged(shared, mapping(one.node))
+                shared = merged(shared, mapping(block.node))
         own = mapping(controller.node)
         both = merged(shared, own)
         if not has_type(both):
@@ -41,7 +41,7 @@ class Wildcards:
         return Found(controller.path, controller.key_place, merged(MappingNode(takes, own.place), own))
 
     def takes(self, node: MappingNode, key: str) -> bool:
-        """Whether a controller of this type reads it; of types that are not served nobody knows."""
+        """Whether a controller of this type reads the key; True for unsupported types, whose keys are unknown."""
         word = node.get("type")
         kind = str(word.value) if isinstance(word, ScalarNode) else ""
         table = BY_TYPE.get(kind)
@@ -50,24 +50,24 @@ class Wildcards:
         return model is None or key in model.model_fields or key in names
 
     def left(self) -> list[tuple[Found, str, Entry]]:
-        """What no controller has taken: where it stands, its name, and what is said."""
+        """Parameters that no controller uses: their block, key and entry."""
         return [
-            (one, key, entry)
-            for one in self.shared
-            for key, entry in mapping(one.node).entries.items()
+            (block, key, entry)
+            for block in self.shared
+            for key, entry in mapping(block.node).entries.items()
             if key not in self.taken
         ]
 
 
 def _without_controllers(node: Node) -> MappingNode:
-    """Without the blocks of controllers and the parameters of their manager."""
+    """The node without blocks of controllers and parameters of their manager."""
     entries = mapping(node).entries
     of_others = [key for key, entry in entries.items() if has_type(entry.node) or key in MANAGER.names]
     return mapping(node).without(*of_others)
 
 
 def _joints(node: MappingNode) -> frozenset[str] | None:
-    """The joints of a controller, where they are listed."""
+    """The joints that a controller lists; None without a list."""
     joints = node.get("joints")
     if not isinstance(joints, SequenceNode):
         return None

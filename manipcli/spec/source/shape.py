@@ -1,4 +1,4 @@
-"""Which types may stand at a path of a model: asked for the keys a block knows and what a value should have been."""
+"""Types allowed at a path of a pydantic model, for messages: known keys and expected values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manipcli.core.errors import Loc
 
 
 def alternatives(annotation: object) -> list[tuple[object, str | None]]:
-    """The members of a union, flattened, each with its tag; a type that is no union stands alone."""
+    """The members of a union, flattened, each with its tag; any other type is its own single member."""
     if isinstance(annotation, TypeAliasType):
         return alternatives(annotation.__value__)
     origin = get_origin(annotation)
@@ -28,12 +28,12 @@ def alternatives(annotation: object) -> list[tuple[object, str | None]]:
 
 
 def at(model: type[BaseModel], path: Loc, tags: Mapping[int, str]) -> list[object]:
-    """The types that may stand at `path`.
+    """The types allowed at `path`.
 
     Args:
-        model: of the whole file.
+        model: model of the whole file.
         path: keys and indices.
-        tags: for a depth of the path, which member of a union there is meant (pydantic's name of it).
+        tags: pydantic's name of the chosen union member, by depth of the path.
     """
     found: list[tuple[object, str | None]] = [(model, None)]
     for depth, part in enumerate(path):
@@ -42,7 +42,7 @@ def at(model: type[BaseModel], path: Loc, tags: Mapping[int, str]) -> list[objec
 
 
 def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
-    """The keys that these types know, with their fields."""
+    """The keys of these types, with their fields."""
     return {
         field.alias or name: field
         for kind in kinds
@@ -52,13 +52,13 @@ def keys_of(kinds: Sequence[object]) -> dict[str, FieldInfo]:
 
 
 def is_of_fixed_length(kinds: Sequence[object]) -> bool:
-    """Whether all lists among the types have a length, and the same."""
+    """Whether all lists among the types have the same fixed length."""
     any_length = any(get_origin(kind) is list or get_args(kind)[-1:] == (Ellipsis,) for kind in kinds)
     return not any_length and len({len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple}) == 1
 
 
 def takes_any_key(kinds: Sequence[object]) -> bool:
-    """Whether one of the types is a mapping of names that the user chooses."""
+    """Whether one of the types is a mapping with user-defined keys."""
     return any(get_origin(kind) is dict for kind in kinds)
 
 

@@ -1,4 +1,4 @@
-"""What a file says, as a tree whose every key and value knows its place."""
+"""Tree of a YAML file, with the place of every key and value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Plain = Scalar | list["Plain"] | dict[str, "Plain"]
 
 @dataclass(frozen=True, slots=True)
 class ScalarNode:
-    """A text, number, truth value or nothing. `written`: the expression that it was computed from."""
+    """A string, number, boolean or null. `written`: the expression that it was computed from."""
 
     value: Scalar
     place: Place
@@ -23,7 +23,7 @@ class ScalarNode:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What stands under a key, and where the key stands."""
+    """The node under a key, and the place of the key."""
 
     key_place: Place
     node: Node
@@ -31,7 +31,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class MappingNode:
-    """Keys in the order of the file."""
+    """A mapping, with keys in the order of the file."""
 
     entries: dict[str, Entry]
     place: Place
@@ -41,11 +41,11 @@ class MappingNode:
         return None if entry is None else entry.node
 
     def with_entry(self, key: str, entry: Entry) -> MappingNode:
-        """A copy in which `entry` stands under `key`."""
+        """A copy with `entry` under `key`."""
         return MappingNode({**self.entries, key: entry}, self.place)
 
     def with_node(self, key: str, node: Node) -> MappingNode:
-        """A copy with `node` under a key, which keeps the place that it has."""
+        """A copy with `node` under `key`; an existing key keeps its place."""
         old = self.entries.get(key)
         return self.with_entry(key, Entry(node.place if old is None else old.key_place, node))
 
@@ -66,7 +66,7 @@ Node = ScalarNode | MappingNode | SequenceNode
 
 
 def plain(node: Node) -> Plain:
-    """The data alone."""
+    """The plain data, without places."""
     if isinstance(node, MappingNode):
         return {key: plain(entry.node) for key, entry in node.entries.items()}
     if isinstance(node, SequenceNode):
@@ -75,7 +75,7 @@ def plain(node: Node) -> Plain:
 
 
 def mapped(node: Node, change: Callable[[ScalarNode, Loc], Node], path: Loc = ()) -> Node:
-    """The tree with `change(scalar, its path)` in the place of each scalar."""
+    """The tree with each scalar replaced by `change(scalar, path)`."""
     if isinstance(node, MappingNode):
         entries = {k: Entry(e.key_place, mapped(e.node, change, (*path, k))) for k, e in node.entries.items()}
         return MappingNode(entries, node.place)
@@ -85,7 +85,7 @@ def mapped(node: Node, change: Callable[[ScalarNode, Loc], Node], path: Loc = ()
 
 
 def child(node: Node, part: str | int) -> Node | None:
-    """What stands one step below, or None."""
+    """The child under a key or index, or None."""
     if isinstance(node, MappingNode):
         return node.get(part) if isinstance(part, str) else None
     if isinstance(node, SequenceNode) and isinstance(part, int) and 0 <= part < len(node.items):
@@ -94,7 +94,7 @@ def child(node: Node, part: str | int) -> Node | None:
 
 
 def node_at(root: Node, path: Loc) -> Node:
-    """The node at `path`, or the deepest one on the way to it."""
+    """The node at `path`, or the deepest existing node along it."""
     node = root
     for part in path:
         below = child(node, part)
@@ -105,7 +105,7 @@ def node_at(root: Node, path: Loc) -> Node:
 
 
 def key_place_at(root: Node, path: Loc) -> Place:
-    """Where the last key of `path` stands; the place of the deepest node on the way where there is no such key."""
+    """Place of the last key of `path`; without such a key, of the deepest existing node along it."""
     parent = node_at(root, path[:-1])
     if path and isinstance(parent, MappingNode) and isinstance(path[-1], str) and path[-1] in parent.entries:
         return parent.entries[path[-1]].key_place
@@ -113,7 +113,7 @@ def key_place_at(root: Node, path: Loc) -> Place:
 
 
 def without(root: MappingNode, path: Loc) -> MappingNode:
-    """A copy without what `path` leads to; where it leads nowhere, without the block that it last leads into."""
+    """A copy without the node at `path`; if it is missing, without the deepest existing block along it."""
     key = path[0]
     below = child(root, key)
     if below is None or not isinstance(key, str):
@@ -124,7 +124,7 @@ def without(root: MappingNode, path: Loc) -> MappingNode:
 
 
 def dotted(path: Loc) -> str:
-    """`scene.cup.mass`, `steps[3].move.to`."""
+    """The path as text: `scene.cup.mass`, `steps[3].move.to`."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{escape(part)}" if text else escape(part)
@@ -132,7 +132,7 @@ def dotted(path: Loc) -> str:
 
 
 def shown(node: Node) -> str:
-    """What was given, short enough for a message."""
+    """A short description of a node for messages."""
     if isinstance(node, MappingNode):
         return f"a mapping with the keys {listed(node.entries, most=5)}" if node.entries else "an empty mapping"
     if isinstance(node, SequenceNode):

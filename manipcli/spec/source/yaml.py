@@ -1,8 +1,8 @@
-"""YAML 1.2 text to a tree of places, by a composer of our own.
+"""YAML 1.2 parser that returns a tree with places.
 
-PyYAML only cuts the text into events here. Its resolver and constructors, which other libraries extend for the whole
-process, are never asked: a plain scalar is read by the core schema of YAML 1.2 below (`1e-3` is a number, `on` a
-word, `010` ten, `12:30` a text), and nothing in a file can name code.
+PyYAML only splits the text into events. Its resolver and constructors, which other libraries extend for the whole
+process, are not used: plain scalars follow the core schema of YAML 1.2 (`1e-3` is a number, `on` a string, `010` ten,
+`12:30` a string), and no file can name code.
 
 | code | mistake |
 |---|---|
@@ -12,12 +12,12 @@ word, `010` ten, `12:30` a text), and nothing in a file can name code.
 | YAML103 | the file is larger than 10 MB |
 | YAML104 | a `!tag` |
 | YAML105 | more than one document |
-| YAML106 | a key stands twice in one mapping |
+| YAML106 | a duplicate key in a mapping |
 | YAML107 | more than 100,000 values, aliases expanded |
 | YAML108 | nested deeper than 64 |
-| YAML109 | an alias to an unknown anchor, or one that contains itself |
-| YAML110 | a key that is no text |
-| YAML111 | infinity, not-a-number, or a number too long to be one |
+| YAML109 | an alias to an unknown anchor, or to an anchor around it |
+| YAML110 | a key that is not a string |
+| YAML111 | infinity, not-a-number, or a number out of range |
 | YAML112 | a merge key `<<` without a mapping |
 """
 
@@ -53,18 +53,20 @@ _NOT_FINITE = re.compile(_INFINITE.pattern + r"|\.(nan|NaN|NAN)")
 _LONGEST_NUMBER = 400
 
 
-def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Diagnostic] | None = None) -> Node | None:
-    """The tree of one YAML document; None when there is nothing but comments.
+def parse(
+    data: bytes | str, name: str, *, infinite: bool = False, reported: list[Diagnostic] | None = None
+) -> Node | None:
+    """Parses one YAML document; None if it holds only comments.
 
     Args:
-        data: the file's bytes, or its text.
-        name: what places call the file.
-        infinite: take `.inf` as a number, for the files of others, who write it where there is no limit.
-        told: gets what is wrong with single keys and values, instead of raising it. A value that is no number is
-            nothing then, and of two keys the first counts.
+        data: bytes or text of the file.
+        name: name of the file in places.
+        infinite: accept `.inf` as a number; ROS files write it for "no limit".
+        reported: list that receives the errors of single keys and values, which are then not raised. An invalid number
+            is then null, and the first of duplicate keys is used.
 
     Raises:
-        InvalidInput: with every finding up to the first syntax error.
+        InvalidInput: with all findings up to the first syntax error.
     """
     if len(data) > MAX_BYTES:
         raise _refusal("YAML103", f"the file is larger than {MAX_BYTES // 1_000_000} MB", Place(name, 1, 1))
@@ -82,10 +84,10 @@ def parse(data: bytes | str, name: str, *, infinite: bool = False, told: list[Di
         if not isinstance(error, _Limit):
             composer.findings.append(_syntax_finding(error, text, name))
         raise InvalidInput(composer.findings) from None
-    if composer.findings and told is None:
+    if composer.findings and reported is None:
         raise InvalidInput(composer.findings)
-    if told is not None:
-        told += composer.findings
+    if reported is not None:
+        reported += composer.findings
     return root
 
 
@@ -103,7 +105,7 @@ def _decode(data: bytes, name: str) -> str:
         before = data[: error.start].decode("utf-8").removeprefix("\ufeff")
         hint = "the file looks like latin-1; save it as UTF-8: iconv -f latin1 -t utf-8"
         if b"\0" in data:
-            hint = "this is a binary file, and no YAML"
+            hint = "this is a binary file, not YAML"
         message = f"the byte 0x{data[error.start]:02x} is not UTF-8"
         raise _refusal("YAML101", message, _place_at(before, len(before), name), hint) from None
 
@@ -116,13 +118,13 @@ def _place_at(text: str, index: int, name: str) -> Place:
 
 
 def _events(text: str) -> Iterator[yaml.Event]:
-    """PyYAML's parser alone: libyaml's where the wheel has it, else the Python one."""
+    """Events of PyYAML's parser: libyaml if the wheel has it, else pure Python."""
     return yaml.parse(text, Loader=yaml.CBaseLoader if yaml.__with_libyaml__ else yaml.BaseLoader)
 
 
 _CLEARER: tuple[tuple[str, str, str | None], ...] = (
-    ("tab", "a tab where only spaces may indent", "YAML indents with spaces"),
-    ("mapping values are not allowed", "a ':' where none may stand", "quote the text, or check the line above it"),
+    ("tab", "a tab in the indentation", "indent with spaces"),
+    ("mapping values are not allowed", "unexpected ':'", "quote the text, or check the line above it"),
     ("did not find expected ',' or ']'", "a '[' is not closed, or a ',' is missing", None),
     ("did not find expected ',' or '}'", "a '{' is not closed, or a ',' is missing", None),
     ("found unexpected end of stream", "a quote is not closed", None),
@@ -144,7 +146,7 @@ def _syntax_finding(error: yaml.YAMLError, text: str, name: str) -> Diagnostic:
             problem = "tab"
         else:
             message = f"'{shorten(character)}' cannot begin a value"
-            return _syntax(message, "quote the text that begins with it", excerpt, Place(name, line + 1, column + 1))
+            return _syntax(message, "quote the text", excerpt, Place(name, line + 1, column + 1))
     opened = getattr(error, "context_mark", None)
     for words, message, hint in _CLEARER:
         if words not in problem:
@@ -166,7 +168,7 @@ def _syntax(message: str, hint: str | None, excerpt: str, place: Place) -> Diagn
 
 @dataclass(frozen=True, slots=True)
 class _Composed:
-    """A node with what it costs when an alias repeats it."""
+    """A node with its number of values and its depth, for limits on aliases."""
 
     node: Node
     count: int
@@ -174,7 +176,7 @@ class _Composed:
 
 
 class _Limit(yaml.YAMLError):
-    """Ends the reading; its finding is already told."""
+    """Stops parsing; its finding is already in the list."""
 
 
 @dataclass(slots=True)
@@ -193,7 +195,9 @@ class _Composer:
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    self.stop("YAML105", "a second document begins", event, "one file holds one document: remove '---'")
+                    self.stop(
+                        "YAML105", "a second document in one file", event, "remove '---': a file holds one document"
+                    )
             elif isinstance(event, yaml.NodeEvent):
                 composed = self.node(event, events, depth=1)
                 root = composed.node
@@ -207,11 +211,11 @@ class _Composer:
         self.count(1, event)
         tag = getattr(event, "tag", None)
         if tag is not None:
-            self.tell(
+            self.report(
                 "YAML104",
                 f"the tag '{shorten(tag.replace('tag:yaml.org,2002:', '!!'))}' is not allowed",
                 event,
-                "plain values need no tag; quotes make a text",
+                "remove the tag; quote a value to make it a string",
             )
         anchor = getattr(event, "anchor", None)
         if anchor is not None:
@@ -233,7 +237,7 @@ class _Composer:
             self.stop("YAML109", f"the alias '*{shorten(anchor)}' has no anchor before it", event)
         target = self.anchors[anchor]
         if target is None:
-            self.stop("YAML109", f"the alias '*{shorten(anchor)}' stands inside its own anchor", event)
+            self.stop("YAML109", f"the alias '*{shorten(anchor)}' is inside its own anchor", event)
         if depth + target.height - 1 > MAX_DEPTH:
             self.stop("YAML108", f"nested deeper than {MAX_DEPTH} once the alias is expanded", event)
         self.count(target.count, event)
@@ -274,21 +278,21 @@ class _Composer:
         return self.composed(MappingNode(entries, self.place(event)), parts)
 
     def key(self, event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> str | None:
-        """The key as written: `010:` and `on:` are texts; None, and a finding, for what is no text."""
+        """The key as written (`010:` and `on:` are strings); None, with a finding, if it is not a string."""
         composed = self.node(event, events, depth=depth + 1)
         if isinstance(composed.node, ScalarNode) and isinstance(event, yaml.ScalarEvent):
             if event.value or not event.implicit[0]:
                 return str(event.value)
-            self.tell("YAML110", "a key is missing before ':'", event)
+            self.report("YAML110", "a key is missing before ':'", event)
         else:
-            self.tell("YAML110", "a key must be a text", event, "an alias, a list or a mapping cannot be a key")
+            self.report("YAML110", "a key must be a string", event, "an alias, a list or a mapping cannot be a key")
         return None
 
     def merge(self, node: Node, merged: dict[str, Entry], event: yaml.Event) -> None:
         sources = node.items if isinstance(node, SequenceNode) else (node,)
         for source in sources:
             if not isinstance(source, MappingNode):
-                self.tell("YAML112", "'<<' merges a mapping or a list of mappings", event, "write `<<: *anchor`")
+                self.report("YAML112", "'<<' needs a mapping or a list of mappings", event, "write `<<: *anchor`")
                 return
             for key, entry in source.entries.items():
                 merged.setdefault(key, entry)
@@ -309,13 +313,13 @@ class _Composer:
         if self.infinite and _INFINITE.fullmatch(text):
             return -math.inf if text.startswith("-") else math.inf
         if _NOT_FINITE.fullmatch(text):
-            self.tell("YAML111", f"'{text}' is not a finite number", event, "write a finite number")
+            self.report("YAML111", f"'{text}' is not a finite number", event, "write a finite number")
             return None
         if whole or based or _FLOAT.fullmatch(text):
             value = math.inf if len(text) > _LONGEST_NUMBER or number is not None else float(text)
             if math.isfinite(value):
                 return value
-            self.tell("YAML111", f"'{shorten(text, width=24)}' is too large to be a number", event)
+            self.report("YAML111", f"'{shorten(text, width=24)}' exceeds the largest number, 1.8e308", event)
             return None
         return text
 
@@ -334,12 +338,12 @@ class _Composer:
         return Place(self.name, mark.line + 1, mark.column + 1)
 
     def duplicate(self, key: str, second: Place, first: Place) -> None:
-        message = f"the key '{shorten(key)}' stands twice in this mapping: lines {first.line} and {second.line}"
+        message = f"duplicate key '{shorten(key)}': lines {first.line} and {second.line}"
         self.findings.append(Diagnostic("YAML106", message, second, hint="remove one of them"))
 
-    def tell(self, code: str, message: str, event: yaml.Event, hint: str | None = None) -> None:
+    def report(self, code: str, message: str, event: yaml.Event, hint: str | None = None) -> None:
         self.findings.append(Diagnostic(code, message, self.place(event), hint=hint))
 
     def stop(self, code: str, message: str, event: yaml.Event, hint: str | None = None) -> NoReturn:
-        self.tell(code, message, event, hint)
+        self.report(code, message, event, hint)
         raise _Limit

@@ -103,7 +103,7 @@ def test_a_finding_in_a_macro_names_the_outermost_and_the_innermost_call(tmp_pat
         encoding="utf-8",
     )
     (finding,) = [each for each in examine(path, packages=Packages(path)).findings if "twice" in each.message]
-    assert (finding.hint or "").endswith(f"expanded from {path}:7:1, in it from {path}:4:42")
+    assert (finding.hint or "").endswith(f"expanded from {path}:7:1, then from {path}:4:42")
     assert finding.place is not None
     assert (finding.place.line, finding.place.column) == (3, 44)
 
