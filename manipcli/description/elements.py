@@ -18,7 +18,7 @@ JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """`mass` [kg]; `X_LI`: inertial frame I (origin at the centre of mass) in the link; `inertia` (3, 3) [kg m2] in I."""
+    """`mass` [kg]; `X_LI`: inertial frame I in the link, at the centre of mass; `inertia` (3, 3) [kg m2] in I."""
 
     mass: float
     X_LI: Transform

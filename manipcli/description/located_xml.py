@@ -139,7 +139,7 @@ def parse_document(data: bytes, file: str) -> Document:
     except expat.ExpatError as error:
         message, place, hint = _described(error, data, file)
         begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
-        other = None if begins in (b"<", b"") else "not an XML file; for robot, controller and task files: `manipcli check`"
+        other = None if begins in (b"<", b"") else "not XML; for robot, controller and task files use `manipcli check`"
         raise invalid("URDF001", message, place, other or hint or _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
         raise invalid("URDF001", f"not valid XML: {error}", Place(file, 1, 1)) from error
@@ -170,9 +170,7 @@ def _described(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, s
             return "unresolved merge conflict", place, "keep one side, and delete the '<<<<<<<' markers"
         byte = None if _DECLARED.match(data) else _not_utf8(data, file)
         if byte is not None and byte[1].line == error.lineno:
-            hint = (
-                'save it as UTF-8: iconv -f latin1 -t utf-8; or declare its encoding: <?xml version="1.0" encoding=...?>'
-            )
+            hint = 'save it as UTF-8: iconv -f latin1 -t utf-8; or declare it: <?xml version="1.0" encoding=...?>'
             return byte[0], byte[1], hint
         if here == b"<":
             hint = "write < as &lt; inside a value, or close the quote before it"

@@ -123,9 +123,7 @@ class Packages:
         if name in self._found:
             return self._found[name]
         if not name or name.startswith(".") or any(character in name for character in "/\\\0"):
-            raise NotFound(
-                f"'{name}' is not a valid package name", hint="write package://NAME/path or $(find NAME)"
-            )
+            raise NotFound(f"'{name}' is not a valid package name", hint="write package://NAME/path or $(find NAME)")
         searched = self._candidates(name)
         found = next((folder for folder in searched if folder.is_dir()), None)
         found = found or self._crawled(name) or _installed_package(name)

@@ -1,15 +1,13 @@
-"""The one definition of a grasp: what presses on an object, what pinches it, and what the hand carries.
-
-Three questions, three names:
+"""Definition of a grasp: pressing links, pinched objects and carried objects.
 
 - *pressing*: the links of the robot that touch an object with force.
-- *pinched*: at least two links press, each with at least `GRIP_FORCE`. The conditions `grasped` and `slip` and the end
-  of `release` ask this. It needs contacts only.
+- *pinched*: at least two links press, each with at least `GRIP_FORCE`. Used by the conditions `grasped` and `slip` and
+  by the end of `release`; needs contacts only.
 - *carried*: a link presses, and the object has followed at least `FOLLOWS` of the hand's motion since `Grasp.begin`.
-  Every step that ends with an object in the hand asks this, and so does planning again. It needs poses, too.
+  Used by every step that ends with an object in the hand, and by re-planning; needs contacts and poses.
 
-`slip` (condition) and the grasp intervals of a report ask other questions: how far a pinched object moved in the hand,
-and when a log shows an object pressed and without support. Both build on `pressing`.
+The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
+moved in the hand, an interval is the time in which an object is pressed and has no other support.
 """
 
 from __future__ import annotations
@@ -29,17 +27,17 @@ LINK: Final = "robot/"
 GRIP_FORCE: Final = 0.1
 """[N] Least force of each of the two links that pinch an object."""
 BRIDGED: Final = 0.05
-"""[s] A contact that is lost for less is not lost."""
+"""[s] Shorter gaps in a contact are ignored."""
 FOLLOWS: Final = 0.5
-"""Share of the hand's motion that a carried object follows at least."""
+"""Least share of the hand's motion that a carried object follows."""
 STILL: Final = 1e-3
-"""[m] A hand that moved less has not moved: the servo error of an arm at rest."""
+"""[m] Smaller motions of the hand are ignored: the servo error of an arm at rest."""
 MISPLACED: Final = 0.05
-"""[m] An object further than this from its planned place in the hand is not carried, whatever touches it."""
+"""[m] An object further than this from its planned pose in the hand is not carried."""
 
 
 def pressing(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
-    """How hard each link of the robot presses on a body [N], the hardest first."""
+    """(force [N], link) of each link of the robot that presses on a body, the largest force first."""
     found: dict[str, float] = {}
     for contact in contacts:
         other = contact.b if contact.a == body else contact.a if contact.b == body else ""
@@ -49,16 +47,16 @@ def pressing(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
 
 
 def pinch_force(contacts: Sequence[Contact], body: str) -> float:
-    """The force [N] of the second hardest link on a body; 0 where fewer than two press."""
+    """The second largest force [N] of a link on a body; 0 if fewer than two links press."""
     found = pressing(contacts, body)
     return found[1][0] if len(found) > 1 else 0.0
 
 
 class Grasp:
-    """Follows the object in the hand, to decide whether the hand carries it.
+    """Tracks the object in the hand to decide whether the hand carries it.
 
     Args:
-        kinematics, scene: of the world that is measured.
+        kinematics, scene: of the measured world.
     """
 
     def __init__(self, kinematics: Kinematics, scene: Scene) -> None:
@@ -71,7 +69,7 @@ class Grasp:
         self._pressed_at = -np.inf
 
     def begin(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> None:
-        """From now on the motion counts: at the end of a closing motion, and when a step begins with a full hand."""
+        """Starts tracking: at the end of a closing motion, or when a step begins with an object in the hand."""
         self._carried = carried
         self._k = self._scene.movable.index(self._scene.body(carried.body))
         self._start = self._centre(state)
@@ -81,7 +79,7 @@ class Grasp:
         self.look(state, contacts)
 
     def look(self, state: WorldState, contacts: Sequence[Contact]) -> None:
-        """The world now; to be called at least every `BRIDGED` while the hand moves."""
+        """Updates with the current world; call it at least every `BRIDGED` while the hand moves."""
         if self._carried is None:
             return
         if pressing(contacts, self._carried.body):
@@ -89,34 +87,34 @@ class Grasp:
         self._travel = max(self._travel, float(np.linalg.norm(self._moved_with_hand(state))))
 
     def lost(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> str:
-        """Why the hand does not carry this object now; "" where it does."""
+        """Why the hand does not carry this object now; "" if it does."""
         if self._carried is None or self._carried.body != carried.body:
             self.begin(carried, state, contacts)
         self.look(state, contacts)
         hand = self._moved_with_hand(state)
         length = float(np.linalg.norm(hand))
-        way = hand / length if length > STILL else np.zeros(3)
+        direction = hand / length if length > STILL else np.zeros(3)
         object_moved = self._centre(state) - self._start
-        behind = float((hand - object_moved) @ way) > (1.0 - FOLLOWS) * max(self._travel, length)
+        behind = float((hand - object_moved) @ direction) > (1.0 - FOLLOWS) * max(self._travel, length)
         why = []
         if float(state.time) - self._pressed_at > BRIDGED:
-            why.append("no link of the robot presses on it")
+            why.append("no robot link presses on it")
         if behind:
-            lifted = way[2] > 0.7
-            verb, along = ("rose", object_moved[2]) if lifted else ("moved", object_moved @ way)
+            lifted = direction[2] > 0.7
+            verb, along = ("rose", object_moved[2]) if lifted else ("moved", object_moved @ direction)
             hand_moved = hand[2] if lifted else length
             why.append(f"it {verb} {_mm(float(along))} while the tool {verb} {_mm(float(hand_moved))}")
         off = float(np.linalg.norm(self._pose(state, carried).p - carried.X_LO.p))
         if off > MISPLACED and not behind:
-            why.append(f"it is {_mm(off)} from its place in the hand")
+            why.append(f"it is {_mm(off)} from its planned pose in the hand")
         return ", ".join(why)
 
     def _moved_with_hand(self, state: WorldState) -> Array:
-        """(3,) motion [m] of the object's centre since `begin` if it did not move in the hand."""
+        """(3,) motion [m] of the object's centre since `begin` if it had moved rigidly with the hand."""
         return np.asarray(self._link(state).apply(self._X_LC) - self._start)
 
     def _link(self, state: WorldState) -> Transform:
-        assert self._carried is not None  # callers ask it first
+        assert self._carried is not None  # callers check it first
         return self._kinematics.forward(state.position, self._carried.link)
 
     def _object(self, state: WorldState) -> Transform:
@@ -126,7 +124,7 @@ class Grasp:
         return self._object(state).apply(self._scene.movable[self._k].centre)
 
     def _pose(self, state: WorldState, carried: Carried) -> Transform:
-        """X_LO of the object as it is measured."""
+        """Measured X_LO of the object."""
         return self._kinematics.forward(state.position, carried.link).inverse() @ self._object(state)
 
 

@@ -69,7 +69,9 @@ def inspect(
     """
     bounds()
     if not os.path.lexists(path):
-        raise InvalidInput([Diagnostic("USE101", "the file does not exist", Place(str(path), 0, 0), hint=sibling(path))])
+        raise InvalidInput(
+            [Diagnostic("USE101", "the file does not exist", Place(str(path), 0, 0), hint=sibling(path))]
+        )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     examination = examine(path, packages=packages, arguments=arguments, allow_env=allow_env)
     if examination.description is None or examination.parts is None:

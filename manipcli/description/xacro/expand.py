@@ -376,7 +376,7 @@ class _Expansion:
         return everything | {
             "python": namespace(plain),
             "math": namespace(math_symbols()),
-            "xacro": namespace({**own, ***messages, "tokenize": _tokenize, "arg": self._argument}),
+            "xacro": namespace({**own, **messages, "tokenize": _tokenize, "arg": self._argument}),
         }
 
 

@@ -7,7 +7,8 @@ from typing import Final
 
 from manipcli.core.text import any_of, nearest
 
-_XACRO_TAGS: Final = ("arg", "attribute", "call", "element", "if", "include", "insert_block", "macro", "property", "unless")
+_TAGS: Final = ("arg", "attribute", "call", "element", "if", "include", "insert_block", "macro", "property", "unless")
+
 
 class UnknownArgument(NameError):
     """`$(arg NAME)` of an argument without a value and a default."""
@@ -38,5 +39,5 @@ def near_name(error: NameError, known: Collection[str]) -> str | None:
 
 
 def near_macro(tag: str, known: Collection[str]) -> str | None:
-    close = nearest(tag.removeprefix("xacro:"), [*(name.removeprefix("xacro:") for name in known), *_XACRO_TAGS])
+    close = nearest(tag.removeprefix("xacro:"), [*(name.removeprefix("xacro:") for name in known), *_TAGS])
     return f"did you mean <xacro:{close[0]}>?" if close else None

@@ -78,7 +78,7 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
                 self.flatten_mapping(merged)
                 self.merged += len(merged.value)
                 if self.merged > bounds().value_size:
-                    raise too_large(f"{path.name}: merging (<<)")
+                    raise too_large(f"{path.name}: the merge (<<)")
 
     def construct(factor: float) -> Callable[[Loader, yaml.ScalarNode], float]:
         def constructor(loader: Loader, node: yaml.ScalarNode) -> float:

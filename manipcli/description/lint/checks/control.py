@@ -78,7 +78,7 @@ def _mimic(subject: Subject) -> Iterator[Diagnostic]:
         stated = joint.element.attributes.get("mimic", "").strip()
         what = f"ros2_control '{joint.component}': joint '{joint.name}'"
         if mimic is None and stated == "true" and joint.name in written:
-            message = f"{what} has mimic=\"true\", but its <joint> has no <mimic>"
+            message = f'{what} has mimic="true", but its <joint> has no <mimic>'
             yield Diagnostic("URDF321", message, joint.element.place, None)
         if mimic is None or stated == "false":
             continue
