@@ -132,7 +132,7 @@ class Packages:
             return self._found[name]
         places = ", ".join(shown_path(place) for place in searched)
         near = difflib.get_close_matches(name, [*(self._below or ()), *_installed_names()], n=1, cutoff=ALIKE)
-        meant = f"did you mean {any_of(near)}? else " if near else ""
+        meant = f"did you mean {any_of(near)}? Otherwise " if near else ""
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
             hint=f"{meant}add the folder that contains '{name}' with --package-path DIR",

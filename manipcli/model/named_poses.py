@@ -183,8 +183,6 @@ class _Poses:
                 word, limit = ("lower", least) if value < least else ("upper", most)
                 at, bound = told_apart(value, limit, form=".6g")
                 message = f"pose '{name}': joint '{joint}' at {at} is beyond its soft {word} limit {bound}"
-                hint = (
-                    f"change the pose, `soft_{word}` or `k_position`: no arm motion starts or ends beyond a soft limit"
-                )
+                hint = f"change the pose, `soft_{word}` or `k_position`: no arm motion starts or ends there"
                 self._reporter.warning("ROBOT324", message, locs[joint], hint=hint)
         return values
