@@ -243,7 +243,7 @@ def examine_cases() -> None:
             watched["on"] = True
             path = place / case.main
             found = examine(path, packages=Packages(path))
-            unmade = [finding.message for finding in found.findings if "came to no end" in finding.message]
+            unmade = [finding.message for finding in found.findings if "failed with an internal error" in finding.message]
             if unmade:
                 result["fault"] = unmade[0]
             elif not found.errors:

@@ -168,8 +168,8 @@ def test_a_group_that_a_pose_lacks_is_told_how_to_write(file: Path) -> None:
             build(file, poses=poses, **groups)
         return next(one.hint for one in refused.value.findings if one.code == "ROBOT320")
 
-    assert told({"p": {"leg": [0.0]}}) == "state it: groups: {leg: {joints: [...]}}"
-    joint = "'j1' is a joint; positions stand below a group: {arm: {j1: ...}}"
+    assert told({"p": {"leg": [0.0]}}) == "define it: groups: {leg: {joints: [...]}}"
+    joint = "'j1' is a joint; write its position below a group: {arm: {j1: ...}}"
     assert told({"p": {"j1": [0.0]}}, groups=GROUPS) == joint
     assert told({"p": {"j1": [0.0]}}) == joint.replace("arm", "GROUP")
     assert told({"p": {"amr": [0.0]}}, groups=GROUPS) == "did you mean 'arm'?"

@@ -206,7 +206,7 @@ SIMPLE = "transmissions: {t: {joints: [foo], actuators: [m]}}\n"
         (SIMPLE.replace("}}", "}, u: {joints: [bar], actuators: [m]}}"), "actuator 'm' already belongs"),
         (SIMPLE.replace("[foo]", "[foo, bar]"), "a simple transmission has 1 of each; joints has 2"),
         (SIMPLE.replace("{joints", "{type: diferential, joints"), "differential"),
-        (SIMPLE.replace("[m]", "[m], actuator_reduction: [0]"), "reduction is 0; expected a number other than 0"),
+        (SIMPLE.replace("[m]", "[m], actuator_reduction: [0]"), "a reduction of 0 is not possible"),
         (SIMPLE.replace("[m]", "[m], actuator_reduction: [.inf]"), "finite"),
         (SIMPLE + "actuators: {mm: {effort: 1}}\n", "of the robot | did you mean 'm'"),
         (SIMPLE + "actuators: {m: {effort: 0}}\n", "effort"),
@@ -234,7 +234,7 @@ def test_an_actuator_too_slow_for_its_joints_is_noted(tmp_path: Path) -> None:
 def test_half_of_a_described_pair_is_not_replaced(tmp_path: Path) -> None:
     told = refused(tmp_path, ros1("DifferentialTransmission", *ROLES1), SIMPLE.replace("t:", "u:"))
     assert "transmission 'u' replaces only joint 'foo' of 't' in the description" in told
-    assert "'t' drives foo and bar: let 'u' drive all of them" in told
+    assert "let 'u' drive all joints of 't': foo and bar" in told
 
 
 def test_a_joint_that_both_generations_describe_is_driven_once(tmp_path: Path) -> None:

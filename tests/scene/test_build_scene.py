@@ -407,8 +407,8 @@ def test_what_would_fall_through_a_urdf_is_told_where_to_stand(tmp_path: Path) -
     with pytest.raises(InvalidInput) as caught:
         build_scene(task(bodies), packages=Packages(tmp_path / "task.yaml"))
     (told,) = caught.value.findings
-    assert told.message == "nothing of 'rails' lies below 'x' at [1, 0] m"
-    assert told.hint == "choose `at` over a part of 'rails'"
+    assert told.message == "'x' at [1, 0] m is not above any part of 'rails'"
+    assert told.hint == "choose `at` above a part of 'rails'"
 
 
 def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
@@ -424,4 +424,4 @@ def test_a_urdf_with_joints_or_errors_is_refused(tmp_path: Path) -> None:
 def test_a_body_beside_its_support_is_told_where_that_is() -> None:
     desk = {"box": {"size": [0.6, 1.0, 0.4]}, "pose": {"xyz": [0.85, 0.1, 0.2]}, "fixed": True}
     told = only({"desk": desk, "x": CUBE | {"rests_on": "desk", "at": [2.75, 0]}})
-    assert told.hint == "the top of 'desk' is 0.6 by 1 m, its middle at [0.85, 0.1] m"
+    assert told.hint == "the top of 'desk' is 0.6 by 1 m, centred at [0.85, 0.1] m"

@@ -259,7 +259,7 @@ def test_links_of_the_smaller_tree_are_named_and_no_others(
     assert found.code == "URDF007"
     named = found.message.split("not connected to 'a': ")[1]
     assert sorted(re.findall(r"\b[a-g]\b", named)) == ["e", "f", "g"]
-    assert found.hint == "join 'e' to 'a' with a fixed joint, or delete it"
+    assert found.hint == "connect 'e' to 'a' with a fixed joint, or delete it"
 
 
 @pytest.mark.parametrize("order", ["abcd", "dcba", "cadb"])
