@@ -243,7 +243,8 @@ def examine_cases() -> None:
             watched["on"] = True
             path = place / case.main
             found = examine(path, packages=Packages(path))
-            unmade = [finding.message for finding in found.findings if "came to no end" in finding.message]
+            messages = [finding.message for finding in found.findings]
+            unmade = [message for message in messages if "failed with an internal error" in message]
             if unmade:
                 result["fault"] = unmade[0]
             elif not found.errors:

@@ -1,4 +1,4 @@
-"""How large and how deep a description may be, and how a user raises that."""
+"""Bounds on the size, depth and cost of a description, and the environment variable that raises them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manipcli.core.errors import Diagnostic, InvalidInput
 from manipcli.core.text import did_you_mean, shorten
 
 VARIABLE: Final = "MANIPCLI_BOUNDS"
-"""Holds bounds of the user's own, `seconds=60 elements=200000`; every command that reads descriptions heeds it."""
+"""Environment variable that overrides bounds, `seconds=60 elements=200000`, in all commands."""
 
 BoundName = Literal[
     "file_bytes",
@@ -32,20 +32,20 @@ BoundName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Generous for any robot: the largest of 57 descriptions has 700 kB, 2,900 elements and 1,900 expansions.
+    """The largest of 57 public descriptions has 700 kB, 2,900 elements and 1,900 expansions.
 
     Attributes:
-        file_bytes: of a file of XML.
+        file_bytes: of an XML file.
         elements: in one file, and in the expanded description.
-        depth: of elements in elements.
+        depth: of nested elements.
         attribute: characters of one attribute.
         expansions: elements and macros that xacro expands.
-        macro_depth: of macros that call macros.
-        include_depth: of files that include files.
-        operations: of all expressions of a description.
-        value_size: characters and items of what one expression gives.
+        macro_depth: of nested macro calls.
+        include_depth: of nested includes.
+        operations: of all expressions in a description.
+        value_size: characters and items in the value of one expression.
         yaml_bytes: of a file that `load_yaml` reads.
-        characters: of all text and attributes that an expansion makes; an element or item of data counts, too.
+        characters: of all text and attributes that an expansion creates; elements and data items count, too.
         seconds: of processor time for one expansion.
     """
 
@@ -64,10 +64,10 @@ class Bounds:
 
 
 def bounds() -> Bounds:
-    """The bounds that hold, with the user's own from the environment.
+    """The bounds, with overrides from the environment.
 
     Raises:
-        InvalidInput: the variable does not say `NAME=NUMBER NAME=NUMBER ...`.
+        InvalidInput: the variable is not of the form `NAME=NUMBER NAME=NUMBER ...`.
     """
     return _parsed(os.environ.get(VARIABLE, ""))
 
@@ -79,14 +79,14 @@ def _parsed(text: str) -> Bounds:
     for word in text.replace(",", " ").split():
         name, _, number = word.partition("=")
         if name not in known or not number.isascii() or not number.isdigit() or not 0 < int(number[:12]) < 10**10:
-            message = f"{VARIABLE}: '{shorten(word)}' is no bound; expected NAME=NUMBER"
-            hint = "whole numbers above 0" if name in known else did_you_mean(name, known, kind="bounds")
+            message = f"{VARIABLE}: invalid bound '{shorten(word)}'; expected NAME=NUMBER"
+            hint = "use a whole number above 0" if name in known else did_you_mean(name, known, kind="bounds")
             raise InvalidInput([Diagnostic("USE040", message, hint=hint)])
         own[name] = int(number)
     return dataclasses.replace(Bounds(), **own)
 
 
 def raised(name: BoundName) -> str:
-    """The hint that says which bound was met and how to raise it."""
+    """The hint with the bound that was exceeded and how to raise it."""
     value = getattr(bounds(), name)
-    return f"the bound is {name}={value}; for a description that you trust, raise it: {VARIABLE}={name}={2 * value}"
+    return f"the bound is {name}={value}; if you trust the description, raise it: {VARIABLE}={name}={2 * value}"

@@ -1,4 +1,4 @@
-"""A description file, URDF or xacro, as one expanded tree of located elements."""
+"""A description file (URDF or xacro) as one expanded tree of located elements."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ XACRO_NAMESPACES = ("http://www.ros.org/wiki/xacro", "http://ros.org/wiki/xacro"
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """`root` is the <robot> element, expanded; `packages` finds what it names; `findings` are warnings.
+    """`root`: the expanded <robot> element; `packages` resolves the files it names; `findings`: warnings.
 
-    `expanded`: the file is xacro, and its elements come from macros and other files.
+    `expanded`: the file is xacro, so its elements may come from macros and other files.
     """
 
     path: Path
@@ -38,7 +38,7 @@ def read_description(
     """Reads and expands a description.
 
     Args:
-        path: URDF or xacro; xacro is told by its name or by the namespace on its root element.
+        path: URDF or xacro; xacro is recognised by the suffix or by the namespace of its root element.
         packages: finds the packages and files it names.
         arguments: for `<xacro:arg>`.
         allow_env: environment variables that `$(env NAME)` and `$(optenv NAME)` may read.
@@ -58,7 +58,7 @@ def read_description(
         document, findings = expand(path, words, packages, allow_env=allow_env)
     elif arguments:
         names = ", ".join(arguments)
-        raise invalid("XACRO003", f"'{path.name}' is plain URDF and has no arguments; given: {names}")
+        raise invalid("XACRO003", f"'{path.name}' is plain URDF and takes no arguments; given: {names}")
     assert document.documentElement is not None  # a document without a root element is not well-formed
     root = element_of(document.documentElement)
     if root.tag != "robot":
@@ -67,10 +67,10 @@ def read_description(
 
 
 def unread_description(urdf: bytes, name: str) -> Description:
-    """An expanded description whose files nobody will read, as that in a log; messages call it `name`.
+    """An expanded description whose files are never read, as in a log; messages call it `name`.
 
     Raises:
-        InvalidInput: it is no XML.
+        InvalidInput: it is not valid XML.
     """
     root = parse_document(urdf, name).documentElement
     assert root is not None  # a document without a root element is not well-formed
@@ -87,18 +87,18 @@ _FORMATS = {
     "package": "the manifest of a ROS package",
     "launch": "a launch file",
 }
-"""What is given in place of a URDF, by its root element."""
+"""Other formats by their root element."""
 
 
 def _other_format(root: Element) -> InvalidInput:
     known = _FORMATS.get(root.tag)
     if known is None:
-        message = f"the root element is <{shorten(root.tag)}>; a description begins with <robot>"
+        message = f"the root element is <{shorten(root.tag)}>; expected <robot>"
         return invalid("URDF002", message, root.place, did_you_mean(root.tag, ["robot"]))
-    hint = "convert it to URDF first: its elements mean other things" if known in {"SDF", "MJCF"} else None
+    hint = "convert it to URDF first" if known in {"SDF", "MJCF"} else None
     return invalid("URDF002", f"this is {known}, not URDF: the root element is <{shorten(root.tag)}>", root.place, hint)
 
 
 def argument_text(value: str | int | float | bool) -> str:
-    """An argument as xacro gets it: `true`, `0.1`, text as it is."""
+    """An argument as the text that xacro expects: `true`, `0.1`, `text`."""
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,4 +1,4 @@
-"""Links, joints and transmission tags of a URDF as typed values. Immutable.
+"""Links, joints and transmission tags of a URDF as immutable dataclasses.
 
 Frames: L link, J joint (coincides with its child link), P parent link.
 """
@@ -18,7 +18,7 @@ JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """`mass` [kg]; `X_LI`: inertial frame (origin at the centre of mass) in the link; `inertia` (3, 3) [kg m2] in I."""
+    """`mass` [kg]; `X_LI`: inertial frame I in the link, at the centre of mass; `inertia` (3, 3) [kg m2] in I."""
 
     mass: float
     X_LI: Transform
@@ -27,7 +27,7 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """`place`: where the description has it."""
+    """A link; `place`: its position in the description file."""
 
     name: str
     inertial: Inertial | None
@@ -38,12 +38,12 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class SoftLimits:
-    """Where a joint is slowed down before its limits (URDF's safety_controller); `control/limits.py` has the law.
+    """Soft limits of a joint (URDF's safety_controller); `control/limits.py` implements them.
 
     Attributes:
-        lower, upper: rad or m; None: none on this side.
-        k_position: velocity per distance to them [1/s]; 0: they do not act.
-        k_velocity: effort per velocity beyond what they allow [N m s/rad or N s/m]; 0: efforts are not bounded.
+        lower, upper: [rad or m]; None: no soft limit on this side.
+        k_position: velocity limit per distance to a soft limit [1/s]; 0: `lower` and `upper` have no effect.
+        k_velocity: effort limit per velocity excess [N m s/rad or N s/m]; 0: efforts are not limited.
     """
 
     lower: float | None = None
@@ -54,7 +54,7 @@ class SoftLimits:
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """SI: rad or m, and per second. None is unlimited (`lower`, `upper`) or not stated (the rest)."""
+    """SI: rad or m, and per second. None: unlimited (`lower`, `upper`) or unknown (the rest)."""
 
     lower: float | None = None
     upper: float | None = None
@@ -66,12 +66,12 @@ class JointLimits:
 
     @property
     def range(self) -> tuple[float, float]:
-        """`lower` and `upper`, infinite where there is none."""
+        """`lower` and `upper`, infinite if unlimited."""
         return -math.inf if self.lower is None else self.lower, math.inf if self.upper is None else self.upper
 
     @property
     def within_soft(self) -> tuple[float, float]:
-        """The part of the `range` within the soft limits that act: from beyond these a joint is led back."""
+        """The part of `range` inside the active soft limits; beyond these a joint is driven back."""
         lower, upper = self.range
         soft = self.soft
         if soft is None or soft.k_position <= 0.0:
@@ -84,7 +84,7 @@ class JointLimits:
         return self.within_soft[side] != self.range[side]
 
     def nearest(self, position: float) -> float:
-        """The position within the limits that is nearest to this one."""
+        """The position within the limits nearest to `position`."""
         lower, upper = self.range
         return min(max(position, lower), upper)
 
@@ -100,7 +100,10 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """`X_PJ`: joint frame in the parent link at zero position; `axis` (3,) unit, in J. Damping N m s/rad or N s/m."""
+    """`X_PJ`: joint frame in the parent link at position zero; `axis`: unit vector (3,) in J.
+
+    `damping` [N m s/rad or N s/m], `friction` [N m or N].
+    """
 
     name: str
     type: JointType
@@ -119,18 +122,17 @@ class Joint:
 
     @property
     def independent(self) -> bool:
-        """Moves and follows no other joint: what a controller may command."""
+        """Whether the joint moves and is not a mimic joint, so that a controller may command it."""
         return self.moves and self.mimic is None
 
     @property
     def unit(self) -> Literal["rad", "m"]:
-        """Of its position."""
         return "m" if self.type == "prismatic" else "rad"
 
     def meant(self, position: float) -> str | None:
-        """The hint where a position beyond the limits lies within them as degrees, or as millimetres.
+        """The hint for a position outside the limits that would be inside as degrees or millimetres; else None.
 
-        Only for more than a turn or 5 m: less may as well be a position that is too far.
+        Only beyond one revolution or 5 m: a smaller value may just be too far.
         """
         what, unit, size, few = (
             ("millimetres", "mm", 1000.0, 5.0) if self.unit == "m" else ("degrees", "deg", 180.0 / math.pi, math.tau)
@@ -142,20 +144,18 @@ class Joint:
 
     @property
     def effort_unit(self) -> Literal["N m", "N"]:
-        """Of its effort."""
         return "N" if self.type == "prismatic" else "N m"
 
     @property
     def inertia_unit(self) -> Literal["kg m2", "kg"]:
-        """Of what resists its acceleration."""
         return "kg" if self.type == "prismatic" else "kg m2"
 
 
 @dataclass(frozen=True, slots=True)
 class TransmissionTag:
-    """A `<transmission>`, roles resolved: parallel tuples in role order, as many actuators as joints.
+    """A `<transmission>` with resolved roles: parallel tuples in role order, as many actuators as joints.
 
-    A simple one has its reduction at the actuator, wherever it was written; its joint reduction is 1.
+    A simple transmission has its reduction at the actuator, wherever it was written; its joint reduction is 1.
     """
 
     name: str

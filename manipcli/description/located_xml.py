@@ -1,4 +1,4 @@
-"""XML of which every element knows file, line and column; no DTD, no entities, bounded size, depth and count."""
+"""XML reader that keeps file, line and column of every element; without DTD and entities, bounded in size and depth."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _XACRO: Final = "http://www.ros.org/wiki/xacro"
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """An element of a description, after expansion. `place`: where the user wrote it; `text_place`: and its text."""
+    """An element of a description, after expansion; `place`, `text_place`: position of it and of its text."""
 
     tag: str
     attributes: Mapping[str, str]
@@ -36,14 +36,14 @@ class Element:
 
     @property
     def name(self) -> str:
-        """Its attribute `name` without blanks around; '' where it has none."""
+        """The attribute `name`, stripped; '' if missing."""
         return self.attributes.get("name", "").strip()
 
     def all(self, tag: str) -> tuple[Element, ...]:
         return tuple(child for child in self.children if child.tag == tag)
 
     def first(self, *path: str) -> Element | None:
-        """The first child of a tag; of that, the first of the next tag of the path."""
+        """The first child with the first tag of `path`, its first child with the second tag, and so on."""
         at: Element | None = self
         for tag in path:
             at = next((child for child in at.children if child.tag == tag), None) if at is not None else None
@@ -51,7 +51,7 @@ class Element:
 
 
 def shown_path(path: Path) -> str:
-    """How messages name a file: relative to the working folder where it lies below that, else as given."""
+    """A path for messages: relative to the working directory if it is inside, else as given."""
     try:
         return str(path.relative_to(Path.cwd()))
     except ValueError:
@@ -63,15 +63,15 @@ def invalid(code: str, message: str, place: Place | None = None, hint: str | Non
 
 
 def read_document(path: Path) -> Document:
-    """The document of a file; `place_of` tells the place of its elements, of copies (cloneNode) too.
+    """The document of a file; `place_of` gives the place of its elements and of their copies (cloneNode).
 
     Raises:
-        InvalidInput: unreadable, not well-formed, a DOCTYPE, or beyond a bound.
+        InvalidInput: unreadable, not well-formed, a DOCTYPE, or a bound is exceeded.
     """
     file = shown_path(path)
     try:
         if not path.is_file():
-            what = "is a folder" if path.is_dir() else "is no regular file" if path.exists() else "is not there"
+            what = "is a folder" if path.is_dir() else "is not a regular file" if path.exists() else "does not exist"
             raise invalid("URDF001", f"'{file}' {what}", Place(file, 0, 0))
         with path.open("rb") as stream:
             data = stream.read(bounds().file_bytes + 1)
@@ -84,14 +84,14 @@ def read_document(path: Path) -> Document:
 
 
 def parse_document(data: bytes, file: str) -> Document:
-    """As `read_document`, from the bytes of a file that messages call `file`."""
+    """Like `read_document`, from the bytes of a file; `file` is its name in messages."""
     from xml.dom import expatbuilder
     from xml.parsers import expat
 
     copy_place = _CopyPlace()
 
     class Builder(expatbuilder.ExpatBuilderNS):
-        """Builds the usual minidom tree and leaves the place of each start tag with its element."""
+        """Builds a minidom tree and stores the place of each start tag at its element."""
 
         depth = 0
         count = 0
@@ -117,8 +117,7 @@ def parse_document(data: bytes, file: str) -> Document:
             self.curNode.setUserData(_PLACE, self.place(), copy_place)
 
         def character_data_handler_cdata(self, data: str) -> None:
-            """Expat gathers text, and stands behind it when it hands it over."""
-            node = self.curNode
+            node = self.curNode  # expat reports the position after the text
             if node.nodeType == node.ELEMENT_NODE and node.getUserData(_TEXT_PLACE) is None and data.strip():
                 node.setUserData(_TEXT_PLACE, _begin(self.place(), data.lstrip(), lines), copy_place)
             super().character_data_handler_cdata(data)
@@ -131,23 +130,24 @@ def parse_document(data: bytes, file: str) -> Document:
             raise invalid("URDF051", "a DOCTYPE is not allowed in a description", self.place(), "delete it")
 
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or data[:2] in (b"<\0", b"\0<"):
-        raise invalid("URDF001", "the file is UTF-16, which few programs read", Place(file, 1, 1), "save it as UTF-8")
+        message = "the file is UTF-16, which few programs can read"
+        raise invalid("URDF001", message, Place(file, 1, 1), "save it as UTF-8")
     lines = data.split(b"\n")
     builder = Builder()
     try:
         document: Document = builder.parseString(data)
     except expat.ExpatError as error:
-        message, place, hint = _told(error, data, file)
+        message, place, hint = _described(error, data, file)
         begins = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
-        other = None if begins in (b"<", b"") else "this is no XML; robot, controllers and task files: `manipcli check`"
+        other = None if begins in (b"<", b"") else "not XML; for robot, controller and task files use `manipcli check`"
         raise invalid("URDF001", message, place, other or hint or _open_element(builder.curNode)) from error
     except (LookupError, ValueError) as error:
-        raise invalid("URDF001", f"not readable as XML: {error}", Place(file, 1, 1)) from error
+        raise invalid("URDF001", f"not valid XML: {error}", Place(file, 1, 1)) from error
     return document
 
 
-def _told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | None]:
-    """Message, place and hint (None: nothing better than that an element is open) for `data` of a `file`."""
+def _described(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | None]:
+    """Message, place and hint (or None) of a syntax error."""
     from xml.parsers.expat import ErrorString, errors
 
     words = ErrorString(error.code)
@@ -157,7 +157,7 @@ def _told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | 
     place = Place(file, error.lineno, error.offset + 1)
     message, hint = f"not well-formed XML: {words}", None
     if words == errors.XML_ERROR_MISPLACED_XML_PI:
-        hint = "nothing may stand before '<?xml', not even a blank"
+        hint = "delete everything before '<?xml', including blanks"
     elif words == errors.XML_ERROR_UNBOUND_PREFIX:
         found = re.compile(rb"</?([\w.-]+):").match(line, error.offset)
         prefix = found.group(1).decode("utf-8", "replace")[:40] if found else ""
@@ -166,12 +166,11 @@ def _told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | 
             hint = f'declare it in the root element: xmlns:{prefix}="{_XACRO if prefix == "xacro" else "..."}"'
     elif words == errors.XML_ERROR_INVALID_TOKEN:
         if line.startswith(b"<<<<<<<"):
-            return "a merge conflict is not resolved", Place(file, error.lineno, 1), "keep one side, and no '<<<<<<<'"
+            place = Place(file, error.lineno, 1)
+            return "unresolved merge conflict", place, "keep one side, and delete the '<<<<<<<' markers"
         byte = None if _DECLARED.match(data) else _not_utf8(data, file)
         if byte is not None and byte[1].line == error.lineno:
-            hint = (
-                'save it as UTF-8: iconv -f latin1 -t utf-8; or name its encoding: <?xml version="1.0" encoding=...?>'
-            )
+            hint = 'save it as UTF-8: iconv -f latin1 -t utf-8; or declare it: <?xml version="1.0" encoding=...?>'
             return byte[0], byte[1], hint
         if here == b"<":
             hint = "write < as &lt; inside a value, or close the quote before it"
@@ -180,12 +179,12 @@ def _told(error: ExpatError, data: bytes, file: str) -> tuple[str, Place, str | 
         elif before.endswith(b"="):
             hint = 'put the value in quotes: "..."'
         elif before.endswith(b"--"):
-            hint = "take '--' out of the comment"
+            hint = "remove '--' from the comment"
     return message, place, hint
 
 
 def _not_utf8(data: bytes, file: str) -> tuple[str, Place] | None:
-    """The first byte that no text in UTF-8 has, and where."""
+    """Message and place of the first byte that is not valid UTF-8."""
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -196,7 +195,7 @@ def _not_utf8(data: bytes, file: str) -> tuple[str, Place] | None:
 
 
 def _begin(end: Place, text: str, lines: Sequence[bytes]) -> Place:
-    """Where a text that stops before `end` begins; an entity in its first line counts as the character that it is."""
+    """Start of a text that ends before `end`; an entity in its first line counts as one character."""
     first, newline, _ = text.partition("\n")
     line = max(end.line - text.count("\n"), 1)
     behind = end.column
@@ -206,15 +205,15 @@ def _begin(end: Place, text: str, lines: Sequence[bytes]) -> Place:
 
 
 def _open_element(node: Node | None) -> str | None:
-    """The hint that names the element in which a document broke off."""
+    """The hint that names the element in which a document ends unexpectedly."""
     if node is None or node.nodeType != node.ELEMENT_NODE:
         return None
     element = cast("DomElement", node)
-    return f"<{element.tagName[:60]}> of line {place.line} is open" if (place := place_of(element)) else None
+    return f"close <{element.tagName[:60]}> of line {place.line}" if (place := place_of(element)) else None
 
 
 class _CopyPlace:
-    """minidom calls `handle` for each element of a tree that is cloned."""
+    """User data handler: minidom calls `handle` for each cloned element."""
 
     def handle(self, operation: int, key: str, data: Place, src: Node, dst: Node) -> None:
         dst.setUserData(key, data, self)
@@ -226,14 +225,14 @@ def place_of(node: DomElement, key: str = _PLACE) -> Place | None:
 
 
 def called_from(node: DomElement, calls: tuple[Place, ...]) -> None:
-    """Leaves with an element that macros made it, unless it is known already."""
+    """Stores at an element the macro calls that created it, unless it already has some."""
     place = place_of(node)
     if place is not None and not place.calls:
         node.setUserData(_PLACE, dataclasses.replace(place, calls=calls), _CopyPlace())
 
 
 def element_of(node: DomElement, _depth: int = 0) -> Element:
-    """The immutable form of a tree; comments and namespace declarations are left out.
+    """The immutable form of a tree, without comments and namespace declarations.
 
     Raises:
         InvalidInput: nested deeper than the bound.

@@ -1,7 +1,7 @@
-"""Where the files that a description names are found: `package://`, `model://`, `file://` and relative paths.
+"""Resolution of the URIs in a description: `package://`, `model://`, `file://` and relative paths.
 
-A description is untrusted data: what it names must be a regular file inside the folder tree of the description or
-inside the root of a package that was asked for by name. Links are followed before that is judged.
+A description is untrusted data: a URI must resolve to a regular file inside the folder tree of the description or
+inside the root of the named package, after symbolic links are resolved.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from manipcli.core.text import any_of, nearest, nearest_file
 from manipcli.description.located_xml import shown_path
 
 LEVELS_ABOVE = 5
-"""How many folders above a description are looked at for a folder of a package's name."""
+"""Number of folders above a description that are searched for a package."""
 ALIKE = 0.85
-"""Likeness from which on a package was meant: among all that is installed, less finds any name."""
+"""Least similarity of a suggested package name; with less, any name matches some installed package."""
 SUBFOLDERS = frozenset({"urdf", "xacro", "robots", "robot", "description", "cfg"})
-"""A description in such a folder belongs to the folder above it."""
+"""A description in such a folder belongs to the parent folder."""
 MOST_BYTES = 65_536
 LEVELS_BELOW = 4
 MOST_FOLDERS = 5_000
@@ -35,7 +35,7 @@ _IGNORED = ("CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE", "rospack_nosubdirs
 
 
 class NotFound(Exception):
-    """A file or package that cannot be used; the caller, who knows the place, makes a finding of it."""
+    """A file or package that cannot be used; the caller, which knows the place, turns it into a finding."""
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         self.message = message
@@ -44,37 +44,37 @@ class NotFound(Exception):
 
 
 class Absent(NotFound):
-    """A file that is not there, where it could be read."""
+    """A missing file in a permitted folder."""
 
 
 class Outside(NotFound):
-    """A file that is there and must not be read: it lies outside of the folders that belong to the description."""
+    """An existing file that must not be read: it is outside the folders of the description."""
 
 
 class RemoteFile(NotFound):
-    """An address that only a network could answer."""
+    """A URI that needs the network."""
 
 
 def own_root(description: Path) -> Path | None:
-    """The folder tree a description belongs to: its ROS package, else the folder above `urdf/`, else its own folder.
+    """Root of the folder tree of a description: its ROS package, else the folder above `urdf/`, else its own folder.
 
-    None where that is a folder of everything: see `_of_everything`.
+    None for a shared folder, see `_is_shared`.
     """
     folder = Path(os.path.realpath(description)).parent
     for ancestor in (folder, *list(folder.parents)[:LEVELS_ABOVE]):
-        if (ancestor / "package.xml").is_file() and not _of_everything(ancestor):
+        if (ancestor / "package.xml").is_file() and not _is_shared(ancestor):
             return ancestor
     above = [folder.parent] if folder.name in SUBFOLDERS else []
-    return next((each for each in (*above, folder) if not _of_everything(each)), None)
+    return next((candidate for candidate in (*above, folder) if not _is_shared(candidate)), None)
 
 
-def _of_everything(folder: Path) -> bool:
-    """A folder that holds more than one robot: the home folder or one above it, `/`, or one like /tmp."""
+def _is_shared(folder: Path) -> bool:
+    """Whether a folder holds unrelated files: the home folder or one above it, `/`, or one like /tmp."""
     home = _home()
     if folder == folder.parent or (home is not None and home.is_relative_to(folder)):
         return True
     try:
-        # Both: file systems without modes, as a mounted Windows disk, let everybody write everywhere.
+        # Both bits: on file systems without modes, such as a mounted Windows disk, all folders are world-writable.
         both = stat.S_ISVTX | stat.S_IWOTH
         return folder.stat().st_mode & both == both
     except OSError:
@@ -82,7 +82,7 @@ def _of_everything(folder: Path) -> bool:
 
 
 def _home() -> Path | None:
-    """The user's folder; None where the system knows of none, as in some containers."""
+    """The user's home folder; None if there is none, as in some containers."""
     try:
         return Path(os.path.realpath(Path.home()))
     except RuntimeError:
@@ -93,12 +93,12 @@ class Packages:
     """Finds packages and files for one description.
 
     Args:
-        description: the file that names things; None looks only at `package_path` and what is installed.
-        package_path: folders that hold packages (or are one), looked at first.
-        allow_outside: lets a file lie anywhere.
+        description: the file with the URIs; None searches only `package_path` and installed packages.
+        package_path: folders that contain packages (or are one), searched first.
+        allow_outside: permits files anywhere.
 
     Attributes:
-        reads: whether the files that are named are there to be read.
+        reads: whether the named files can be read.
     """
 
     reads = True
@@ -123,9 +123,7 @@ class Packages:
         if name in self._found:
             return self._found[name]
         if not name or name.startswith(".") or any(character in name for character in "/\\\0"):
-            raise NotFound(
-                f"'{name}' cannot be the name of a package", hint="write package://NAME/path or $(find NAME)"
-            )
+            raise NotFound(f"'{name}' is not a valid package name", hint="write package://NAME/path or $(find NAME)")
         searched = self._candidates(name)
         found = next((folder for folder in searched if folder.is_dir()), None)
         found = found or self._crawled(name) or _installed_package(name)
@@ -134,10 +132,10 @@ class Packages:
             return self._found[name]
         places = ", ".join(shown_path(place) for place in searched)
         near = difflib.get_close_matches(name, [*(self._below or ()), *_installed_names()], n=1, cutoff=ALIKE)
-        meant = f"did you mean {any_of(near)}? else " if near else ""
+        meant = f"did you mean {any_of(near)}? Otherwise " if near else ""
         raise NotFound(
             f"package '{name}' is not found; searched {places or 'nowhere'}, and the installed Python packages",
-            hint=f"{meant}add the folder that holds '{name}' with --package-path DIR",
+            hint=f"{meant}add the folder that contains '{name}' with --package-path DIR",
         )
 
     def _candidates(self, name: str) -> list[Path]:
@@ -157,7 +155,7 @@ class Packages:
         return list(dict.fromkeys(places))
 
     def _crawled(self, name: str) -> Path | None:
-        """The package whose `package.xml` has this name, in a folder that is called otherwise."""
+        """The package whose `package.xml` has this name, in a folder with another name."""
         if self._below is None:
             given = [Path(part) for part in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if part]
             self._below = {}
@@ -166,17 +164,17 @@ class Packages:
         return self._below.get(name)
 
     def below(self, description: Path) -> Packages:
-        """For what a file that was found here names in its turn: the same places and rules, seen from it."""
+        """For the URIs in a file that was found here: the same search path and rules, relative to that file."""
         return Packages(description, package_path=self._package_path, allow_outside=self._allow_outside)
 
     def resolve(self, uri: str, *, relative_to: Path | None = None, anywhere: bool = False) -> Path:
-        """The regular file that `uri` names, links followed; relative paths start at the folder `relative_to`.
+        """The regular file that `uri` names, symbolic links resolved; relative paths start at the folder `relative_to`.
 
         Args:
-            anywhere: the user himself wrote this name, so that the file may lie where he says.
+            anywhere: permits any folder, for a URI that the user wrote.
 
         Raises:
-            NotFound: unknown scheme or package, no such file, not a regular file, or outside of the allowed folders.
+            NotFound: unknown scheme or package, missing file, not a regular file, or outside the permitted folders.
         """
         scheme, separator, rest = uri.partition("://")
         roots = [root for root in (self._own, *self._package_path, *self._found.values()) if root is not None]
@@ -188,13 +186,13 @@ class Packages:
             path = Path("/" + unquote(rest.removeprefix("localhost")).lstrip("/"))
         elif separator:
             hint = "copy the file into the package; use package://NAME/path or a relative path"
-            raise RemoteFile(f"'{uri[:100]}': nothing is fetched, and scheme '{scheme[:20]}' is not read", hint=hint)
+            raise RemoteFile(f"'{uri[:100]}': scheme '{scheme[:20]}' is not supported", hint=hint)
         elif uri[:5].lower() == "data:":
-            raise RemoteFile(f"'{uri[:20]}...': data in an address is not read", hint="write it into a file")
+            raise RemoteFile(f"'{uri[:20]}...': data URIs are not supported", hint="write the data into a file")
         else:
             path = Path(uri)
         if "\0" in str(path):
-            raise NotFound("a file name holds a NUL character")
+            raise NotFound("a file name contains a NUL character")
         if not path.is_absolute():
             path = (relative_to or self._folder or Path.cwd()) / path
         return self._checked(path, uri, roots, self._allow_outside or anywhere)
@@ -208,7 +206,7 @@ class Packages:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError) as error:
             if os.path.islink(path):  # noqa: PTH114  (Path.is_symlink raises where a name is too long)
-                message, near = f"'{uri}' is a link that leads to no file", False
+                message, near = f"'{uri}' is a broken symbolic link", False
             else:
                 message, near = f"'{uri}' is not found; searched {shown_path(path)}", True
             if inside(Path(os.path.realpath(path))):
@@ -216,28 +214,28 @@ class Packages:
             raise NotFound(message) from error
         if not inside(real):
             hint = "move it into the package, add its folder with --package-path DIR, or pass --allow-outside"
-            raise Outside(f"'{uri}' lies outside of the description's folder and packages", hint=hint)
+            raise Outside(f"'{uri}' is outside the description's folder and packages", hint=hint)
         if not real.is_file():
             raise NotFound(f"'{uri}' is not a regular file")
         return real
 
     def _near(self, path: Path) -> str | None:
-        """`_meant`, once a path: many checks ask for the same absent file."""
+        """`_meant`, cached: several checks resolve the same missing file."""
         if path not in self._meant:
             self._meant[path] = _meant(path)
         return self._meant[path]
 
     def _beside(self, real: Path) -> bool:
-        """In a folder of everything: whether a file lies below it without being hidden, as `~/meshes/arm.stl` does."""
+        """For a description in a shared folder: whether a file is below it and not hidden, like `~/meshes/arm.stl`."""
         if self._own is not None or self._folder is None or not real.is_relative_to(self._folder):
             return False
         return not any(part.startswith(".") for part in real.relative_to(self._folder).parts)
 
     def portable(self, path: Path) -> str:
-        """A `package://NAME/...` URI of a resolved file that says nothing about this machine.
+        """A `package://NAME/...` URI of a resolved file, independent of this machine.
 
-        NAME is the outermost Python package or nearest ROS package that holds the file, else a package found by name,
-        else the description's own folder, else the folder beside it that holds the file, else the file's folder.
+        NAME is the outermost Python package or nearest ROS package that contains the file, else a package found by
+        name, else the description's root, else the folder beside it that contains the file, else the file's folder.
         """
         for ancestor in path.parents:
             if (ancestor / "package.xml").is_file():
@@ -248,7 +246,7 @@ class Packages:
             if root is not None and path.is_relative_to(root):
                 return _uri(root, path)
         for above in self._own.parents if self._own is not None else ():
-            if _of_everything(above):
+            if _is_shared(above):
                 break
             if path.is_relative_to(above):
                 return _uri(above / path.relative_to(above).parts[0], path)
@@ -256,7 +254,7 @@ class Packages:
 
 
 class Unread(Packages):
-    """For a description whose files nobody will read, as that in a log: every name stands for itself."""
+    """For a description whose files are never read, as in a log: URIs are kept as they are."""
 
     reads = False
 
@@ -265,7 +263,7 @@ class Unread(Packages):
         self._written: dict[Path, str] = {}
 
     def resolve(self, uri: str, *, relative_to: Path | None = None, anywhere: bool = False) -> Path:
-        # A path has no place for the two slashes of `package://`: how it was written is kept beside it.
+        # A Path drops one slash of `package://`, so the URI is stored, too.
         path = Path(uri)
         self._written[path] = uri
         return path
@@ -279,13 +277,13 @@ def _uri(root: Path, path: Path) -> str:
 
 
 def _of_the_same_package(real: Path, roots: Sequence[Path]) -> bool:
-    """In the source of a package that is installed as links to it: `colcon build --symlink-install`."""
+    """Whether a file is in the source of a package installed by symbolic links (`colcon build --symlink-install`)."""
     names = {package_name(root) for root in roots} - {None}
     return bool(names) and any(package_name(folder) in names for folder in list(real.parents)[:LEVELS_ABOVE])
 
 
 def _meant(path: Path) -> str | None:
-    """The file beside it with nearly this name."""
+    """The hint with a file in the same folder and with a similar name."""
     try:
         known = sorted(entry.name for entry in path.parent.iterdir() if not _of_another_part(path.name, entry.name))
     except OSError:
@@ -295,7 +293,7 @@ def _meant(path: Path) -> str | None:
 
 
 def _of_another_part(name: str, other: str) -> bool:
-    """Files are called after parts: `link6` is not `link7`, and `laser_link` is no `wheel_link` for its last word."""
+    """Whether two file names refer to different parts: `link6` and `link7`, or `laser_link` and `wheel_link`."""
     mine, others = (re.split(r"[_-]", Path(each).stem) for each in (name, other))
     while len(mine) > 1 and len(others) > 1 and mine[-1] == others[-1]:
         mine.pop()
@@ -306,7 +304,7 @@ def _of_another_part(name: str, other: str) -> bool:
 
 @cache
 def _installed_names() -> tuple[str, ...]:
-    """Of all Python packages, without importing them."""
+    """Names of all installed Python packages, without importing them."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules() if module.ispkg))
 
 
@@ -323,7 +321,7 @@ def _installed_package(name: str) -> Path | None:
 
 
 def package_name(folder: Path) -> str | None:
-    """The `<name>` of the package in this very folder, if there is one."""
+    """The `<name>` in the folder's `package.xml`, if there is one."""
     file = folder / "package.xml"
     try:
         if not file.is_file():
@@ -336,9 +334,9 @@ def package_name(folder: Path) -> str | None:
 
 
 def packages_below(folder: Path) -> dict[str, Path]:
-    """The packages at or below a folder by name, the nearest of each, as rospack crawls.
+    """The packages at or below a folder by name, the nearest of each name, as rospack searches.
 
-    Packages hold no packages; hidden folders and those that a build tool is told to ignore are left out.
+    Packages are not nested; hidden folders and those marked to be ignored by build tools are skipped.
     """
     found: dict[str, Path] = {}
     for each in _packages_below(folder):

@@ -1,7 +1,7 @@
-"""The contract of transmissions: linear maps between the actuators and the joints that they drive.
+"""The transmission seam: linear maps between actuators and the joints that they drive.
 
-Position, velocity and effort change by different rules. What a transmission keeps is power: with velocity_j =
-M velocity_a, effort_j = E effort_a and E = M^-T, effort_j . velocity_j = effort_a . velocity_a.
+A transmission conserves power: with velocity_j = M velocity_a, effort_j = E effort_a and E = M^-T,
+effort_j . velocity_j = effort_a . velocity_a.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ Compat = Literal["ros1", "ros2"]
 
 @dataclass(frozen=True, slots=True)
 class Maps:
-    """The matrices of a transmission of k actuators and k joints, or of several in blocks.
+    """The matrices of a transmission with k actuators and k joints, or of several in blocks.
 
     Attributes:
         joint_motion: (k, k) M: velocity_j = M velocity_a, position_j = M position_a + offset.
-        actuator_motion: (k, k) its inverse: velocity_a = M^-1 velocity_j, position_a = M^-1 (position_j - offset).
+        actuator_motion: (k, k) M^-1: velocity_a = M^-1 velocity_j, position_a = M^-1 (position_j - offset).
         joint_effort: (k, k) E: effort_j = E effort_a.
-        actuator_effort: (k, k) its inverse.
-        offset: (k) position of the joints where the actuators are at 0 [rad or m].
+        actuator_effort: (k, k) E^-1.
+        offset: (k) joint positions at actuator positions 0 [rad or m].
     """
 
     joint_motion: Array
@@ -55,28 +55,29 @@ class Maps:
         offset: npt.ArrayLike,
     ) -> Maps:
         """Read-only copies."""
-        return Maps(*(frozen(each) for each in (joint_motion, actuator_motion, joint_effort, actuator_effort, offset)))
+        arrays = (joint_motion, actuator_motion, joint_effort, actuator_effort, offset)
+        return Maps(*(frozen(array) for array in arrays))
 
 
 class Transmission(ABC):
-    """k actuators that drive k joints; both in the order of their roles.
+    """k actuators that drive k joints, both in the order of their roles.
 
-    `values` are numbers, lists or arrays whose last axis (k) runs over the actuators or joints; leading axes (time,
-    say) stay. A transmission of one actuator takes any shape, a single number too, and maps each element.
+    `values` are numbers, lists or arrays whose last axis (k) runs over the actuators or joints; leading axes (such as
+    time) are kept. A transmission with one actuator takes any shape, including a number, and maps each element.
     """
 
     @cached_property
     @abstractmethod
     def maps(self) -> Maps:
-        """Its matrices."""
+        """The matrices."""
 
     @property
     def size(self) -> int:
-        """k: how many actuators it has, and how many joints."""
+        """k, the number of actuators and of joints."""
         return len(self.maps.offset)
 
     def actuator_to_joint(self, quantity: Quantity, values: npt.ArrayLike) -> Array:
-        """Values of the joints for values of the actuators.
+        """Joint values from actuator values.
 
         Args:
             quantity: "position" [rad or m], "velocity" [rad/s or m/s] or "effort" [N m or N].
@@ -86,14 +87,14 @@ class Transmission(ABC):
             (..., k) of the joints, a new array.
 
         Raises:
-            InvalidArgument: another quantity, or a last axis that is not k.
+            InvalidArgument: unknown quantity, or the last axis does not have length k.
         """
         maps = self.maps
         mapped = self._mapped(maps.joint_effort if _is_effort(quantity) else maps.joint_motion, values)
         return self._plain(mapped + maps.offset) if quantity == "position" else self._plain(mapped)
 
     def joint_to_actuator(self, quantity: Quantity, values: npt.ArrayLike) -> Array:
-        """Values of the actuators for values of the joints; arguments and errors as in `actuator_to_joint`."""
+        """Actuator values from joint values; arguments and errors as in `actuator_to_joint`."""
         maps = self.maps
         matrix = maps.actuator_effort if _is_effort(quantity) else maps.actuator_motion
         if quantity == "position":
@@ -116,7 +117,7 @@ class Transmission(ABC):
     def _refuse_shape(self, values: npt.ArrayLike) -> None:
         shape = np.shape(values)
         if self.size > 1 and (not shape or shape[-1] != self.size):
-            message = f"values of the shape {shape}; expected {self.size} along the last axis, one a joint or actuator"
+            message = f"values have shape {shape}; expected {self.size} along the last axis, one per joint or actuator"
             raise InvalidArgument("TRAN003", message)
 
 
@@ -129,15 +130,15 @@ def _is_effort(quantity: str) -> bool:
 
 
 def nonzero(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
-    """Reductions: `count` finite numbers that are not 0.
+    """`count` finite numbers other than 0, for reductions.
 
     Raises:
-        InvalidArgument: they are not.
+        InvalidArgument: wrong count, not finite, or 0.
     """
     checked = finite(name, values, count)
     for value in checked:
         if value == 0.0:
-            raise InvalidArgument("TRAN001", f"{name} = 0 is not possible; expected a number that is not 0")
+            raise InvalidArgument("TRAN001", f"{name} = 0 is not allowed; expected a number other than 0")
     return checked
 
 
@@ -145,7 +146,7 @@ def finite(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
     """`count` finite numbers.
 
     Raises:
-        InvalidArgument: they are not.
+        InvalidArgument: wrong count, or not finite.
     """
     try:
         checked = tuple(float(value) for value in values)
@@ -153,21 +154,23 @@ def finite(name: str, values: Sequence[float], count: int) -> tuple[float, ...]:
         message = f"{name} = {values!r}: expected {count} number{'s' * (count != 1)}"
         raise InvalidArgument("TRAN001", message) from None
     if len(checked) != count:
-        raise InvalidArgument("TRAN001", f"{name} has {len(checked)} number{'s' * (len(checked) != 1)}, not {count}")
+        raise InvalidArgument(
+            "TRAN001", f"{name} has {len(checked)} number{'s' * (len(checked) != 1)}; expected {count}"
+        )
     for value in checked:
         if not math.isfinite(value):
-            raise InvalidArgument("TRAN001", f"{name} = {value:g} is not possible; expected a finite number")
+            raise InvalidArgument("TRAN001", f"{name} = {value:g} is not allowed; expected a finite number")
     return checked
 
 
 @dataclass(frozen=True, slots=True)
 class TransmissionMember:
-    """A member of the seam.
+    """A kind of transmission.
 
     Attributes:
         name: in robot files: "simple".
-        type: in descriptions, without the package before it: "SimpleTransmission".
-        size: how many joints and how many actuators it has.
+        type: in descriptions, without the package: "SimpleTransmission".
+        size: number of joints and of actuators.
         of: (tag, compat) -> the transmission of a tag with `size` joints and actuators in role order.
     """
 

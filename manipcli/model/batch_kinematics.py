@@ -1,7 +1,7 @@
-"""Poses of links over many instants at once, in numpy: what a recording writes and a picture draws.
+"""Forward kinematics of many instants at once in numpy, for recordings and pictures.
 
-Each moving joint is two constant quaternions: with X_PJ = (p, v) and u = v (axis, 0), the quaternion of its child link
-at angle q is  u sin(q/2) + v cos(q/2).
+Two constant quaternions describe each moving joint: with X_PJ = (p, v) and u = v (axis, 0), the quaternion of its child
+link at angle q is u sin(q/2) + v cos(q/2).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def forward_batch(robot: RobotModel, q: Array) -> tuple[Array, Array]:
 
 
 def tool_poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
-    """Pose of the tool in the world, of a robot that has one: (T, 3) [m] and (T, 4) xyzw, at joint positions (T, n)."""
+    """Pose of the robot's tool in the world at joint positions (T, n): (T, 3) [m] and (T, 4) xyzw."""
     assert robot.tool is not None
     last, X = link_places(robot)[robot.tool.link]
     X = X @ robot.tool.X_LT
@@ -61,18 +61,17 @@ def tool_poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
 
 
 def link_places(robot: RobotModel) -> Mapping[str, tuple[int, Transform]]:
-    """Where each link stands still: in the child link of the last moving joint above it, by its number, or in the world
-    (-1)."""
+    """(index, X) of each link: its constant pose in the child link of moving joint `index`, or in the world (-1)."""
     return _terms(robot).places
 
 
 def still_links(robot: RobotModel) -> frozenset[str]:
-    """Links that no joint moves: the root, and what is fixed to it."""
+    """Names of the links that no joint moves: the root and all links fixed to it."""
     return frozenset(name for name, (joint, _) in link_places(robot).items() if joint < 0)
 
 
 class _Terms:
-    """The constants of a robot's moving joints, each placed in its parent link and behind the joint `before` it."""
+    """The constants of a robot's moving joints, relative to the parent link and to the moving joint `before`."""
 
     def __init__(self, robot: RobotModel) -> None:
         joints = robot.moving_joints
@@ -103,7 +102,7 @@ class _Terms:
 
 
 def _halves(joints: tuple[Joint, ...], placements: list[Transform]) -> tuple[Array, Array, Array, Array]:
-    """(p, u, v, slide), each (n, 3 or 4): position, the two quaternions, and the direction of sliding in the parent."""
+    """(p, u, v, slide), each (n, 3 or 4): position, the two quaternions, and the sliding direction in the parent."""
     n = len(joints)
     p, u, v, slide = np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 4)), np.zeros((n, 3))
     for k, (joint, X) in enumerate(zip(joints, placements, strict=True)):

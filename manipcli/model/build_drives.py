@@ -1,4 +1,4 @@
-"""What drives the joints: the transmissions and actuators of a robot file, with those of its descriptions."""
+"""Transmissions and actuators of a robot, from the robot file and its descriptions."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 def build_transmissions(
     reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], described: Sequence[TransmissionTag]
 ) -> tuple[TransmissionTag, ...]:
-    """Those of the descriptions, then those of the robot file.
+    """The transmissions of the descriptions, then those of the robot file.
 
-    A transmission of the robot file replaces what descriptions say about its joints, and one of its own name; where
-    only one joint of a described pair is replaced, the pair is in contradiction to it.
+    A transmission of the robot file replaces described transmissions of the same joints or the same name. Replacing
+    only one joint of a described pair is an error.
     """
     driven = {joint.name: joint for joint in joints}
     commanded = [joint.name for joint in joints if joint.independent]
@@ -38,14 +38,14 @@ def build_transmissions(
                 hint = did_you_mean(joint_name, commanded)
                 reporter.error("ROBOT340", message, (*loc, "joints", k), hint=hint)
             elif not joint.independent:
-                what = f"follows '{joint.mimic.joint}' (mimic)" if joint.mimic is not None else "is fixed"
-                message = f"transmission '{name}': joint '{joint_name}' {what}, so no actuator drives it"
+                what = f"mimics '{joint.mimic.joint}'" if joint.mimic is not None else "is fixed"
+                message = f"transmission '{name}': joint '{joint_name}' {what} and cannot have an actuator"
                 reporter.error("ROBOT341", message, (*loc, "joints", k))
         for key, names in (("joints", each.joints), ("actuators", each.actuators)):
             for k, part in enumerate(names):
                 owner = owners.setdefault(f"{key} {part}", name)
                 if owner != name:
-                    message = f"transmission '{name}': {key[:-1]} '{part}' belongs to transmission '{owner}' already"
+                    message = f"transmission '{name}': {key[:-1]} '{part}' already belongs to transmission '{owner}'"
                     reporter.error("ROBOT342", message, (*loc, key, k))
         own[name] = _tag(name, each)
     replaced = {joint for tag in own.values() for joint in tag.joints}
@@ -56,8 +56,8 @@ def build_transmissions(
         shared = replaced.intersection(tag.joints)
         if shared:
             owner = owners[f"joints {min(shared)}"]
-            message = f"transmission '{owner}' takes joint '{min(shared)}' out of '{tag.name}' of the description"
-            hint = f"'{tag.name}' drives {' and '.join(tag.joints)}: let '{owner}' drive all of them"
+            message = f"transmission '{owner}' replaces only joint '{min(shared)}' of '{tag.name}' in the description"
+            hint = f"let '{owner}' drive all joints of '{tag.name}': {' and '.join(tag.joints)}"
             reporter.error("ROBOT343", message, ("transmissions", owner, "joints"), hint=hint)
         kept.append(tag)
     return (*kept, *own.values())
@@ -66,12 +66,12 @@ def build_transmissions(
 def build_actuators(
     reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], transmissions: Sequence[TransmissionTag]
 ) -> tuple[Actuator, ...]:
-    """The actuators of the robot file; each is one of a transmission."""
+    """The actuators of the robot file; each belongs to a transmission."""
     known = [name for tag in transmissions if tag.type in BY_TYPE for name in tag.actuators]
     for name in spec.actuators:
         if name not in known:
             message = f"actuator '{name}' is not in a transmission of the robot"
-            hint = did_you_mean(name, known) or "say under `transmissions:` which joint it drives"
+            hint = did_you_mean(name, known) or "add it to a transmission under `transmissions:`"
             reporter.error("ROBOT344", message, ("actuators", name), hint=hint)
     for tag in transmissions:
         _compare_speeds(reporter, spec, joints, tag)
@@ -91,7 +91,7 @@ def build_actuators(
 
 
 def _compare_speeds(reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint], tag: TransmissionTag) -> None:
-    """A note for each actuator that is too slow for its joints: plans know the joints' limits, not the actuators'."""
+    """A note for each actuator that is too slow for its joints: planning uses the joints' limits only."""
     by_name = {joint.name: joint for joint in joints}
     limits = [by_name[name].limits.velocity for name in tag.joints if name in by_name]
     if tag.type not in BY_TYPE or len(limits) < len(tag.joints) or None in limits:
@@ -102,9 +102,9 @@ def _compare_speeds(reporter: Reporter, spec: RobotSpec, joints: Sequence[Joint]
         own = spec.actuators.get(name)
         if own is None or own.velocity is None or speed <= own.velocity * (1.0 + 1e-9):
             continue
-        message = f"actuator '{name}' reaches {own.velocity:.4g} rad/s or m/s, and would have to turn at {speed:.4g}"
+        message = f"actuator '{name}' is limited to {own.velocity:.4g} rad/s or m/s and needs {speed:.4g}"
         message += f" with {' and '.join(tag.joints)} at their velocity limits"
-        hint = f"narrow them: limits: {{{tag.joints[0]}: {{velocity: ...}}}}"
+        hint = f"lower them: limits: {{{tag.joints[0]}: {{velocity: ...}}}}"
         reporter.note("ROBOT345", message, ("actuators", name, "velocity"), hint=hint)
 
 

@@ -1,4 +1,4 @@
-"""A robot file to the robot: descriptions welded together, groups, named poses, limits, tool frame."""
+"""Builds a robot from a robot file: descriptions welded together, groups, named poses, limits, tool frame."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ def build_robot(
 
     Args:
         spec: the robot file.
-        file: where it is; its relative paths start there.
-        package_path: more folders to look for packages in.
-        allow_outside: lets meshes and includes lie outside of packages and the description's folder.
-        source: of the robot file, for the places and units of what is written.
+        file: path of the robot file; its relative paths start in that folder.
+        package_path: additional folders to search for packages.
+        allow_outside: permits meshes and includes outside of packages and the description's folder.
+        source: of the robot file, for places and units of its values.
 
     Returns:
-        The robot, and what a user should know about it: warnings and notes.
+        The robot, and warnings and notes.
 
     Raises:
-        InvalidInput: every error of the descriptions at once; or, where those are sound, of the robot file.
+        InvalidInput: all errors of the descriptions at once; if these are valid, all errors of the robot file.
     """
     reporter = Reporter(source)
     sources = Packages(file, package_path=package_path, allow_outside=True)
@@ -66,10 +66,10 @@ def build_robot(
 
 
 def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
-    """The robot of a log, from the whole description in it; meshes are neither looked for nor read.
+    """The robot of a log, from the complete description in it; meshes are not read.
 
     Args:
-        spec: the robot file as it was resolved; what it attached is part of `urdf` already.
+        spec: the resolved robot file; attached descriptions are already part of `urdf`.
         urdf: `RobotModel.urdf` of the robot.
 
     Raises:
@@ -84,7 +84,7 @@ def rebuild_robot(spec: RobotSpec, urdf: bytes) -> RobotModel:
 
 
 def bare_robot(parts: Parts) -> RobotModel:
-    """A sound description as a robot of which no file says more: no groups, no named poses, at the world's origin."""
+    """The robot of a valid description without a robot file: no groups, no named poses, at the world's origin."""
     return RobotModel(
         name=parts.name,
         root=parts.root,
@@ -99,7 +99,7 @@ def bare_robot(parts: Parts) -> RobotModel:
 
 
 def _assembled(reporter: Reporter, spec: RobotSpec, body: _Body) -> RobotModel:
-    """The robot of welded parts and of what the robot file says about them."""
+    """The robot of welded descriptions and a robot file."""
     joints = _with_limits(reporter, spec, body.ordered())
     links = tuple(body.links)
     moving = {joint.name: joint for joint in joints if joint.moves}
@@ -145,18 +145,18 @@ class _Descriptions:
         self._allow_outside = allow_outside
 
     def parts(self, uri: str, arguments: Mapping[str, str | int | float | bool], loc: Loc) -> Parts | None:
-        """The parts of one description, or None; findings are reported."""
+        """The parts of a description, or None; findings go to the reporter."""
         try:
             path = self._sources.resolve(uri, relative_to=self._folder)
         except NotFound as error:
             self._reporter.error("ROBOT301", f"description: {error.message}", loc, hint=error.hint)
             return None
         packages = Packages(path, package_path=self._package_path, allow_outside=self._allow_outside)
-        grave = tuple(check for check in CHECKS if check.severity == "error")  # the others read visual meshes, too
-        examination = examine(path, packages=packages, arguments=arguments, checks=grave)
+        errors_only = tuple(check for check in CHECKS if check.severity == "error")  # others also read visual meshes
+        examination = examine(path, packages=packages, arguments=arguments, checks=errors_only)
         self._reporter.findings += examination.errors
         if examination.parts is not None:
-            # Notes are for who writes the description; whoever uses one has not asked for them.
+            # Notes are for the author of a description, not for its users.
             read = [finding for finding in examination.parts.findings if finding.severity == "warning"]
             self._reporter.findings += list(dict.fromkeys(read))
         return examination.parts
@@ -172,7 +172,7 @@ class _Body:
         self.transmissions = transmissions
 
     def weld(self, reporter: Reporter, spec: AttachSpec, parts: Parts, k: int) -> None:
-        """Adds the parts below `spec.parent`, their names prefixed, by a fixed joint `<prefix><root>_attach`."""
+        """Attaches prefixed parts to link `spec.parent` by a fixed joint `<prefix><root>_attach`."""
         prefix = spec.prefix
         names = [link.name for link in self.links]
         if spec.parent not in names:
@@ -186,7 +186,7 @@ class _Body:
         for what in (*added, f"joint '{joint_name}'"):
             if what in taken:
                 hint = f"give this attachment {'another' if prefix else 'a'} prefix"
-                reporter.error("ROBOT303", f"{what} is already there", ("attach", k), hint=hint)
+                reporter.error("ROBOT303", f"{what} already exists", ("attach", k), hint=hint)
         self.links += [dataclasses.replace(link, name=prefix + link.name) for link in parts.links]
         self.joints.append(
             Joint(
@@ -211,7 +211,7 @@ class _Body:
         ]
 
     def ordered(self) -> tuple[Joint, ...]:
-        """Joints depth first; links are put into the order of their joints."""
+        """Joints depth first; also sorts the links into that order."""
         from manipcli.description.urdf.topology import depth_first
 
         joints = depth_first(self.root, {joint.name: joint for joint in self.joints})
@@ -232,7 +232,7 @@ def _prefixed(joint: Joint, prefix: str) -> Joint:
 
 
 def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """The joints with the robot file's limits: positions only narrowed, acceleration stated or the default."""
+    """The joints with the robot file's limits: positions narrowed only, acceleration as written or the default."""
     moving = [joint.name for joint in joints if joint.moves]
     for name in spec.limits:
         if name not in moving:
@@ -252,10 +252,10 @@ def _with_limits(reporter: Reporter, spec: RobotSpec, joints: tuple[Joint, ...])
     if without:
         many = ", ".join(without[:6]) + (", ..." if len(without) > 6 else "")
         message = (
-            f"no acceleration limit is stated for {many}: default_acceleration, "
-            f"{spec.default_acceleration:g} rad/s2 or m/s2, is used"
+            f"no acceleration limit for {many}; using default_acceleration, "
+            f"{spec.default_acceleration:g} rad/s2 or m/s2"
         )
-        hint = f"state it in the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
+        hint = f"add it to the robot file: limits: {{{without[0]}: {{acceleration: ...}}}}"
         reporter.note("ROBOT330", message, ("limits",), hint=hint)
     return tuple(result)
 
@@ -271,8 +271,8 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
         outside = (base.lower is not None and bound < base.lower) or (base.upper is not None and bound > base.upper)
         if outside:
             within = interval(base.lower, base.upper)
-            message = f"joint '{joint.name}': {key} {bound:g} is outside of the description's {within}"
-            hint = joint.meant(bound) or "the robot file may only narrow it"
+            message = f"joint '{joint.name}': {key} {bound:g} is outside the description's {within}"
+            hint = joint.meant(bound) or "choose a value inside: the robot file may only narrow the range"
             reporter.error("ROBOT305", message, ("limits", joint.name, key), hint=hint)
         elif key == "lower":
             lower = bound
@@ -292,7 +292,7 @@ def _overridden(reporter: Reporter, joint: Joint, own: LimitsSpec | None) -> Joi
 def _soft(
     reporter: Reporter, joint: str, own: LimitsSpec, base: JointLimits, lower: float | None, upper: float | None
 ) -> SoftLimits | None:
-    """The description's soft limits with what the robot file says instead; they lie inside of the hard ones."""
+    """The description's soft limits, overridden by the robot file; they must be inside the hard limits."""
     written = (own.soft_lower, own.soft_upper, own.k_position, own.k_velocity)
     if all(value is None for value in written):
         return base.soft
@@ -302,14 +302,14 @@ def _soft(
         if value is None:
             continue
         if (lower is not None and value < lower) or (upper is not None and value > upper):
-            message = f"joint '{joint}': {key} {value:g} is outside of its limits {interval(lower, upper)}"
-            reporter.error("ROBOT307", message, ("limits", joint, key), hint="soft limits lie inside of the limits")
+            message = f"joint '{joint}': {key} {value:g} is outside its limits {interval(lower, upper)}"
+            reporter.error("ROBOT307", message, ("limits", joint, key), hint="choose a value inside the limits")
         elif soft.k_position == 0.0:
-            message = f"joint '{joint}': {key} without k_position, which says how hard it acts"
-            hint = "k_position is a velocity per distance [1/s]; 20 is usual"
+            message = f"joint '{joint}': {key} has no effect without k_position"
+            hint = "add k_position, a velocity per distance [1/s]; 20 is a usual value"
             reporter.error("ROBOT308", message, ("limits", joint, key), hint=hint)
     if soft.lower is not None and soft.upper is not None and soft.lower >= soft.upper:
-        message = f"joint '{joint}': the soft limits {soft.lower:g} and {soft.upper:g} leave nothing between them"
+        message = f"joint '{joint}': soft lower limit {soft.lower:g} is not below soft upper limit {soft.upper:g}"
         reporter.error("ROBOT307", message, ("limits", joint))
     return soft
 
@@ -322,7 +322,7 @@ def _known_link(reporter: Reporter, name: str, links: Sequence[Link], loc: Loc) 
 
 
 def _tool(reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], links: Sequence[Link]) -> Tool | None:
-    """The tool as written, else the tip of the first group, else none."""
+    """The tool as written, else the tip of the first group, else None."""
     if spec.tool is None:
         tip = groups[0].tip if groups else None
         return None if tip is None else Tool(link=tip, X_LT=Transform.identity())

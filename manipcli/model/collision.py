@@ -1,15 +1,15 @@
-"""Does the robot touch itself or the scene? Exact for primitive shapes, convex hulls for meshes (conservative).
+"""Collision checking of the robot with itself and the scene: exact primitives, convex hulls of meshes (conservative).
 
-`CollisionChecker(kinematics, scene)` holds the shapes; `checker.at(...)` fixes where the bodies stand, what the robot
-carries and which contacts are allowed, and that `CollisionQuery` answers for as many joint positions as wanted:
+`CollisionChecker(kinematics, scene)` holds the shapes. `checker.at(...)` sets the poses of the bodies, the carried
+body and the allowed contacts, and returns a `CollisionQuery` for any number of joint positions:
 
     query = checker.at(poses, carried=Carried("cup", link="palm", X_LO=X_LO), ignore=pairs(hand_links, "cup"))
     hit = query.check(q)                                 # CollisionHit | None
     hit = query.check_trajectory(columns, q, times, positions)
 
-Parts are named as contacts are: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
-link and is checked against the scene and the other links. Never checked: links that no moving joint, or only one,
-separates; links that already touch with all joints at zero; things at rest against each other.
+Parts are named as in contacts: `robot/<link>`, or the body. A carried body is part of the robot: it moves with its
+link and is checked against the scene and the other links. Never checked: links with at most one moving joint between
+them; links that overlap with all joints at zero; bodies of the scene against each other.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ if TYPE_CHECKING:
 
     from manipcli.shapes.proximity import CollisionGeometry
 
-RESOLUTION = 0.01  # rad or m: how far any joint moves between two checked positions of a trajectory
-_SEEN = 5e-5  # m: less is 0.0 mm to one digit
+RESOLUTION = 0.01  # rad or m: largest joint motion between two checked positions of a trajectory
+_SEEN = 5e-5  # m: smaller values would be printed as 0.0 mm
 
 Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A movable body that moves with `link`: its frame O stays at `X_LO`."""
+    """A movable body attached to `link`: its frame O is at `X_LO`."""
 
     body: str
     link: str
@@ -48,7 +48,7 @@ class Carried:
 
 @dataclass(frozen=True, slots=True)
 class CollisionHit:
-    """Two parts nearer than the margin. `distance` [m] is negative where they overlap; `time` [s] on a trajectory."""
+    """Two parts closer than the margin. `distance` [m] is negative for an overlap; `time` [s] on a trajectory."""
 
     a: str
     b: str
@@ -57,17 +57,17 @@ class CollisionHit:
 
     @property
     def amount(self) -> str:
-        """How far apart they are, or how deep in each other."""
+        """Clearance or depth of the overlap, with unit."""
         return f"{1000.0 * abs(self.distance):.1f} mm" if abs(self.distance) >= _SEEN else "less than 0.1 mm"
 
     def __str__(self) -> str:
         if abs(self.distance) < _SEEN:
             return f"{self.a} and {self.b} touch"
-        return f"{self.a} and {self.b} {'overlap by' if self.distance < 0.0 else 'come as near as'} {self.amount}"
+        return f"{self.a} and {self.b} {'overlap by' if self.distance < 0.0 else 'have a clearance of'} {self.amount}"
 
 
 def pairs(links: Iterable[str], *bodies: str) -> frozenset[Pair]:
-    """The pairs of each robot link with each body: what `ignore` takes to allow a grasp."""
+    """The pairs of each robot link with each body, for `ignore`: allows a grasp."""
     return frozenset((f"robot/{link}", body) for link in links for body in bodies)
 
 
@@ -107,14 +107,14 @@ class CollisionChecker:
         absent: Iterable[str] = (),
         only: str | None = None,
     ) -> CollisionQuery:
-        """Fix where things stand.
+        """A query with given poses, load and allowed contacts.
 
         Args:
-            poses: `X_WO` of each of `scene.movable`, in that order; None: where the task puts them.
+            poses: `X_WO` of each of `scene.movable`, in that order; None: the poses of the task.
             carried: a movable body that the robot holds.
-            ignore: pairs of parts whose contact is allowed (`pairs` makes them); order does not matter.
-            margin: parts nearer than this [m] count as touching; a negative one forgives so much overlap.
-            absent: bodies that are not there (what lies in a carried cup).
+            ignore: pairs of parts whose contact is allowed (see `pairs`), in any order.
+            margin: parts closer than this [m] are in contact; a negative margin permits that overlap.
+            absent: bodies that are not checked (such as the contents of a carried cup).
             only: a part; pairs without it are not checked.
         """
         where = {body.name: body.X_WO for body in self.scene.bodies}
@@ -139,14 +139,14 @@ class CollisionChecker:
         return CollisionQuery(self._kinematics, parts, self._near, allowed, margin, only=only)
 
     def _touching_at_zero(self) -> set[frozenset[str]]:
-        """Links that touch with every joint at zero (or at its limit nearest to zero): so made, so allowed."""
+        """Links that touch with every joint at zero (or at its limit nearest to zero), which is always allowed."""
         moving = self._kinematics.robot.moving_joints
         zero = CollisionQuery(self._kinematics, self._links, self._near, self._ignored, 0.0)
         return {frozenset((hit.a, hit.b)) for hit in zero.every([joint.limits.nearest(0.0) for joint in moving])}
 
 
 class CollisionQuery:
-    """Fixed obstacles, a fixed load, fixed allowances; see `CollisionChecker.at`."""
+    """A collision query with fixed obstacles, load and allowed contacts; see `CollisionChecker.at`."""
 
     def __init__(
         self,
@@ -170,7 +170,7 @@ class CollisionQuery:
             )
         carried = [k for k, part in enumerate(parts) if part.role == "carried"]
         for i, a in enumerate(parts):
-            # Bodies of the scene never meet each other here: of many, the pairs are not even looked at.
+            # Pairs of scene bodies are never checked, and skipped early because there can be many.
             for j in [k for k in carried if k > i] if a.role == "scene" else range(i + 1, len(parts)):
                 b = parts[j]
                 if only is not None and only not in (a.name, b.name):
@@ -187,16 +187,16 @@ class CollisionQuery:
         )
 
     def check(self, q: npt.ArrayLike) -> CollisionHit | None:
-        """The deepest touching pair at joint positions `q` (n), all moving joints; None if there is none."""
+        """The deepest touching pair at joint positions `q` (n) of all moving joints; None without a contact."""
         return min(self.every(q), key=lambda hit: hit.distance) if self.touches(q) else None
 
     def touches(self, q: npt.ArrayLike) -> bool:
-        """Whether anything touches at `q` (n): the fast question."""
+        """Whether any parts touch at `q` (n); faster than `check`."""
         q = np.asarray(q, dtype=np.float64)
         return bool(self._pin.computeCollisions(self._kinematics.model, self._data, self._broad, q, True))
 
     def every(self, q: npt.ArrayLike) -> tuple[CollisionHit, ...]:
-        """Every touching pair of parts at `q` (n), the deepest contact of each, sorted by name."""
+        """Every touching pair of parts at `q` (n) with its deepest contact, sorted by name."""
         pin, geometry = self._pin, self._geometry
         q = np.asarray(q, dtype=np.float64)
         pin.computeCollisions(self._kinematics.model, self._data, geometry, self._state, q, False)
@@ -215,11 +215,11 @@ class CollisionQuery:
         times: Array,
         positions: Array,
     ) -> CollisionHit | None:
-        """The first hit on the way, with its time; first, last, and every point `RESOLUTION` after the one before.
+        """The first hit on a trajectory, with its time; checks points at most `RESOLUTION` apart, and both ends.
 
         Args:
-            columns: where the joints of the trajectory stand in `q`.
-            q: (n) all moving joints; the others stay here.
+            columns: indices of the trajectory's joints in `q`.
+            q: (n) positions of all moving joints; joints outside the trajectory keep these.
             times: (k,) [s].
             positions: (k, m) of the trajectory's joints; neighbours much closer than `RESOLUTION`.
         """
@@ -235,7 +235,7 @@ class CollisionQuery:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One shape of a robot's link or of a body: `placement` in the joint frame of `joint` (0: the world)."""
+    """A shape of a link or of a body; `placement` is in the frame of `joint` (0: the world)."""
 
     name: str
     role: Literal["link", "carried", "scene"]
@@ -245,7 +245,7 @@ class _Part:
 
 
 def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
-    """Whether two parts move against each other, and not just because one joint turns."""
+    """Whether two parts can move relative to each other through more than one joint."""
     if a.role == b.role == "link":
         return a.joint != b.joint and (a.joint, b.joint) not in near
     if a.role == b.role:
@@ -254,7 +254,7 @@ def _may_meet(a: _Part, b: _Part, near: frozenset[tuple[int, int]]) -> bool:
 
 
 def _neighbours(model: pin.Model) -> frozenset[tuple[int, int]]:
-    """Joints of which one hangs directly on the other, both ways round."""
+    """Pairs of a joint and its parent joint, in both orders."""
     down = {(model.parents[child], child) for child in range(1, model.njoints)}
     return frozenset(down | {(child, parent) for parent, child in down})
 

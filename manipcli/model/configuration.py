@@ -1,4 +1,4 @@
-"""Postures: where all joints stand. Named poses, zero, and mimic joints that follow."""
+"""Configurations: positions of all joints, from named poses or zero, with mimic joints resolved."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from manipcli.model.robot import RobotModel
 
 
 def position_limits(joints: Iterable[Joint]) -> tuple[Array, Array]:
-    """(n,) the least and (n,) the most of each joint [rad or m], soft limits kept; infinite where it has no limit."""
+    """(n,) lower and (n,) upper position limits [rad or m], inside active soft limits; infinite if unlimited."""
     ranges = [joint.limits.within_soft for joint in joints]
     return frozen([lower for lower, _ in ranges]), frozen([upper for _, upper in ranges])
 
 
 def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
-    """(..., n) the same with every mimic joint where its leader puts it: multiplier * q_leader + offset."""
+    """(..., n) `q` with every mimic joint at multiplier * q_leader + offset."""
     position = np.array(q, dtype=np.float64)
     for k, joint in enumerate(robot.moving_joints):
         if joint.mimic is not None:
@@ -29,17 +29,17 @@ def with_mimics(robot: RobotModel, q: npt.ArrayLike) -> Array:
 
 
 def zero_configuration(robot: RobotModel) -> Array:
-    """(n,) every independent joint at zero, or at the limit nearest to it."""
+    """(n,) every independent joint at zero, or at its limit nearest to zero."""
     return with_mimics(robot, [joint.limits.nearest(0.0) for joint in robot.moving_joints])
 
 
 def configuration(robot: RobotModel, pose: str | None = None, *, rest: Array | None = None) -> Array:
-    """(n,) a named pose; None: `home` where there is one, else zero.
+    """(n,) a named pose; by default `home` if it exists, else zero.
 
     Args:
         robot: the robot.
-        pose: its name.
-        rest: (n,) where the joints are that it does not speak of; at zero by default.
+        pose: name of the pose.
+        rest: (n,) positions of the joints that the pose does not set; zero by default.
     """
     q = np.array(zero_configuration(robot) if rest is None else rest)
     if pose is None:

@@ -1,4 +1,4 @@
-"""All actuators of a robot: its transmissions side by side, as one transmission of block matrices."""
+"""Drivetrain of a robot: all its transmissions combined into one with block matrices."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from manipcli.model.robot import Actuator, RobotModel
 
 @dataclass(frozen=True)
 class BlockTransmission(Transmission):
-    """Transmissions side by side: the actuators of the first, then those of the second, and so the joints."""
+    """Several transmissions in a row: the actuators and joints of the first, then those of the second, ..."""
 
     blocks: tuple[Transmission, ...]
 
     @cached_property
     def maps(self) -> Maps:
-        each = [block.maps for block in self.blocks]
+        blocks = [block.maps for block in self.blocks]
         return Maps.of(
-            joint_motion=_diagonal([maps.joint_motion for maps in each]),
-            actuator_motion=_diagonal([maps.actuator_motion for maps in each]),
-            joint_effort=_diagonal([maps.joint_effort for maps in each]),
-            actuator_effort=_diagonal([maps.actuator_effort for maps in each]),
-            offset=np.concatenate([maps.offset for maps in each]) if each else [],
+            joint_motion=_diagonal([maps.joint_motion for maps in blocks]),
+            actuator_motion=_diagonal([maps.actuator_motion for maps in blocks]),
+            joint_effort=_diagonal([maps.joint_effort for maps in blocks]),
+            actuator_effort=_diagonal([maps.actuator_effort for maps in blocks]),
+            offset=np.concatenate([maps.offset for maps in blocks]) if blocks else [],
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Drivetrain:
-    """The a actuators of a robot, which drive as many of its joints.
+    """The a actuators of a robot and the a joints that they drive.
 
     Attributes:
-        actuators: (a) what is known of each; ideal where nothing is.
-        joints: (a) where the joints that they drive stand in a joint vector, in the order of `transmission`.
-        transmission: from the actuators to those joints.
+        actuators: (a) their parameters; ideal if unknown.
+        joints: (a) indices of the driven joints in a joint vector, in the order of `transmission`.
+        transmission: between the actuators and these joints.
     """
 
     actuators: tuple[Actuator, ...]
@@ -49,10 +49,11 @@ class Drivetrain:
 
     @staticmethod
     def of(robot: RobotModel) -> Drivetrain:
-        """In the order of `robot.transmissions`.
+        """The drivetrain in the order of `robot.transmissions`.
 
-        Left out are those that the checks of descriptions tell of: of an unknown type or a wrong number of joints, of
-        joints that nobody commands, and a second one of the same joint (ROS 1 and ros2_control may both describe it).
+        Skipped are transmissions that the checks of descriptions report: of unknown type, with a wrong number of
+        joints, with joints that cannot be commanded, and a second one of the same joint (ROS 1 and ros2_control may
+        both describe it).
         """
         known = {actuator.name: actuator for actuator in robot.actuators}
         free = {joint.name for joint in robot.moving_joints if joint.independent}
@@ -74,13 +75,13 @@ class Drivetrain:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(a) of the actuators."""
+        """(a) names of the actuators."""
         return tuple(actuator.name for actuator in self.actuators)
 
     def state(self, position: Array, velocity: Array, effort: Array) -> list[Array]:
         """Position, velocity and effort of the actuators, each (T, a), from those of all joints (T, n).
 
-        The effort is what reaches the gear: friction, losses and limits of the actuators are in it already.
+        The effort is that at the gear, after friction, losses and limits of the actuators.
         """
         to_actuator, columns = self.transmission.joint_to_actuator, list(self.joints)
         return [
@@ -91,10 +92,10 @@ class Drivetrain:
 
 
 def reflected_inertia(robot: RobotModel) -> Array:
-    """(n) [kg m2 or kg] what the rotors add to the inertia of each joint: the diagonal of T^T J T.
+    """(n) reflected rotor inertia of each joint [kg m2 or kg]: the diagonal of T^T J T.
 
-    velocity_a = T velocity_j and J the rotors' own inertia; for a simple transmission reduction^2 J. What couples the
-    two joints of a pair (the rest of the matrix) is left out.
+    velocity_a = T velocity_j and J is the rotor inertia; for a simple transmission reduction^2 J. The coupling between
+    the two joints of a pair (off the diagonal) is neglected.
     """
     drivetrain = Drivetrain.of(robot)
     inertia = np.zeros(len(robot.joint_names))

@@ -1,6 +1,4 @@
-"""The one definition of a grasp: what presses on an object, what pinches it, and what the hand carries.
-
-Three questions, three names:
+"""Definition of a grasp: pressing links, pinched objects and carried objects.
 
 - *pressing*: the links of the robot that touch an object with force.
 - *pinched*: at least two links press, each with at least `GRIP_FORCE`. The conditions `grasped` and `slip` and the end
@@ -8,8 +6,8 @@ Three questions, three names:
 - *carried*: a link presses, and the object has followed at least `FOLLOWS` of the motion of the hand.
   Every step that ends with an object in the hand asks this, and so does planning again. It needs poses, too.
 
-`slip` (condition) and the grasp intervals of a report ask other questions: how far a pinched object moved in the hand,
-and when a log shows an object pressed and without support. Both build on `pressing`.
+The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
+moved in the hand, an interval is the time in which an object is pressed and has no other support.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ LINK: Final = "robot/"
 GRIP_FORCE: Final = 0.1
 """[N] Least force of each of the two links that pinch an object."""
 BRIDGED: Final = 0.05
-"""[s] A contact that is lost for less is not lost."""
+"""[s] Shorter gaps in a contact are ignored."""
 FOLLOWS: Final = 0.5
 """Share of the hand's motion that a carried object follows at least."""
 STILL: Final = 2e-4
@@ -38,11 +36,11 @@ STILL: Final = 2e-4
 DROPPED: Final = 0.02
 """[m] A lag on the way counts from this motion of the hand on; below it, contacts are still settling."""
 MISPLACED: Final = 0.05
-"""[m] An object further than this from its planned place in the hand is not carried, whatever touches it."""
+"""[m] An object further than this from its planned pose in the hand is not carried."""
 
 
 def pressing(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
-    """How hard each link of the robot presses on a body [N], the hardest first."""
+    """(force [N], link) of each link of the robot that presses on a body, the largest force first."""
     found: dict[str, float] = {}
     for contact in contacts:
         other = contact.b if contact.a == body else contact.a if contact.b == body else ""
@@ -52,7 +50,7 @@ def pressing(contacts: Sequence[Contact], body: str) -> list[tuple[float, str]]:
 
 
 def pinch_force(contacts: Sequence[Contact], body: str) -> float:
-    """The force [N] of the second hardest link on a body; 0 where fewer than two press."""
+    """The second largest force [N] of a link on a body; 0 if fewer than two links press."""
     found = pressing(contacts, body)
     return found[1][0] if len(found) > 1 else 0.0
 
@@ -93,7 +91,7 @@ def _behind(hand: Array, body: Array, travel: float) -> bool:
 
 
 class Grasp:
-    """Follows the object in the hand, to decide whether the hand carries it.
+    """Tracks the object in the hand to decide whether the hand carries it.
 
     The point that is followed is fixed to the object: the one that was at the tool when the hand closed. An object that
     pivots between the fingers is carried; how far it slips or rotates there is the question of `slip`. Its motion counts
@@ -149,7 +147,7 @@ class Grasp:
             motion.look(*points)
 
     def lost(self, carried: Carried, state: WorldState, contacts: Sequence[Contact]) -> str:
-        """Why the hand does not carry this object now; "" where it does."""
+        """Why the hand does not carry this object now; "" if it does."""
         if self._carried is None or self._carried.body != carried.body:
             self.close(carried, state, contacts)
         self.look(state, contacts)
@@ -157,12 +155,12 @@ class Grasp:
         lags = [lag for motion in reversed(self._motions) if (lag := motion.lag(*points)) is not None]
         reasons = []
         if float(state.time) - self._pressed_at > self._bridged:
-            reasons.append("no link of the robot presses on it")
+            reasons.append("no robot link presses on it")
         if lags:
             reasons.append(_described(*lags[0]))
         off = float(np.linalg.norm(self._pose(state, carried).p - carried.X_LO.p))
         if off > MISPLACED and not lags:
-            reasons.append(f"it is {_mm(off)} from its place in the hand")
+            reasons.append(f"it is {_mm(off)} from its planned pose in the hand")
         return ", ".join(reasons)
 
     def _points(self, state: WorldState) -> tuple[Array, Array]:
@@ -170,7 +168,7 @@ class Grasp:
         return self._link(state).apply(self._p_LC), self._object(state).apply(self._p_OC)
 
     def _link(self, state: WorldState) -> Transform:
-        assert self._carried is not None  # callers ask it first
+        assert self._carried is not None  # callers check it first
         return self._kinematics.forward(state.position, self._carried.link)
 
     def _object(self, state: WorldState) -> Transform:

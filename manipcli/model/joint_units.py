@@ -1,6 +1,6 @@
-"""Angles of joints that slide, lengths of joints that turn: told where a file and its robot meet.
+"""Check of units against joint types: angles for prismatic joints, lengths for revolute joints.
 
-The type of a joint's value takes both, because a file does not know by itself what its robot's joints are.
+The type of a joint value accepts both, because joint types are known only with the robot.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from manipcli.spec.source.tree import Node, ScalarNode, SequenceNode, child, sho
 def misread_units(
     spec: Model, source: Source, joints: Iterable[Joint], groups: Iterable[Group]
 ) -> Iterator[Diagnostic]:
-    """An error for each text such as `5 cm` that fits no joint which it is about.
+    """An error for each quantity such as `5 cm` whose unit does not match the type of its joints.
 
     Args:
         spec, source: the file.
@@ -31,7 +31,7 @@ def misread_units(
 
 
 class _Reading:
-    """A walk through what was written and what it was read as."""
+    """Traversal of a file's nodes together with the values read from them."""
 
     def __init__(self, source: Source, joints: Iterable[Joint], groups: Iterable[Group]) -> None:
         self._source = source
@@ -39,7 +39,7 @@ class _Reading:
         self._groups = {group.name: group.joints for group in groups}
 
     def below(self, held: Held, node: Node, path: Loc, about: tuple[str, ...]) -> Iterator[Diagnostic]:
-        """What is wrong at `node` and below; `about`: the joints that this is about, as far as blocks around it say."""
+        """Errors at `node` and below; `about`: names of the joints that the enclosing blocks refer to."""
         value, annotation, metadata = held
         if isinstance(node, ScalarNode):
             unit = unit_of(annotation, metadata)
@@ -51,24 +51,24 @@ class _Reading:
                     message = f"joint '{known[0].name}' is {known[0].type}: {shown(node)} is {given.name}; "
                     yield self._source.finding(207, path, f"{message}expected {describe(wanted[0])}")
             return
-        about = self._said(value) or about
+        about = self._named(value) or about
         for k, (key, inside) in enumerate(children(value, annotation).items()):
             part = k if isinstance(node, SequenceNode) else key
             written = child(node, part)
             if written is not None:
-                own = self._meant(value, k, key, inside[0], about)
+                own = self._joints_of(value, k, key, inside[0], about)
                 yield from self.below(inside, written, (*path, part), own)
 
-    def _said(self, block: object) -> tuple[str, ...]:
-        """The joints that a block speaks of in its `group`, `joints` or `joint_names`."""
+    def _named(self, block: object) -> tuple[str, ...]:
+        """The joints that a block names in `group`, `joints` or `joint_names`."""
         group = getattr(block, "group", None)
         if isinstance(group, str):
             return self._groups.get(group, ())
         names = getattr(block, "joints", None) or getattr(block, "joint_names", None)
         return names if isinstance(names, tuple) else ()
 
-    def _meant(self, value: object, k: int, key: str, inside: object, about: tuple[str, ...]) -> tuple[str, ...]:
-        """The joints of item `k` of a value: its key names a group or a joint; a list is in the order of its joints."""
+    def _joints_of(self, value: object, k: int, key: str, inside: object, about: tuple[str, ...]) -> tuple[str, ...]:
+        """The joints of item `k` of a value: its key names a group or a joint; a list is in the order of `about`."""
         if isinstance(value, dict) and isinstance(inside, dict | tuple):
             return self._groups.get(key, about)
         if isinstance(value, dict) and key in self._joints:

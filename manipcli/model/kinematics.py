@@ -1,8 +1,8 @@
 """Kinematics and dynamics of a robot through Pinocchio.
 
-Joint vectors (n,) follow `RobotModel.moving_joints`; a mimic joint is an ordinary joint here. Inertia is that of the
-links and, on the diagonal, that of the actuators' rotors. Frames: W world, L link,
-T a frame fixed in a link. Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse dynamics) and 6.
+Joint vectors (n,) follow `RobotModel.moving_joints`; mimic joints are treated as independent. The inertia includes that
+of the actuators' rotors on the diagonal. Frames: W world, L link, T a frame fixed in a link.
+Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapters 5 (inverse dynamics) and 6.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 class Kinematics:
-    """Forward kinematics, Jacobians and joint-space dynamics; holds scratch memory, so one object serves one thread.
+    """Forward kinematics, Jacobians and joint-space dynamics; not thread-safe, because it reuses memory.
 
     Args:
-        robot: the robot; its mount `X_WB` is included, so that poses are in the world.
+        robot: the robot; its mount `X_WB` is included, so poses are in the world.
         gravity: (3,) [m/s2] in the world.
     """
 
@@ -35,7 +35,7 @@ class Kinematics:
         self.robot = robot
         self._model = model = pin.Model()
         model.gravity = pin.Motion(np.asarray(gravity, dtype=np.float64), np.zeros(3))
-        # Joints are added in the order of the robot, which is depth first as Pinocchio wants it: q needs no reordering.
+        # Joints are added in the robot's order, which is depth first as in Pinocchio: q needs no reordering.
         at: dict[str, tuple[int, pinocchio.SE3]] = {robot.root: (0, self._se3(robot.X_WB))}
         for joint in robot.joints:
             parent, X = at[joint.parent]
@@ -62,7 +62,7 @@ class Kinematics:
 
     @property
     def model(self) -> pinocchio.Model:
-        """Pinocchio's own: joints in the order of joint vectors, a frame for each link. To be read only."""
+        """Pinocchio's model: joints in the order of joint vectors, a frame per link. Do not modify."""
         return self._model
 
     def _se3(self, X: Transform) -> pinocchio.SE3:
@@ -75,7 +75,7 @@ class Kinematics:
         return Transform(R=frozen(X.rotation), p=frozen(X.translation))
 
     def jacobian(self, q: Array, link: str, offset: Transform | None = None) -> Array:
-        """J_WT (6, n): velocity of frame T (linear rows first, then angular), in world axes, per joint velocity.
+        """J_WT (6, n): velocity of frame T (linear, then angular), in world axes, per joint velocity.
 
         Args:
             q: (n,) joint positions.
@@ -85,14 +85,14 @@ class Kinematics:
         return self.pose_and_jacobian(q, link, offset)[2]
 
     def pose_and_jacobian(self, q: Array, link: str, offset: Transform | None = None) -> tuple[Array, Array, Array]:
-        """(R_WT (3, 3), p_WT (3,), J_WT (6, n)) in one pass; the arrays are the caller's."""
+        """(R_WT (3, 3), p_WT (3,), J_WT (6, n)) in one pass, as new arrays."""
         pin, model, data = self._pin, self._model, self._data
         frame = self._frames[link]
-        # computeFrameJacobian would leave the placements of the joints as they were before.
+        # computeFrameJacobian would not update the placements of the joints.
         pin.computeJointJacobians(model, data, q)
         X = pin.updateFramePlacement(model, data, frame)
         found = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        J: Array = np.array(found).reshape(6, -1)  # of a single joint Pinocchio gives a vector
+        J: Array = np.array(found).reshape(6, -1)  # for a single joint Pinocchio returns a vector
         R, p = np.array(X.rotation), np.array(X.translation)
         if offset is not None:
             arm = R @ offset.p
@@ -104,7 +104,7 @@ class Kinematics:
         return R, p, J
 
     def point_velocity(self, q: Array, v: Array, link: str, offset: Transform | None = None) -> Array:
-        """v_WT (3,) [m/s] of the origin of frame T in the world; T is L itself, or stands at `offset` X_LT in it."""
+        """v_WT (3,) [m/s] of the origin of frame T in the world; T is L, or at `offset` X_LT in L."""
         pin, model, data, frame = self._pin, self._model, self._data, self._frames[link]
         pin.forwardKinematics(model, data, q, v)
         X = pin.updateFramePlacement(model, data, frame)
@@ -113,7 +113,7 @@ class Kinematics:
         return linear if offset is None else linear + cross(V.angular, X.rotation @ offset.p)
 
     def gravity(self, q: Array) -> Array:
-        """g(q) (n,) [N m or N]: what the joints must hold at rest. A view, overwritten by the next call."""
+        """g(q) (n,) [N m or N], the gravity load of the joints. A view, overwritten by the next call."""
         g: Array = self._pin.computeGeneralizedGravity(self._model, self._data, q)
         return g
 

@@ -1,4 +1,4 @@
-"""Groups and named poses of a robot file."""
+"""Builds the groups and named poses of a robot file."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from manipcli.model.reporter import Reporter
 
 LIMIT_TOLERANCE = 1e-6
-"""How far a named pose may lie beyond a limit [rad or m]: angles in degrees are written with few digits."""
+"""Accepted excess of a named pose over a limit [rad or m]: angles in degrees are written with few digits."""
 
 
 def interval(lower: float | None, upper: float | None) -> str:
-    """`-1 to 2`, where None is unlimited."""
+    """`-1 to 2`; None is unlimited."""
     return f"{'-inf' if lower is None else f'{lower:g}'} to {'inf' if upper is None else f'{upper:g}'}"
 
 
 def build_groups(
     reporter: Reporter, spec: RobotSpec, links: Sequence[Link], joints: Sequence[Joint]
 ) -> tuple[Group, ...]:
-    """The groups of a robot file; unknown names are reported."""
+    """The groups of a robot file; errors go to the reporter."""
     found = []
     for name, group in spec.groups.items():
         built = _group(reporter, name, group, links, joints)
@@ -40,7 +40,7 @@ def _group(
 ) -> Group | None:
     link_names = [link.name for link in links]
     if (spec.chain is None) == (spec.joints is None):
-        message = f"group '{name}' needs either a chain or a list of joints"
+        message = f"group '{name}' must have either a chain or a list of joints"
         reporter.error("ROBOT310", message, ("groups", name))
         return None
     if spec.tip is not None and spec.tip not in link_names:
@@ -56,18 +56,18 @@ def _group(
             reporter.error("ROBOT306", message, ("groups", name, "chain", key), hint=did_you_mean(link, link_names))
             return None
     by_child = {joint.child: joint for joint in joints}
-    way: list[Joint] = []
+    path: list[Joint] = []
     at = spec.chain.tip
     while at != spec.chain.base and at in by_child:
-        way.append(by_child[at])
+        path.append(by_child[at])
         at = by_child[at].parent
     if at != spec.chain.base:
-        message = f"group '{name}': link '{spec.chain.tip}' does not stand below '{spec.chain.base}'"
+        message = f"group '{name}': tip link '{spec.chain.tip}' is not below base link '{spec.chain.base}'"
         reporter.error("ROBOT311", message, ("groups", name, "chain"))
         return None
-    names = tuple(joint.name for joint in reversed(way) if joint.independent)
+    names = tuple(joint.name for joint in reversed(path) if joint.independent)
     if not names:
-        message = f"group '{name}': no joint moves between '{spec.chain.base}' and '{spec.chain.tip}'"
+        message = f"group '{name}': no moving joint between '{spec.chain.base}' and '{spec.chain.tip}'"
         reporter.error("ROBOT311", message, ("groups", name, "chain"))
         return None
     return Group(name=name, joints=names, tip=spec.tip or spec.chain.tip)
@@ -89,11 +89,11 @@ def _listed(
         if known is None:
             message = f"group '{name}': joint '{joint}' is not in the robot"
         elif known.mimic is not None:
-            message = f"group '{name}': joint '{joint}' follows '{known.mimic.joint}' and cannot be commanded"
+            message = f"group '{name}': joint '{joint}' mimics '{known.mimic.joint}' and cannot be commanded"
         elif not known.moves:
             message = f"group '{name}': joint '{joint}' is fixed"
         else:
-            message = f"group '{name}': joint '{joint}' is listed twice"
+            message = f"group '{name}': duplicate joint '{joint}'"
         hint = did_you_mean(joint, usable) if known is None else None
         reporter.error("ROBOT312", message, ("groups", name, "joints", k), hint=hint)
     return Group(name=name, joints=tuple(listed), tip=tip) if good else None
@@ -102,12 +102,12 @@ def _listed(
 def build_poses(
     reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], moving: Mapping[str, Joint]
 ) -> tuple[NamedPose, ...]:
-    """The named poses of a robot file, each over all groups it speaks of, within the limits of the joints."""
+    """The named poses of a robot file, each over all its groups, within the limits of the joints."""
     return tuple(_Poses(reporter, spec, groups, moving).build(name) for name in spec.poses)
 
 
 class _Poses:
-    """Named poses refer to each other group by group, so they are looked up by (pose, group)."""
+    """Named poses, looked up by (pose, group): a pose can refer to another pose for each group."""
 
     def __init__(
         self, reporter: Reporter, spec: RobotSpec, groups: Sequence[Group], moving: Mapping[str, Joint]
@@ -121,24 +121,23 @@ class _Poses:
         values: dict[str, float] = {}
         for group in self._spec.poses[name]:
             if group not in self._spec.groups:
-                message = f"pose '{name}': there is no group '{group}'"
-                self._reporter.error("ROBOT320", message, ("poses", name, group), hint=self._instead(group))
-            elif group in self._groups:  # one that could not be built has been reported
+                message = f"pose '{name}': unknown group '{group}'"
+                self._reporter.error("ROBOT320", message, ("poses", name, group), hint=self._group_hint(group))
+            elif group in self._groups:  # invalid groups are already reported
                 values |= self._part(name, group, ())
         at = (self._moving[joint].limits.nearest(q) if joint in self._moving else q for joint, q in values.items())
         return NamedPose(name=name, joints=tuple(values), positions=tuple(at))
 
-    def _instead(self, group: str) -> str | None:
-        """What stands where a group of that name is looked for."""
+    def _group_hint(self, group: str) -> str | None:
         if group in self._moving:
-            own = next((one.name for one in self._groups.values() if group in one.joints), "GROUP")
-            return f"'{group}' is a joint; positions stand below a group: {{{own}: {{{group}: ...}}}}"
+            own = next((known.name for known in self._groups.values() if group in known.joints), "GROUP")
+            return f"'{group}' is a joint; write its position below a group: {{{own}: {{{group}: ...}}}}"
         if not self._spec.groups:
-            return f"state it: groups: {{{group}: {{joints: [...]}}}}"
+            return f"define it: groups: {{{group}: {{joints: [...]}}}}"
         return did_you_mean(group, self._spec.groups)
 
     def _part(self, name: str, group: str, seen: tuple[str, ...]) -> dict[str, float]:
-        """Joint values of one group in one pose; names of other poses are followed."""
+        """Joint values of a group in a pose; references to other poses are resolved."""
         part = self._spec.poses[name][group]
         loc = ("poses", name, group)
         joints = self._groups[group].joints
@@ -149,11 +148,11 @@ class _Poses:
                 self._reporter.error("ROBOT321", f"pose '{name}' refers to itself: {circle}", loc)
                 return {}
             if part not in having:
-                message = f"pose '{name}': there is no pose '{part}' of group '{group}'"
+                message = f"pose '{name}': unknown pose '{part}' of group '{group}'"
                 self._reporter.error("ROBOT321", message, loc, hint=did_you_mean(part, having))
                 return {}
             return self._part(part, group, (*seen, name))
-        if seen:  # the values themselves are checked where they are written
+        if seen:  # the values are checked in the pose that defines them
             return dict(part) if isinstance(part, dict) else dict(zip(joints, part, strict=False))
         if isinstance(part, dict):
             for joint in part:
@@ -164,8 +163,8 @@ class _Poses:
             named = {joint: value for joint, value in part.items() if joint in joints}
             return self._checked(name, named, {joint: (*loc, joint) for joint in named})
         if len(part) != len(joints):
-            message = f"pose '{name}': {len(part)} values for the {len(joints)} joints of group '{group}'"
-            self._reporter.error("ROBOT322", message, loc, hint=f"in this order: {', '.join(joints)}")
+            message = f"pose '{name}' has {len(part)} values for the {len(joints)} joints of group '{group}'"
+            self._reporter.error("ROBOT322", message, loc, hint=f"give one value each for {', '.join(joints)}")
             return {}
         return self._checked(name, dict(zip(joints, part, strict=True)), {j: (*loc, k) for k, j in enumerate(joints)})
 
@@ -176,7 +175,7 @@ class _Poses:
             high = limits.upper is not None and value > limits.upper + LIMIT_TOLERANCE
             if low or high:
                 within = interval(limits.lower, limits.upper)
-                message = f"pose '{name}': joint '{joint}' at {value:g} is outside of {within}"
+                message = f"pose '{name}': joint '{joint}' at {value:g} is outside its limits {within}"
                 self._reporter.error("ROBOT323", message, locs[joint], hint=self._moving[joint].meant(value))
                 continue
             least, most = limits.within_soft
@@ -184,6 +183,6 @@ class _Poses:
                 word, limit = ("lower", least) if value < least else ("upper", most)
                 at, bound = told_apart(value, limit, form=".6g")
                 message = f"pose '{name}': joint '{joint}' at {at} is beyond its soft {word} limit {bound}"
-                hint = f"no motion of an arm begins or ends there: change the pose, `soft_{word}` or `k_position`"
+                hint = f"change the pose, `soft_{word}` or `k_position`: no arm motion starts or ends there"
                 self._reporter.warning("ROBOT324", message, locs[joint], hint=hint)
         return values

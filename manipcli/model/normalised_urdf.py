@@ -1,7 +1,7 @@
-"""URDF that we write ourselves: numbers printed exactly, short lines, nothing but what is understood.
+"""Writer of normalised URDF for logs and engines: exact numbers, short lines, supported elements only.
 
-PyBullet cuts lines at 8191 bytes without a word, reads what is no number as 0, and gives a link without an inertial
-a mass of 1 kg; a text of ours holds none of that.
+It avoids what PyBullet misreads silently: lines beyond 8191 bytes are cut, invalid numbers become 0, and a link without
+an inertial gets a mass of 1 kg.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from manipcli.shapes.mesh import clean_mesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape, Sphere
 
 MAX_LINE = 4096
-"""Bytes; no line that is written is longer."""
+"""Longest line that is written [bytes]."""
 NUDGE = 1e-6
-"""Relative: how far an engine's inertia is moved inside of the triangle inequality where rounding left it outside."""
+"""Relative distance by which an engine's inertia is moved inside the triangle inequality after rounding."""
 
 
 def portable_urdf(
     name: str, links: Sequence[Link], joints: Sequence[Joint], transmissions: Sequence[TransmissionTag]
 ) -> str:
-    """The whole description as text with `package://` meshes; reading it again gives the same links and joints."""
+    """The complete description as text with `package://` meshes; reading it gives the same links and joints."""
     lines = _head(name)
     for link in links:
         lines += _link(link, lambda mesh: mesh.uri)
@@ -43,14 +43,14 @@ def portable_urdf(
 
 
 def engine_urdf(robot: RobotModel, folder: Path) -> str:
-    """What a physics engine reads: inertials, collision shapes, joints; meshes as files of ours, never those of users.
+    """The URDF for a physics engine: inertials, collision shapes, joints; meshes are rewritten by `clean_mesh`.
 
-    A link without an inertial is written with mass 0. Limits are those of the model, robot file included; a mimic joint
-    is an ordinary joint here.
+    A link without an inertial is written with mass 0. Limits include those of the robot file; mimic joints become
+    independent joints.
 
     Args:
         robot: the robot.
-        folder: takes the files of its meshes; to be kept until the engine has read them.
+        folder: receives the mesh files; keep it until the engine has read them.
 
     Raises:
         InvalidInput: a joint moves a link without mass, a line would be too long, or a collision mesh is damaged.
@@ -65,14 +65,14 @@ def engine_urdf(robot: RobotModel, folder: Path) -> str:
         simulated = dataclasses.replace(link, inertial=inertial, visuals=())
         lines += _link(simulated, lambda mesh: str(clean_mesh(mesh, folder)))
     for joint in robot.joints:
-        # Bullet would take greatest numbers for limits.
+        # Bullet would use the largest numbers as limits.
         free = joint.type == "revolute" and joint.limits.lower is None and joint.limits.upper is None
         lines += _joint(dataclasses.replace(joint, type="continuous") if free else joint)
     return _text(lines)
 
 
 def body_urdf(shapes: Sequence[Geometry], inertial: Inertial, folder: Path) -> str:
-    """What a physics engine reads of one rigid body: its shapes and its inertia; `folder` as in `engine_urdf`."""
+    """The URDF of a rigid body for a physics engine: shapes and inertia; `folder` as in `engine_urdf`."""
     link = Link(name="body", inertial=inertial, visuals=(), collisions=tuple(shapes))
     return _text([*_head("body"), *_link(link, lambda mesh: str(clean_mesh(mesh, folder)))])
 
@@ -81,7 +81,7 @@ MASSLESS = Inertial(mass=0.0, X_LI=Transform.identity(), inertia=np.zeros((3, 3)
 
 
 def massless_joints(robot: RobotModel) -> tuple[str, ...]:
-    """Moving joints whose child link, with all that is fixed to it, has no mass."""
+    """Moving joints whose child link has no mass, including all links fixed to it."""
     massive = {link.name for link in robot.links if link.inertial is not None}
     for joint in reversed(robot.joints):  # children come after parents
         if joint.type == "fixed" and joint.child in massive:
@@ -90,12 +90,12 @@ def massless_joints(robot: RobotModel) -> tuple[str, ...]:
 
 
 def massless_links(robot: RobotModel, code: str) -> tuple[Diagnostic, ...]:
-    """What `massless_joints` move, each at its place in the description: no engine with physics can hold it."""
+    """An error for each child link of `massless_joints`: no engine with physics can simulate it."""
     found = []
     for name in massless_joints(robot):
         link = robot.link(robot.joint(name).child)
-        message = f"link '{link.name}', which joint '{name}' moves, has no mass, nor has what is fixed to it"
-        hint = "give it an <inertial> with a mass, or use an engine without physics"
+        message = f"link '{link.name}' has no mass (nor the links fixed to it) and is moved by joint '{name}'"
+        hint = "add an <inertial> with a mass, or use an engine without physics"
         found.append(Diagnostic(code, message, link.place, hint))
     return tuple(found)
 
@@ -115,7 +115,7 @@ def _text(lines: list[str]) -> str:
 
 @functools.lru_cache(maxsize=4096)
 def number(value: float) -> str:
-    """Shortest text that reads back as the same double; no '-0.0'."""
+    """Shortest text of the same double; never '-0.0'."""
     return repr(float(value) + 0.0)
 
 
@@ -135,7 +135,7 @@ def _origin(X: Transform, indent: str) -> list[str]:
 
 
 FileOf = Callable[[Mesh], str]
-"""What stands in the description for the file of a mesh."""
+"""Gives the file name that is written for a mesh."""
 
 
 def _link(link: Link, file_of: FileOf) -> list[str]:
@@ -154,9 +154,9 @@ def _link(link: Link, file_of: FileOf) -> list[str]:
 
 
 def inside_triangle(inertia: Array) -> Array:
-    """`inertia` (3, 3), or where a principal moment exceeds the sum of the others by rounding, one just inside.
+    """`inertia` (3, 3), moved just inside the triangle inequality if rounding left it outside.
 
-    Bullet takes a link whose moments break the inequality by one bit for one without inertia.
+    Bullet drops the inertia of a link that violates the inequality by one bit.
     """
     principal, R = np.linalg.eigh(inertia)
     excess = principal[2] - (principal[0] + principal[1]) * (1.0 - NUDGE)
@@ -170,7 +170,7 @@ def _geometry(tag: str, geometry: Geometry, file_of: FileOf) -> list[str]:
     lines = [f"    <{tag}>", *_origin(geometry.X_LS, "      ")]
     lines.append(f"      <geometry>{_shape(geometry.shape, file_of)}</geometry>")
     if geometry.rgba is not None:
-        # PyBullet gives every material of one name the first one's colour, so the name says the colour.
+        # PyBullet gives all materials of one name the first colour, so the name contains the colour.
         name = "rgba_" + "_".join(number(value) for value in geometry.rgba)
         lines.append(f'      <material name="{name}"><color rgba="{_numbers(geometry.rgba)}"/></material>')
     return [*lines, f"    </{tag}>"]

@@ -1,4 +1,4 @@
-"""Findings about a robot file, each with the place of its value."""
+"""Collector of findings about a robot file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from manipcli.spec.located import Source
 
 
 class Reporter:
-    """Gathers findings about the robot file, each with the place of the value it is about."""
+    """Collects findings about a robot file, each with the place of the value it refers to."""
 
     def __init__(self, source: Source | None) -> None:
         self.source = source
@@ -28,6 +28,6 @@ class Reporter:
         return self.source.place(*loc) if self.source is not None else None
 
     def stop(self) -> None:
-        """Raises InvalidInput when an error was found."""
+        """Raises InvalidInput if there is an error."""
         if any(finding.severity == "error" for finding in self.findings):
             raise InvalidInput(self.findings)

@@ -1,4 +1,4 @@
-"""What a robot is: links, joints, groups, named poses, transmissions. Immutable; built once from a description.
+"""The robot model: links, joints, groups, named poses, transmissions and actuators, immutable.
 
 Frames: L link, J joint (coincides with its child link), P parent link, B robot base, W world.
 """
@@ -19,7 +19,7 @@ from manipcli.description.elements import (
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Independent joints that are planned and named together. `tip`: the link that poses of the group speak of."""
+    """Independent joints that are planned together; `tip`: the link that poses of the group refer to."""
 
     name: str
     joints: tuple[str, ...]
@@ -28,7 +28,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class NamedPose:
-    """Position of some joints, parallel tuples; rad or m."""
+    """Positions of some joints [rad or m], as parallel tuples."""
 
     name: str
     joints: tuple[str, ...]
@@ -37,7 +37,7 @@ class NamedPose:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """The tool frame T at `X_LT` of `link`: +z is the direction of approach, y the one in which fingers close."""
+    """The tool frame T at `X_LT` in `link`: +z is the approach direction, y the direction in which fingers close."""
 
     link: str
     X_LT: Transform
@@ -45,12 +45,12 @@ class Tool:
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """A motor in front of its gear, in its own units: N m and rad, or N and m. The defaults are those of an ideal one.
+    """A motor on its side of the gear: N m and rad, or N and m. The defaults describe an ideal motor.
 
     Attributes:
-        effort: the most that it gives [N m or N]; None: unlimited.
-        velocity: beyond it nothing is left to drive with [rad/s or m/s]; None: unlimited.
-        rotor_inertia: of what turns with it [kg m2 or kg].
+        effort: largest effort [N m or N]; None: unlimited.
+        velocity: speed beyond which it has no driving effort [rad/s or m/s]; None: unlimited.
+        rotor_inertia: [kg m2 or kg].
         viscous_friction: [N m s/rad or N s/m].
         coulomb_friction: [N m or N].
         efficiency: share of its effort that reaches the joints while it drives them.
@@ -69,12 +69,12 @@ class Actuator:
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """The robot. Joints stand in depth-first order from the root; a joint's parent link comes before its child link.
+    """The robot, with joints in depth-first order from the root: parent links come before child links.
 
-    `urdf` is the normalised description (package:// mesh URIs kept) that the log carries;
-    `X_WB` places the root link in the world; `friction` is the coefficient of its surfaces in contact;
-    `collision_ignore` are pairs of links that planning never checks against each other; `compat` says whose four-bar
-    linkages these are, where ROS 1 and ROS 2 differ. `actuators` are those of which something is known.
+    `urdf`: normalised description with package:// mesh URIs, as stored in logs. `X_WB`: pose of the root link in the
+    world. `friction`: friction coefficient of its surfaces. `collision_ignore`: pairs of links that planning never
+    checks against each other. `compat`: convention of four-bar linkages, which differ between ROS 1 and ROS 2.
+    `actuators`: those with known parameters.
     """
 
     name: str
@@ -94,7 +94,7 @@ class RobotModel:
 
     @cached_property
     def moving_joints(self) -> tuple[Joint, ...]:
-        """Every joint that moves, mimics included: the order of all joint vectors (n,) in the program."""
+        """Every joint that moves, including mimic joints: the order of all joint vectors (n,)."""
         return tuple(joint for joint in self.joints if joint.moves)
 
     @cached_property
@@ -104,7 +104,7 @@ class RobotModel:
 
     @cached_property
     def following(self) -> tuple[str, ...]:
-        """Names of the joints that follow others (mimic): nobody commands them."""
+        """Names of the mimic joints, which cannot be commanded."""
         return tuple(joint.name for joint in self.moving_joints if joint.mimic is not None)
 
     @cached_property
@@ -128,7 +128,7 @@ class RobotModel:
         return next(pose for pose in self.poses if pose.name == name)
 
     def indices(self, joints: tuple[str, ...]) -> list[int]:
-        """Where these joints stand in a joint vector."""
+        """Indices of these joints in a joint vector."""
         return [self.joint_names.index(name) for name in joints]
 
     def descendants(self, link: str) -> frozenset[str]:

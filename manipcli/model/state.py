@@ -1,6 +1,6 @@
-"""The state of the world at one instant, or at many: every array may carry leading axes `...` (time).
+"""The state of the world at one or many instants: arrays may have leading axes `...` (time).
 
-The same conditions read a live state (no leading axis) and a whole recording (a leading time axis).
+Conditions read both a live state (without leading axis) and a recording (with a leading time axis).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class WorldState:
         body_quat_xyzw: (..., m, 4).
         body_linear: (..., m, 3) [m/s] velocity of O (not of the centre of mass) in the world.
         body_angular: (..., m, 3) [rad/s] in the world.
-        block: (..., 3 n + 7 m) where positions to quaternions are views of one array; None where they are not.
+        block: (..., 3 n + 7 m) the array that positions to quaternions are views of; None if they are not views.
     """
 
     time: Array
@@ -41,7 +41,7 @@ class WorldState:
 
     @classmethod
     def room(cls, joints: int, bodies: int, *leading: int) -> WorldState:
-        """Zeros in one `block`, which a control tick can copy at once."""
+        """Zeros in one `block`, which can be copied at once per control tick."""
         n, m = joints, bodies
         block = np.zeros((*leading, 3 * n + 7 * m))
         poses = block[..., 3 * n :].reshape(*leading, m, 7)
@@ -52,7 +52,7 @@ class WorldState:
 
     @property
     def numbers(self) -> Array:
-        """(..., 3 n + 7 m) position, velocity, effort, then position and quaternion of each body; not to be written."""
+        """(..., 3 n + 7 m) position, velocity, effort, then position and quaternion of each body; do not modify."""
         if self.block is not None:
             return self.block
         poses = np.concatenate((self.body_position, self.body_quat_xyzw), axis=-1)
@@ -60,15 +60,15 @@ class WorldState:
         return np.concatenate((self.position, self.velocity, self.effort, flat), axis=-1)
 
     def map(self, change: Callable[[Array], Array]) -> WorldState:
-        """The same with every array changed: `states.map(np.copy)`, `states.map(lambda a: a[-1])`."""
+        """The state with a function applied to every array: `states.map(np.copy)`, `states.map(lambda a: a[-1])`."""
         return WorldState(*(change(getattr(self, name)) for name in self.__slots__ if name != "block"))
 
 
 class Contact(NamedTuple):
-    """Two touching parts. `a` and `b` name a body, or `robot/<link>`; sorted so that a <= b.
+    """Two touching parts. `a` and `b` are a body or `robot/<link>`, with a <= b.
 
-    `force` [N]: sum of the normal forces between the two; `distance` [m]: the deepest, negative when penetrating.
-    A named tuple, because a control tick makes many, at a third of a dataclass's cost.
+    `force` [N]: sum of the normal forces between the two; `distance` [m]: the deepest, negative for penetration.
+    A named tuple, because many are created per control tick and a dataclass takes three times as long.
     """
 
     a: str

@@ -1,4 +1,4 @@
-"""Bodies that come from files: a mesh, taken as its convex hull, or a URDF of one link."""
+"""Bodies from files: the convex hull of a mesh, or a URDF with one link."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from manipcli.spec.task import MeshSpec, UrdfSpec
 
 
 def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
-    """A mesh in its own frame; hull, bounding box and mass properties (at uniform density) of its convex hull.
+    """A mesh in its own frame, with the bounding box and mass properties of its convex hull at uniform density.
 
-    Its inertial states 1 kg per m3, so that only its mass has to be scaled; a mesh has no mass of its own.
+    The inertial is for a density of 1 kg/m3 and is scaled to the mass of the body.
 
     Raises:
-        NotFound: there is no such file.
-        ValueError: the file is of another kind, unreadable, or encloses no volume.
+        NotFound: the file does not exist.
+        ValueError: the file has another format, is unreadable, or encloses no volume.
     """
     path = packages.resolve(spec.file, anywhere=True)
     if path.suffix.lower() not in SUFFIXES:
-        raise ValueError(f"'{spec.file}' is no mesh that can be read; it must end in {', '.join(SUFFIXES)}")
-    # A path is relative to the task, which no log is beside.
+        raise ValueError(f"'{spec.file}' is not a supported mesh file; expected {', '.join(SUFFIXES)}")
+    # A path is relative to the task file, which a log does not contain.
     uri = spec.file if spec.file.startswith("package:") else packages.portable(path)
     shape = Mesh(uri=uri, path=path, scale=(spec.scale, spec.scale, spec.scale))
     try:
         hull = coal_shape(shape)
     except (ValueError, RuntimeError) as error:
-        raise ValueError(f"'{spec.file}' cannot be used as a mesh: it holds no solid") from error
+        raise ValueError(f"'{spec.file}' cannot be used as a mesh: it has no convex hull") from error
     points = np.array(hull.points())
     volume = float(hull.computeVolume())
     if not (math.isfinite(volume) and volume > 0.0 and np.all(np.isfinite(points))):
-        raise ValueError(f"'{spec.file}' cannot be used as a mesh: its hull encloses no volume")
+        raise ValueError(f"'{spec.file}' cannot be used as a mesh: its convex hull has no volume")
     low, high = points.min(axis=0), points.max(axis=0)
     return BodyShape(
         geometries=(Geometry(X_LS=Transform.identity(), shape=shape, rgba=rgba),),
@@ -56,17 +56,17 @@ def mesh(spec: MeshSpec, packages: Packages, rgba: Rgba) -> BodyShape:
 
 
 def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
-    """The one link of a URDF, in the link's frame: its collision shapes and its inertia.
+    """The only link of a URDF, in the link's frame: its collision shapes and its inertia.
 
     Args:
         spec: names the file.
         packages: of the file that names it.
-        rgba: instead of the file's colours.
+        rgba: overrides the file's colours.
 
     Raises:
-        NotFound: there is no such file.
+        NotFound: the file does not exist.
         InvalidInput: the file has errors, each with its place.
-        ValueError: it holds more than one link, no collision shape, or (for a link with mass) no moments of inertia.
+        ValueError: it has more than one link, no collision shape, or (for a link with mass) no moments of inertia.
     """
     path = packages.resolve(spec.file, anywhere=True)
     parts = read_parts(read_description(path, packages=packages.below(path)))
@@ -74,8 +74,8 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
         raise InvalidInput(parts.errors)
     if len(parts.links) != 1:
         raise ValueError(
-            f"'{spec.file}' has {len(parts.links)} links; an object of the scene has one, "
-            "as nothing joins two of them: give each part that moves a file of its own"
+            f"'{spec.file}' has {len(parts.links)} links; expected 1, because joints of scene bodies are not "
+            "supported: use one file per moving part"
         )
     (link,) = parts.links
     if not link.collisions:
@@ -99,7 +99,7 @@ def urdf(spec: UrdfSpec, packages: Packages, rgba: Rgba | None) -> BodyShape:
 
 
 def principal(mass: float, centre: npt.ArrayLike, inertia: npt.ArrayLike) -> Inertial:
-    """The inertial with its frame turned into the principal axes, so that `inertia` (3, 3) becomes diagonal.
+    """The inertial in the frame of the principal axes, where `inertia` (3, 3) is diagonal.
 
     Args:
         mass: [kg].

@@ -1,6 +1,6 @@
-"""The shapes of the scene's words: what `cup: {...}` is made of, its hollow, its bounding box, its colour.
+"""Geometry of the bodies that a task file can define (`cup: {...}`): shapes, interior, bounding box, colour.
 
-All in the body's frame O: at the centre for box and sphere, in the middle of the bottom for what stands or contains.
+All in the body's frame O: at the centre of a box or sphere, at the centre of the bottom of other bodies.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ COLORS: dict[str, Rgba] = {
     "mesh": (0.70, 0.66, 0.58, 1.0),
     "urdf": (0.70, 0.66, 0.58, 1.0),
 }
-"""By the word that made the body; `desk` is a fixed box, what things stand on."""
+"""By kind of body; `desk` is a fixed box."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodyShape:
-    """What a body is made of, before it has a place.
+    """Geometry of a body before it has a pose.
 
     Attributes:
         geometries: shapes in O.
         interior: its hollow, or None.
-        size, centre: (3,) [m] its bounding box in O.
-        radius: [m] of its outline seen from above when that is round about O's z axis, else None.
+        size, centre: (3,) [m] bounding box in O.
+        radius: [m] of the outline seen from above if it is a circle about O's z axis, else None.
         flat_top: whether other bodies can rest on its upper side.
-        inertial: mass properties that a file states or a mesh implies; None: the union of the geometries, uniform.
+        inertial: mass properties from a file; None: those of the union of the geometries at uniform density.
     """
 
     geometries: tuple[Geometry, ...]
@@ -53,7 +53,6 @@ class BodyShape:
 
 
 def box(spec: BoxSpec, rgba: Rgba) -> BodyShape:
-    """One box."""
     return BodyShape(
         geometries=(_placed(Box(spec.size), (0.0, 0.0, 0.0), rgba),),
         interior=None,
@@ -64,7 +63,6 @@ def box(spec: BoxSpec, rgba: Rgba) -> BodyShape:
 
 
 def sphere(spec: SphereSpec, rgba: Rgba) -> BodyShape:
-    """One sphere."""
     return BodyShape(
         geometries=(_placed(Sphere(spec.radius), (0.0, 0.0, 0.0), rgba),),
         interior=None,
@@ -75,7 +73,7 @@ def sphere(spec: SphereSpec, rgba: Rgba) -> BodyShape:
 
 
 def cylinder(spec: CylinderSpec, rgba: Rgba) -> BodyShape:
-    """One cylinder that stands on the origin."""
+    """A cylinder whose bottom is at the origin."""
     return BodyShape(
         geometries=(_placed(Cylinder(spec.radius, spec.height), (0.0, 0.0, spec.height / 2.0), rgba),),
         interior=None,
@@ -87,11 +85,11 @@ def cylinder(spec: CylinderSpec, rgba: Rgba) -> BodyShape:
 
 
 def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
-    """A floor disc and `segments` wall boxes that stand on it.
+    """A floor disc and `segments` wall boxes on it.
 
-    The walls' outer faces touch the circle of `radius`, their inner faces the hollow's circle of radius - wall. Each
-    box is 2 R tan(pi / n) wide with R in the middle of the wall: neighbours overlap inside as much as they gape
-    outside, so that the walls' volume is that of the n-sided ring.
+    The outer faces of the walls touch the circle of `radius`, their inner faces that of radius - wall. Each box is
+    2 R tan(pi / n) wide with R at the middle of the wall: the overlaps inside equal the gaps outside, so the volume of
+    the walls is that of the n-sided ring.
     """
     middle, inner, n = spec.radius - spec.wall / 2.0, spec.radius - spec.wall, spec.segments
     depth = spec.height - spec.wall
@@ -114,7 +112,7 @@ def cup(spec: CupSpec, rgba: Rgba) -> BodyShape:
 
 
 def tray(spec: TraySpec, rgba: Rgba) -> BodyShape:
-    """A floor and four walls that stand on it; the walls along y lie between those along x."""
+    """A floor and four walls on it; the walls along y are between those along x."""
     (x, y, z), w = spec.size, spec.wall
     depth = z - w
     middle = w + depth / 2.0

@@ -1,4 +1,4 @@
-"""From what the user wrote under `scene:` and `frames:` to a `Scene`: shapes, mass, places; every finding at once."""
+"""Builds a `Scene` from `scene:` and `frames:` of a task: shapes, masses and poses, with all findings at once."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ SHAPES = ("box", "sphere", "cylinder", "cup", "tray", "mesh", "urdf")
 PLACING = ("pose", "rests_on", "inside", "at", "yaw")
 FLOOR_SIZE = (10.0, 10.0, 0.1)
 LONGEST = 10.0
-"""[m] of what can move: anything longer was meant in millimetres."""
+"""[m] Longest movable body: a longer one was probably meant in millimetres."""
 _SCALED = {"mesh": "`scale: 0.001`", "urdf": '`scale="0.001 0.001 0.001"` at its mesh'}
 EXACT = 1e-9
-"""[m] By so much rounding may move what fits exactly."""
+"""[m] Tolerance for rounding of bodies that fit exactly."""
 UPRIGHT = 1.0 - 1e-6
-"""Least cosine of the tilt of what carries or contains something: none, but for rounding."""
+"""Least cosine of the tilt of a supporting or containing body: upright within rounding."""
 
 
 def build_scene(spec: TaskSpec, *, place: Locate | None = None, packages: Packages | None = None) -> Scene:
@@ -39,18 +39,18 @@ def build_scene(spec: TaskSpec, *, place: Locate | None = None, packages: Packag
 
     Args:
         spec: the task; `scene`, `frames`, `floor` and `simulation.gravity` are read.
-        place: where in the file the value at a path such as `("scene", "cup", "inside")` stands.
-        packages: of the task file, whose bodies name files (mesh, urdf); default: as seen from the working directory.
+        place: gives the position in the file of a value such as `("scene", "cup", "inside")`.
+        packages: resolves the mesh and URDF files; default: relative to the working directory.
 
     Raises:
-        InvalidInput: with every finding: no or several shapes, no or several placements, a body, parent or container
-            that is not there, a missing mass, a wall thicker than its container, bodies that start inside each other.
+        InvalidInput: all findings: no or several shapes, no or several placements, unknown bodies, parents or
+            containers, a missing mass, a wall thicker than its container, bodies that overlap at the start.
     """
     return _Builder(spec, place or (lambda _: None), packages or Packages(None)).build()
 
 
 class _Builder:
-    """One use: collects findings on the way, so that a faulty body does not hide the faults of the others."""
+    """Builds one scene and collects the findings of all bodies."""
 
     def __init__(self, spec: TaskSpec, place: Locate, packages: Packages) -> None:
         self.spec = spec
@@ -80,7 +80,7 @@ class _Builder:
             for a, b, depth in overlaps(bodies):
                 self._error(
                     "TASK226",
-                    f"'{a}' and '{b}' start {depth * 1e3:.1f} mm inside each other",
+                    f"'{a}' and '{b}' overlap by {depth * 1e3:.1f} mm at the start",
                     self._blamed([name for name in reversed(self.spec.scene) if name in (a, b)]),
                     self._apart(a, b),
                 )
@@ -89,17 +89,17 @@ class _Builder:
         return Scene(bodies=tuple(bodies), frames=frames, gravity=frozen(self.spec.simulation.gravity))
 
     def _apart(self, a: str, b: str) -> str:
-        """What keeps two bodies from starting inside each other."""
+        """The hint for two bodies that overlap at the start."""
         specs = {name: self.spec.scene[name] for name in (a, b) if name in self.spec.scene}
         inside = {spec.inside for spec in specs.values()}
         middle = [f"'{name}'" for name, spec in specs.items() if spec.at is None]
         if len(specs) == 2 and len(inside) == 1 and None not in inside and middle:
-            where = f"{' and '.join(middle)} {'are' if len(middle) > 1 else 'is'} in the middle of '{inside.pop()}'"
-            return f"{where}: `at: [X, Y]` says how far from it"
-        return "move one of them; things that only touch are fine"
+            where = f"{' and '.join(middle)} {'are' if len(middle) > 1 else 'is'} at the centre of '{inside.pop()}'"
+            return f"{where}; move {'one' if len(middle) > 1 else 'it'} with `at: [X, Y]`"
+        return "move one of them; contact without overlap is allowed"
 
     def _blamed(self, bodies: Sequence[str]) -> Loc:
-        """Where an argument (`--set`) gave one of these a place or a shape; else the first of them."""
+        """The value from `--set` that places or shapes one of these bodies; else the first body."""
         for name in bodies:
             for word in (*PLACING, *SHAPES):
                 for loc in _written(getattr(self.spec.scene[name], word), ("scene", name, word)):
@@ -115,7 +115,7 @@ class _Builder:
         words = [word for word in SHAPES if getattr(spec, word) is not None]
         if len(words) != 1:
             found = f"has {len(words)} shapes ({', '.join(words)})" if words else "has no shape"
-            self._error("TASK221", f"body '{name}' {found}; it needs exactly one of {', '.join(SHAPES)}", loc)
+            self._error("TASK221", f"body '{name}' {found}; expected exactly one of {', '.join(SHAPES)}", loc)
             return
         (kind,) = words
         rgba = spec.color or COLORS["desk" if kind == "box" and spec.fixed else kind]
@@ -134,18 +134,18 @@ class _Builder:
         if spec.fixed:
             return
         if max(shape.size) > LONGEST:
-            message = f"body '{name}' can move and is {max(shape.size):.3g} m long, more than {LONGEST:g} m"
-            scaled = _SCALED.get(kind, "each size with its unit, as '80 mm'")
-            self._error("TASK222", message, (*loc, kind), f"in millimetres? write {scaled}; else say `fixed: true`")
+            message = f"body '{name}' is {max(shape.size):.3g} m long; movable bodies are at most {LONGEST:g} m"
+            scaled = _SCALED.get(kind, "each size with its unit, such as '80 mm'")
+            self._error("TASK222", message, (*loc, kind), f"in millimetres? write {scaled}; else `fixed: true`")
         if kind == "urdf" and shape.inertial is None:
-            hint = "give the link an <inertial> with mass and moments, or say `fixed: true`"
-            self._error("TASK223", f"body '{name}' can move and its URDF states no inertia", (*loc, kind), hint)
+            hint = "add an <inertial> with mass and moments to the link, or write `fixed: true`"
+            self._error("TASK223", f"body '{name}' is movable but its URDF has no inertia", (*loc, kind), hint)
         elif kind != "urdf" and spec.mass is None:
-            hint = "say `mass: 150 g`, or `fixed: true`"
-            self._error("TASK223", f"body '{name}' can move and has no mass", loc, hint)
+            hint = "write `mass: 150 g`, or `fixed: true`"
+            self._error("TASK223", f"body '{name}' is movable but has no mass", loc, hint)
 
     def _made(self, spec: BodySpec, rgba: Rgba) -> BodyShape:
-        """Raises ValueError when the numbers contradict each other or a file cannot be used."""
+        """Raises ValueError if the numbers contradict each other or a file cannot be used."""
         if spec.box is not None:
             return body_shapes.box(spec.box, rgba)
         if spec.sphere is not None:
@@ -154,16 +154,16 @@ class _Builder:
             return body_shapes.cylinder(spec.cylinder, rgba)
         if spec.cup is not None:
             if spec.cup.wall >= min(spec.cup.radius, spec.cup.height):
-                raise ValueError(f"a wall of {spec.cup.wall:g} m leaves no hollow in the cup")
+                raise ValueError(f"wall of {spec.cup.wall:g} m is too thick: the cup has no interior")
             return body_shapes.cup(spec.cup, rgba)
         if spec.tray is not None:
             x, y, z = spec.tray.size
             if spec.tray.wall >= min(x / 2.0, y / 2.0, z):
-                raise ValueError(f"a wall of {spec.tray.wall:g} m leaves no hollow in the tray")
+                raise ValueError(f"wall of {spec.tray.wall:g} m is too thick: the tray has no interior")
             return body_shapes.tray(spec.tray, rgba)
         if spec.mesh is not None:
             return body_files.mesh(spec.mesh, self.packages, rgba)
-        assert spec.urdf is not None  # the words of SHAPES are the fields of BodySpec
+        assert spec.urdf is not None  # SHAPES lists the fields of BodySpec
         return body_files.urdf(spec.urdf, self.packages, spec.color)
 
     def _add_shape(self, name: str, kind: str, shape: BodyShape) -> None:
@@ -191,17 +191,17 @@ class _Builder:
             centre=shape.centre,
         )
 
-    # -- places
+    # -- poses
 
     def _pose(self, name: str) -> Transform | None:
-        """X_WO of a body of the task; None when a finding says why not (here or at the body that it depends on)."""
+        """X_WO of a body; None with a finding (here or at the body that it depends on)."""
         if name in self.poses or name in self.unplaced:
             return self.poses.get(name)
         if name in self.waiting:
             circle = " -> ".join((*self.waiting[self.waiting.index(name) :], name))
             last = self.waiting[-1]
             word = "inside" if self.spec.scene[last].inside is not None else "rests_on"
-            self._error("TASK225", f"bodies are placed on each other in a circle: {circle}", ("scene", last, word))
+            self._error("TASK225", f"circular placement of bodies: {circle}", ("scene", last, word))
             return None
         self.waiting.append(name)
         X_WO = self._placed(name, self.spec.scene[name])
@@ -216,25 +216,25 @@ class _Builder:
         loc: Loc = ("scene", name)
         words = [word for word in ("pose", "rests_on", "inside") if getattr(spec, word) is not None]
         if len(words) != 1:
-            found = f"is placed twice ({', '.join(words)})" if words else "has no place"
+            found = f"has {len(words)} placements ({', '.join(words)})" if words else "has no placement"
             hint = "`pose: {xyz: [x, y, z]}`, or `rests_on: BODY` with `at: [x, y]`, or `inside: CONTAINER`"
             self._error("TASK224", f"body '{name}' {found}", (*loc, words[-1]) if words else loc, hint)
             return None
         if spec.at is None and spec.rests_on is not None:
-            self._error("TASK224", f"body '{name}' needs `at: [x, y]` beside `rests_on`", (*loc, "rests_on"))
+            self._error("TASK224", f"body '{name}' has `rests_on` without `at: [x, y]`", (*loc, "rests_on"))
             return None
         if spec.at is not None and spec.pose is not None:
-            hint = "say it in the pose: `xyz: [x, y, z]`"
-            self._error("TASK224", f"body '{name}' has `pose` and `at`", (*loc, "at"), hint)
+            hint = "write the position in the pose: `xyz: [x, y, z]`"
+            self._error("TASK224", f"body '{name}' has both `pose` and `at`", (*loc, "at"), hint)
             return None
         if spec.pose is not None:
             if spec.yaw != 0.0:
-                hint = "say it in the pose: `rpy: [0, 0, yaw]`"
-                self._error("TASK224", f"body '{name}' has `pose` and `yaw`", (*loc, "yaw"), hint)
+                hint = "write the yaw in the pose: `rpy: [0, 0, yaw]`"
+                self._error("TASK224", f"body '{name}' has both `pose` and `yaw`", (*loc, "yaw"), hint)
             return spec.pose.transform
         word = "rests_on" if spec.rests_on is not None else "inside"
         other = spec.rests_on or spec.inside or ""
-        known = other in self.spec.scene or other in self.poses  # what is not has been told
+        known = other in self.spec.scene or other in self.poses  # unknown bodies are already reported
         X_WB = self._pose(other) if known else None
         if X_WB is None or name not in self.shapes or other not in self.shapes:
             return None
@@ -243,19 +243,19 @@ class _Builder:
         return self._resting(name, spec, other, X_WB)
 
     def _resting(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """Bottom of the body on the top face of the other, or on what it meets from above of a body from a file: the
-        settling lets it land."""
+        """X_WO with the body's bottom on the top face of the other, or, for a body from a file, where a drop ends."""
         loc: Loc = ("scene", name, "rests_on")
         support, shape = self.shapes[other], self.shapes[name]
         assert spec.at is not None
         if X_WB.R[2, 2] < UPRIGHT:
-            self._error("TASK224", f"nothing rests on '{other}': it is tilted", loc, "give a `pose` instead")
+            self._error("TASK224", f"body '{name}' cannot rest on '{other}': it is tilted", loc, "use `pose` instead")
             return None
         formed = self.kinds[other] in FORMED
         if not support.flat_top and not formed:
             flat = "rest it on a box, a cylinder or the floor"
-            hint = f"say `inside: {other}`" if support.interior is not None else flat
-            self._error("TASK224", f"nothing rests on '{other}': a {self.kinds[other]} has no flat top", loc, hint)
+            hint = f"write `inside: {other}`" if support.interior is not None else flat
+            message = f"body '{name}' cannot rest on '{other}': a {self.kinds[other]} has no flat top"
+            self._error("TASK224", message, loc, hint)
             return None
         top = float(X_WB.p[2] + support.centre[2] + support.size[2] / 2.0)
         X_WO = Transform.of(xyz=(*spec.at, top - _bottom(shape)), rpy=(0.0, 0.0, spec.yaw))
@@ -269,39 +269,39 @@ class _Builder:
             at = f"[{spec.at[0]:g}, {spec.at[1]:g}]"
             middle = X_WB.apply(support.centre)
             across = f"{support.size[0]:g} by {support.size[1]:g} m"
-            hint = f"the top of '{other}' is {across}, its middle at [{middle[0]:g}, {middle[1]:g}] m"
-            self._error("TASK224", f"'{name}' would stand beside '{other}' at {at} m", ("scene", name, "at"), hint)
+            hint = f"the top of '{other}' is {across}, centred at [{middle[0]:g}, {middle[1]:g}] m"
+            self._error("TASK224", f"'{name}' at {at} m is not above '{other}'", ("scene", name, "at"), hint)
             return None
         if not formed:
             return X_WO
         fall = landing(shape, X_WO, support, X_WB)
         if fall is None:
-            message = f"nothing of '{other}' lies below '{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m"
-            self._error("TASK224", message, ("scene", name, "at"), f"choose `at` over a part of '{other}'")
+            message = f"'{name}' at [{spec.at[0]:g}, {spec.at[1]:g}] m is not above any part of '{other}'"
+            self._error("TASK224", message, ("scene", name, "at"), f"choose `at` above a part of '{other}'")
             return None
         return Transform.of(xyz=(0.0, 0.0, -fall)) @ X_WO
 
     def _inside(self, name: str, spec: BodySpec, other: str, X_WB: Transform) -> Transform | None:
-        """On the floor of the other's hollow, `at` and `yaw` as seen from its middle."""
+        """X_WO on the floor of the other's interior, `at` and `yaw` relative to its centre."""
         loc: Loc = ("scene", name, "inside")
         interior, shape = self.shapes[other].interior, self.shapes[name]
         if interior is None:
             containers = [known for known, made in self.shapes.items() if made.interior is not None]
-            hint = f"containers here: {', '.join(containers)}" if containers else "a cup or a tray is a container"
-            self._error("TASK224", f"'{other}' is a {self.kinds[other]} and has no inside", loc, hint)
+            hint = f"containers here: {', '.join(containers)}" if containers else "use a cup or a tray as container"
+            self._error("TASK224", f"'{other}' is not a container but a {self.kinds[other]}", loc, hint)
             return None
         if X_WB.R[2, 2] < UPRIGHT:
-            self._error("TASK224", f"nothing stays inside '{other}': it is tilted", loc, "give a `pose` instead")
+            self._error("TASK224", f"body '{name}' cannot be inside '{other}': it is tilted", loc, "use `pose` instead")
             return None
         lack = _too_big(shape, spec.yaw, interior)
         if lack > EXACT:
-            self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for the inside of '{other}'", loc)
+            self._error("TASK224", f"'{name}' is {digits(lack * 1e3)} mm too wide for '{other}'", loc)
             return None
         x, y = spec.at or (0.0, 0.0)
         lack = _too_big(shape, spec.yaw, interior, x, y)
         if lack > EXACT:
-            hint = f"`at` counts from the middle of '{other}', along its axes"
-            message = f"'{name}' would stand {digits(lack * 1e3)} mm outside of the hollow of '{other}'"
+            hint = f"`at` is relative to the centre of '{other}', along its axes"
+            message = f"'{name}' is {digits(lack * 1e3)} mm outside the interior of '{other}'"
             self._error("TASK224", message, ("scene", name, "at"), hint)
             return None
         floor = interior.shape.length if isinstance(interior.shape, Cylinder) else interior.shape.size[2]
@@ -320,7 +320,7 @@ class _Builder:
 
 
 def _written(value: object, loc: Loc) -> Iterator[Loc]:
-    """Where a value stands, and everything below it."""
+    """The path of a value and of everything below it."""
     yield loc
     if isinstance(value, Model):
         for key in value.model_fields_set:
@@ -330,18 +330,18 @@ def _written(value: object, loc: Loc) -> Iterator[Loc]:
 
 
 def _inertial(spec: BodySpec, shape: BodyShape) -> Inertial:
-    """Mass properties in O: those of a file scaled to the mass that is written, else of the union of the shapes."""
+    """Mass properties in O: those of a file scaled to the written mass, else those of the union of the shapes."""
     if spec.fixed:
         return Inertial(mass=0.0, X_LI=Transform.identity(), inertia=frozen(np.zeros((3, 3))))
     if shape.inertial is None:
-        return union(shape.geometries, spec.mass or 1.0)  # without a mass there is a finding, and no scene
+        return union(shape.geometries, spec.mass or 1.0)  # a missing mass is already reported
     mass = spec.mass or shape.inertial.mass
     scale = mass / shape.inertial.mass
     return Inertial(mass=mass, X_LI=shape.inertial.X_LI, inertia=frozen(shape.inertial.inertia * scale))
 
 
 def _floor_shape() -> BodyShape:
-    # A thick box and not PyBullet's plane: the same body for contact, collision checks and drawing.
+    # A thick box instead of PyBullet's plane: the same body for contact, collision checks and drawing.
     return BodyShape(
         geometries=(Geometry(X_LS=Transform.identity(), shape=Box(FLOOR_SIZE), rgba=COLORS["floor"]),),
         interior=None,
@@ -357,7 +357,7 @@ def _bottom(shape: BodyShape) -> float:
 
 
 def _too_big(shape: BodyShape, yaw: float, interior: Interior, x: float = 0.0, y: float = 0.0) -> float:
-    """By how much [m] the outline of the shape at (x, y) [m], turned by yaw, leaves the hollow; <= 0: it fits."""
+    """Excess [m] of the outline of the shape at (x, y) [m] and `yaw` [rad] over the interior; <= 0: it fits."""
     half: Array = shape.size[:2] / 2.0
     if isinstance(interior.shape, Cylinder):
         outline = shape.radius if shape.radius is not None else float(np.hypot(*half))

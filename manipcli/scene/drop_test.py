@@ -1,4 +1,4 @@
-"""How far a body falls before it meets another one, shape against shape."""
+"""Drop test: distance that a body falls until it touches another body."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from manipcli.scene.scene import Body
 from manipcli.shapes.proximity import coal_shape, distance
 
 FORMED: Final = ("urdf", "mesh")
-"""Kinds of bodies whose top need not be that of their bounding box: a drawer, a shelf."""
+"""Kinds of bodies whose top may be below that of their bounding box: a drawer, a shelf."""
 GRAZES: Final = 1e-5
-"""[m] What overlaps by no more has not met: a thing flush with a wall slides down along it."""
+"""[m] Smaller overlaps are ignored, so that a body flush with a wall slides down along it."""
 LEAST: Final = 2e-4
-"""[m] Least step down, and so the greatest gap that is left: beside a wall distances are small on the whole way."""
+"""[m] Least step down, and so the largest remaining gap: next to a wall all distances are small."""
 
 
 def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape, X_WU: Transform) -> float | None:
-    """[m] how far a body at X_WF falls until it meets `under`; None where it falls past it.
+    """Distance [m] that a body at X_WF falls until it touches `under`; None if it falls past it.
 
-    Conservative advancement: a step as long as the distance meets nothing, whichever way it goes. It has landed where
-    the least step further down would make it overlap.
+    Conservative advancement: a step of the current distance cannot cause contact. The body has landed when the least
+    step further down would make it overlap.
     """
     pairs = [(a, b, coal_shape(a.shape), coal_shape(b.shape)) for a in falling.geometries for b in under.geometries]
     still = [X_WU @ b.X_LS for _, b, _, _ in pairs]
@@ -45,7 +45,7 @@ def landing(falling: Body | BodyShape, X_WF: Transform, under: Body | BodyShape,
 
 
 def _top(body: Body | BodyShape, X_WO: Transform) -> float:
-    """Height [m] of the highest corner of its bounding box."""
+    """Height [m] of the highest corner of the bounding box."""
     return float(X_WO.apply(body.centre)[2] + np.abs(X_WO.R[2]) @ body.size / 2.0)
 
 

@@ -40,8 +40,8 @@ def unit_inertia(shape: Primitive) -> Array:
 def union(geometries: Iterable[Geometry], mass: float) -> Inertial:
     """Mass properties of disjoint primitive shapes as one rigid body of total `mass` [kg] and uniform density.
 
-    Each part weighs by its volume; I = sum R_i I_i R_i^T + m_i (|d_i|^2 1 - d_i d_i^T), the parallel axis theorem
-    with d_i from the common centre of mass. The inertial frame I keeps the axes of the body's frame.
+    I = sum R_i I_i R_i^T + m_i (|d_i|^2 1 - d_i d_i^T), the parallel axis theorem, with m_i in proportion to the volume
+    of part i and d_i from the common centre of mass. The inertial frame I has the axes of the body's frame.
     """
     parts = [(geometry.X_LS, geometry.shape) for geometry in geometries]
     volumes = np.array([volume(_primitive(shape)) for _, shape in parts])

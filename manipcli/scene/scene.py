@@ -1,7 +1,7 @@
-"""What stands around the robot: bodies made of primitive shapes, and named frames. Immutable.
+"""The scene around the robot: bodies and named frames, immutable.
 
-The frame O of a body lies at its reference point: the centre for boxes and spheres; the middle of the *bottom* for
-what stands and contains (cup, tray, cylinder), z up.
+The frame O of a body is at its reference point: the centre of a box or sphere; the centre of the *bottom* of a cup,
+tray or cylinder, z up.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Interior:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One thing in the scene.
+    """A body in the scene.
 
     Attributes:
         name: as in the task.
-        kind: the word of the task file that made it (`box`, `cup`, ...).
+        kind: its shape word in the task file (`box`, `cup`, ...).
         geometries: shapes in O, for contact and for drawing.
         mass: [kg]; 0 when fixed.
         X_OI: inertial frame in O (origin at the centre of mass).
@@ -35,8 +35,8 @@ class Body:
         friction, rolling_friction, spinning_friction: coefficients of this body; the engine combines two bodies'.
         restitution: 0 to 1.
         fixed: never moves.
-        X_WO: where it starts.
-        interior: the hollow, when it has one.
+        X_WO: its pose at the start.
+        interior: the hollow of a container, else None.
         size: (3,) [m] bounding box of the body in O (full lengths).
         centre: (3,) [m] centre of that bounding box in O.
     """
@@ -60,7 +60,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A named frame, fixed in `parent`: 'world', or a body."""
+    """A named frame, fixed in `parent`: 'world' or a body."""
 
     name: str
     parent: str
@@ -69,6 +69,8 @@ class Frame:
 
 @dataclass(frozen=True)
 class Scene:
+    """Bodies, named frames and gravity (3,) [m/s2] in the world."""
+
     bodies: tuple[Body, ...]
     frames: tuple[Frame, ...]
     gravity: Array

@@ -1,4 +1,4 @@
-"""A scene as text and back, so that a log says what stood where without the files that it was built from."""
+"""Scene as JSON, which makes a log independent of the files that the scene was built from."""
 
 from __future__ import annotations
 
@@ -91,14 +91,15 @@ class _Scene(Model):
 
 
 def scene_to_json(scene: Scene) -> bytes:
-    """The scene as JSON: the same bytes for the same scene, every number exact; meshes by their URI."""
+    """The scene as JSON: deterministic bytes, exact numbers; meshes by their URI."""
     bodies = tuple(
         _Body(
             name=body.name,
             kind=body.kind,
             pose=_pose(body.X_WO),
             geometries=tuple(
-                _Geometry(pose=_pose(one.X_LS), shape=_shape(one.shape), rgba=one.rgba) for one in body.geometries
+                _Geometry(pose=_pose(shape.X_LS), shape=_shape(shape.shape), rgba=shape.rgba)
+                for shape in body.geometries
             ),
             mass=body.mass,
             inertial_pose=_pose(body.X_OI),
@@ -114,16 +115,16 @@ def scene_to_json(scene: Scene) -> bytes:
         )
         for body in scene.bodies
     )
-    frames = tuple(_Frame(name=one.name, parent=one.parent, pose=_pose(one.X_PF)) for one in scene.frames)
+    frames = tuple(_Frame(name=frame.name, parent=frame.parent, pose=_pose(frame.X_PF)) for frame in scene.frames)
     made = _Scene(bodies=bodies, frames=frames, gravity=_three(scene.gravity))
     return (json.dumps(made.model_dump(mode="json"), indent=1) + "\n").encode()
 
 
 def scene_from_json(text: bytes) -> Scene:
-    """The scene that `scene_to_json` wrote. No file is looked for: the path of a mesh is its URI.
+    """The scene that `scene_to_json` wrote. No file is read: the path of a mesh is its URI.
 
     Raises:
-        ValueError: the text is no such scene.
+        ValueError: the text is not a valid scene.
     """
     made = TypeAdapter(_Scene).validate_json(text)
     return Scene(
@@ -132,8 +133,8 @@ def scene_from_json(text: bytes) -> Scene:
                 name=body.name,
                 kind=body.kind,
                 geometries=tuple(
-                    Geometry(X_LS=_transform(one.pose), shape=_made(one.shape), rgba=one.rgba)
-                    for one in body.geometries
+                    Geometry(X_LS=_transform(shape.pose), shape=_read_shape(shape.shape), rgba=shape.rgba)
+                    for shape in body.geometries
                 ),
                 mass=body.mass,
                 X_OI=_transform(body.inertial_pose),
@@ -150,7 +151,7 @@ def scene_from_json(text: bytes) -> Scene:
             )
             for body in made.bodies
         ),
-        frames=tuple(Frame(name=one.name, parent=one.parent, X_PF=_transform(one.pose)) for one in made.frames),
+        frames=tuple(Frame(name=frame.name, parent=frame.parent, X_PF=_transform(frame.pose)) for frame in made.frames),
         gravity=frozen(made.gravity),
     )
 
@@ -184,7 +185,7 @@ def _shape(shape: Shape) -> _Box | _Sphere | _Cylinder | _Mesh:
             return _Mesh(type="mesh", uri=uri, scale=scale)
 
 
-def _made(shape: _Box | _Sphere | _Cylinder | _Mesh) -> Shape:
+def _read_shape(shape: _Box | _Sphere | _Cylinder | _Mesh) -> Shape:
     match shape:
         case _Box(size=size):
             return Box(size)

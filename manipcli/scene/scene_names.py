@@ -1,4 +1,4 @@
-"""Names of bodies and frames: which may be given, and which are spoken of without being there."""
+"""Checks of the names of bodies and frames: reserved, duplicate and unknown names."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ RESERVED = ("world", "base", "tool", "robot", "start", "floor")
 
 
 def misnamed(spec: TaskSpec, place: Locate) -> Iterator[Diagnostic]:
-    """TASK220 a body's name that means something else; TASK225 an unknown body that another is placed by; TASK227 a
-    frame's name that is taken, or an unknown parent."""
+    """TASK220: reserved name of a body. TASK225: unknown body in `rests_on` or `inside`. TASK227: reserved or duplicate
+    name of a frame, or unknown parent."""
     bodies = (*spec.scene, *(("floor",) if spec.floor else ()))
     for name, body in spec.scene.items():
         if name in RESERVED or "/" in name:
-            why = "names have no '/'" if "/" in name else "the word means something else in a task"
-            message, hint = f"a body cannot be called '{name}': {why}", f"reserved are {', '.join(RESERVED)}"
+            why = "'/' is not allowed" if "/" in name else "the name is reserved"
+            message = f"invalid name of a body: '{name}': {why}"
+            hint = f"rename it; reserved names: {', '.join(RESERVED)}"
             yield Diagnostic("TASK220", message, place(("scene", name)), hint=hint)
         for word, other in (("rests_on", body.rests_on), ("inside", body.inside)):
             if other is not None and other not in bodies:
                 yield _unknown("TASK225", other, bodies, place(("scene", name, word)))
     for name, frame in spec.frames.items():
         if name in RESERVED or "/" in name or name in spec.scene:
-            message = f"a frame cannot be called '{name}': the name is taken"
+            message = f"invalid name of a frame: '{name}' is already in use"
             yield Diagnostic("TASK227", message, place(("frames", name)))
         if frame.parent in spec.frames and frame.parent not in (*RESERVED, *bodies):
-            message = f"'{frame.parent}' is a frame itself; the parent of a frame is `world` or a body"
+            message = f"parent '{frame.parent}' is a frame; expected `world` or a body"
             its = spec.frames[frame.parent].parent
-            other = f"give it the parent '{its}', and its pose there" if its in ("world", *bodies) else None
+            other = f"use the parent '{its}' and the pose relative to it" if its in ("world", *bodies) else None
             yield Diagnostic("TASK227", message, place(("frames", name, "parent")), hint=other)
         elif frame.parent not in ("world", *bodies):
             yield _unknown("TASK227", frame.parent, ("world", *bodies), place(("frames", name, "parent")))

@@ -1,4 +1,4 @@
-"""Which bodies of a scene start inside each other."""
+"""Pairs of bodies of a scene that overlap at the start."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from manipcli.shapes.primitives import Geometry
 from manipcli.shapes.proximity import coal_shape, distance
 
 TOLERANCE = 1e-3
-"""Depth [m] up to which two bodies count as touching: rounding, and what the settling pushes apart without harm."""
+"""Overlap [m] up to which two bodies only touch: rounding, and what settling separates harmlessly."""
 
 
 def overlaps(bodies: Sequence[Body]) -> Iterator[tuple[str, str, float]]:
-    """Pairs of bodies, not both fixed, that start more than `TOLERANCE` inside each other, with the depth [m].
+    """Pairs of bodies, not both fixed, that overlap by more than `TOLERANCE`, with the depth [m].
 
-    Bounding boxes decide most pairs; the rest are measured exactly, shape against shape.
+    Bounding boxes rule out most pairs; the rest are compared shape by shape.
     """
     boxes = [_world_box(body) for body in bodies]
     for i, j in combinations(range(len(bodies)), 2):
@@ -42,6 +42,6 @@ def _world_box(body: Body) -> tuple[Array, Array]:
 
 
 def _depth(a: Body, shape_a: Geometry, b: Body, shape_b: Geometry) -> float:
-    """How deep two shapes are in each other [m]; 0 when apart."""
+    """Depth of the overlap [m]; 0 if the shapes are apart."""
     X_a, X_b = a.X_WO @ shape_a.X_LS, b.X_WO @ shape_b.X_LS
     return max(0.0, -distance(coal_shape(shape_a.shape), X_a, coal_shape(shape_b.shape), X_b).distance)

@@ -1,7 +1,7 @@
-"""The one door for mesh files: the content decides what a file is, every size is bounded, nothing outside is followed.
+"""Reader of mesh files: format detection by content, bounded sizes, no external references; writer for engines.
 
-An engine crashes on a damaged file, drops a text STL without a word, and reads past the end of an OBJ with a bad index:
-it gets files that `clean_mesh` writes from triangles that were checked.
+An engine crashes on a damaged file, silently drops an ASCII STL, and reads past the end of an OBJ with a bad index.
+Engines therefore get files that `clean_mesh` writes from validated triangles.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from manipcli.shapes.mesh_formats import (
 from manipcli.shapes.primitives import Mesh
 
 SUFFIXES = {".stl": "stl", ".obj": "obj", ".dae": "collada"}
-"""The formats that are read, by the ends of their names."""
+"""Supported formats by suffix."""
 
 Format = Literal["stl", "stl-ascii", "obj", "collada"]
 
@@ -48,10 +48,10 @@ class TriangleMesh:
     Attributes:
         vertices: (n, 3), finite.
         faces: (m, 3) integers, each row the vertices of a triangle.
-        parts: index of the first face of each part; an engine makes a hull of each part.
-        format: what the file holds.
-        up_axis: what a Collada file states, "" where it states none; it changes nothing here.
-        colours: which faces have which colour, as far as the file itself says.
+        parts: index of the first face of each part; an engine builds a hull per part.
+        format: of the content.
+        up_axis: as written in a Collada file, "" if missing; it is not applied.
+        colours: colours of the faces in the file.
     """
 
     vertices: Array
@@ -63,13 +63,13 @@ class TriangleMesh:
 
     @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest corner (3,) of the box about all vertices of triangles."""
+        """Lowest and highest corner (3,) of the bounding box of all triangles."""
         used = self.vertices[self.faces.ravel()]
         return used.min(axis=0), used.max(axis=0)
 
     @functools.cached_property
     def flat(self) -> bool:
-        """Whether the vertices of all triangles lie in a plane, on a line or at a point: they have no hull."""
+        """Whether all triangles lie in a plane, on a line or at a point, so that the hull has no volume."""
         used = self.vertices[np.unique(self.faces)]
         spread = np.linalg.svd(used - used.mean(axis=0), compute_uv=False)
         return len(used) < 4 or bool(spread[2] <= 1e-9 * spread[0])
@@ -77,7 +77,7 @@ class TriangleMesh:
 
 @dataclass(frozen=True, slots=True)
 class MeshFacts:
-    """`low`, `high`: corners (3,) of its box, unscaled, in its frame; `flat`: its vertices span no volume."""
+    """`low`, `high`: corners (3,) of the bounding box, unscaled, in the mesh frame; `flat`: without volume."""
 
     format: Format
     triangles: int
@@ -88,10 +88,10 @@ class MeshFacts:
 
 
 def read_mesh(path: Path) -> TriangleMesh:
-    """The triangles of an STL (binary or text), OBJ or Collada file; a file that did not change is read once.
+    """The triangles of an STL (binary or ASCII), OBJ or Collada file; unchanged files are cached.
 
     Raises:
-        UnusableMesh: not a regular file, too large, of another format, damaged, or without triangles.
+        UnusableMesh: not a regular file, too large, in another format, damaged, or without triangles.
     """
     try:
         info = path.stat()
@@ -100,7 +100,7 @@ def read_mesh(path: Path) -> TriangleMesh:
     except (OSError, ValueError) as error:
         raise UnusableMesh(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if info.st_size > MAX_BYTES:
-        raise UnusableMesh(f"has {info.st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are read")
+        raise UnusableMesh(f"has {info.st_size / 1e6:.0f} MB; at most {MAX_BYTES / 1e6:.0f} MB are allowed")
     if info.st_size == 0:
         raise UnusableMesh("is empty")
     found = _read(path.resolve(), info.st_mtime_ns, info.st_size)
@@ -111,7 +111,7 @@ def read_mesh(path: Path) -> TriangleMesh:
 
 @functools.lru_cache(maxsize=64)
 def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, str | None]:
-    """The mesh, or reason and hint: exceptions are not cached, and a bad file must not be read again and again."""
+    """The mesh, or reason and hint, which are cached unlike exceptions."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -123,14 +123,14 @@ def _read(path: Path, _changed: int, _size: int) -> TriangleMesh | tuple[str, st
     except OSError as error:
         return f"cannot be read: {error.strerror}", None
     except MemoryError:
-        return "needs more memory than there is", None
+        return "does not fit into memory", None
 
 
 def mesh_facts(path: Path) -> MeshFacts:
-    """The facts of a file; one that did not change is read once.
+    """The facts of a mesh file; unchanged files are cached.
 
     Raises:
-        UnusableMesh: it holds no mesh that can be used.
+        UnusableMesh: as `read_mesh`.
     """
     try:
         info = path.stat()
@@ -153,7 +153,7 @@ def _facts(path: Path, _changed: int, _size: int) -> MeshFacts | tuple[str, str 
 
 
 def scaled_box(low: Array, high: Array, scale: tuple[float, float, float]) -> tuple[Array, Array]:
-    """Lowest and highest corner (3,) of a box after scaling; a negative scale mirrors it."""
+    """Lowest and highest corner (3,) of a scaled box; a negative scale mirrors it."""
     corners = np.stack([low * np.array(scale), high * np.array(scale)])
     return corners.min(axis=0), corners.max(axis=0)
 
@@ -170,7 +170,7 @@ _OTHERS: Final = {
     b"iso-10303": "a STEP file",
     b"%pdf": "a PDF document",
 }
-"""By the first bytes, in lower case."""
+"""Other formats by their first bytes, in lower case."""
 
 
 def _other_format(head: bytes) -> str | None:
@@ -193,31 +193,31 @@ def _parsed(data: bytes, suffix: str) -> Parsed:
     if head.startswith((b"<?xml", b"<collada", b"<!doctype")):
         return ("collada", *read_collada(data))
     if other := _other_format(head):
-        raise UnusableMesh(f"is {other}, as its first bytes say", hint=f"expected one of {', '.join(SUFFIXES)}")
+        raise UnusableMesh(f"is {other}, not a mesh", hint=f"convert it to one of {', '.join(SUFFIXES)}")
     if suffix == ".stl" and _BEGINS_AS_OBJ.match(data[:4096]):
-        raise UnusableMesh("looks like an OBJ file, by its first lines", hint="rename it to end with .obj")
+        raise UnusableMesh("contains OBJ, not STL", hint="rename it to *.obj")
     if suffix == ".stl":
         return ("stl", *read_binary_stl(data), "Z_UP", ())
     if suffix == ".dae":
-        raise UnusableMesh("is no Collada file: it does not begin as XML")
+        raise UnusableMesh("is not a Collada file: it is not XML")
     if suffix == ".obj":
         return ("obj", *read_obj(data), "Z_UP", ())
     known = ", ".join(SUFFIXES)
-    raise UnusableMesh(f"is of a format that is not read ('{suffix}'); expected one of {known}", hint="convert it")
+    raise UnusableMesh(f"has the unsupported format '{suffix}'; expected one of {known}", hint="convert it")
 
 
 def _checked(
     kind: Format, vertices: Array, faces: Faces, parts: tuple[int, ...], up_axis: str, colours: Colours
 ) -> TriangleMesh:
     if len(faces) == 0:
-        raise UnusableMesh("holds no triangle")
+        raise UnusableMesh("has no triangles")
     if len(faces) > MAX_TRIANGLES:
-        raise UnusableMesh(f"has {len(faces)} triangles; at most {MAX_TRIANGLES} are read")
+        raise UnusableMesh(f"has {len(faces)} triangles; at most {MAX_TRIANGLES} are allowed")
     if int(faces.min()) < 0 or int(faces.max()) >= len(vertices):
         k = int(np.argmax((faces < 0).any(axis=1) | (faces >= len(vertices)).any(axis=1)))
         at = ", ".join(str(index) for index in faces[k])
-        raise UnusableMesh(f"is damaged: triangle {k + 1} names vertices {at} of {len(vertices)}")
-    # Larger numbers overflow in an engine, which counts in single precision and squares them.
+        raise UnusableMesh(f"is damaged: triangle {k + 1} has vertices {at} of {len(vertices)}")
+    # Larger numbers overflow in an engine, which squares them in single precision.
     bad = ~(np.abs(vertices) < 1e15).all(axis=1)
     if bad.any():
         k = int(np.argmax(bad))
@@ -228,16 +228,16 @@ def _checked(
     )
     low, high = mesh.bounds
     if not (high > low).any():
-        raise UnusableMesh("is damaged: all its triangles lie in one point")
+        raise UnusableMesh("is damaged: all triangles are at one point")
     mesh.faces.flags.writeable = False
     return mesh
 
 
 def clean_mesh(mesh: Mesh, folder: Path) -> Path:
-    """A new file in `folder` with the triangles of `mesh`, unscaled: OBJ for OBJ, as its parts count, else binary STL.
+    """A new file in `folder` with the unscaled triangles of `mesh`: OBJ for OBJ, to keep its parts, else binary STL.
 
     Raises:
-        InvalidInput: the file of the mesh cannot be used.
+        InvalidInput: the mesh file cannot be used.
     """
     try:
         triangles = read_mesh(mesh.path)

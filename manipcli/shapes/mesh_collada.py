@@ -1,11 +1,11 @@
-"""Collada (1.4, 1.5): the triangles of the scene, every node in its place, in metres.
+"""Reader of Collada 1.4 and 1.5: the triangles of the scene with node transforms applied, in metres.
 
-`<up_axis>` is reported and not applied: RViz, MoveIt and Pinocchio take the numbers as they are, and every robot was
-looked at in one of them (Y_UP is what some exporters write over a model whose z points up). `<unit>` is applied, as
-they do. Geometry and plain colours are read; textures, animations and addresses outside of the file are ignored.
+`<up_axis>` is returned but not applied, as in RViz, MoveIt and Pinocchio, in which robots are usually checked (some
+exporters write Y_UP for a model whose z points up). `<unit>` is applied, as in these programs. Geometry and plain
+colours are read; textures, animations and external references are ignored.
 
-pycollada reads such files, too, and was measured: it takes NaN for 0, ignores counts, strides and all but the first <p>
-of <triangles>, and stops without an error at the first word that is no number.
+pycollada is not used: it reads NaN as 0, ignores counts, strides and all but the first <p> of <triangles>, and stops
+silently at the first word that is not a number.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _PRIMITIVES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 
 
 def read_collada(data: bytes) -> tuple[Array, Faces, tuple[int, ...], str, Colours]:
-    """Vertices (n, 3) [m], faces (m, 3), one part, the up axis that is stated, the colours of the faces.
+    """Vertices (n, 3) [m], faces (m, 3), parts (always one), the up axis in the file, and the colours of the faces.
 
     Raises:
-        UnusableMesh: not well-formed, a DOCTYPE, beyond a bound, or wrong counts, references or indices.
+        UnusableMesh: not well-formed, a DOCTYPE, a bound is exceeded, or wrong counts, references or indices.
     """
     root = _tree(data)
     scene = _Scene(root)
@@ -54,7 +54,7 @@ def read_collada(data: bytes) -> tuple[Array, Faces, tuple[int, ...], str, Colou
 
 
 def _tree(data: bytes) -> Element:
-    """The elements without prefixes of their namespaces; ElementTree's own parser has no bounds and reads DOCTYPEs."""
+    """The element tree without namespace prefixes; ElementTree's parser has no bounds and accepts a DOCTYPE."""
     from xml.etree.ElementTree import TreeBuilder
     from xml.parsers import expat
 
@@ -67,7 +67,7 @@ def _tree(data: bytes) -> Element:
         nonlocal depth, count
         depth, count = depth + 1, count + 1
         if count > MAX_ELEMENTS or depth > MAX_DEPTH:
-            raise UnusableMesh(f"has more than {MAX_ELEMENTS} elements, or {MAX_DEPTH} nested")
+            raise UnusableMesh(f"has more than {MAX_ELEMENTS} elements or is nested more than {MAX_DEPTH} deep")
         builder.start(name.rpartition(":")[2], attributes)
 
     def end(name: str) -> None:
@@ -76,7 +76,7 @@ def _tree(data: bytes) -> Element:
         builder.end(name.rpartition(":")[2])
 
     def refuse(*_: object) -> None:
-        raise UnusableMesh("holds a DOCTYPE, which is not allowed", hint="delete it")
+        raise UnusableMesh("has a DOCTYPE, which is not allowed", hint="delete it")
 
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, builder.data
     parser.StartDoctypeDeclHandler = refuse
@@ -85,27 +85,27 @@ def _tree(data: bytes) -> Element:
     except expat.ExpatError as error:
         raise UnusableMesh(f"is not well-formed XML: {expat.ErrorString(error.code)}, line {error.lineno}") from error
     except (LookupError, ValueError) as error:
-        raise UnusableMesh(f"is not readable as XML: {error}") from error
+        raise UnusableMesh(f"is not valid XML: {error}") from error
     root = builder.close()
     if root.tag != "COLLADA":
-        raise UnusableMesh(f"is no Collada file: its root element is <{root.tag}>")
+        raise UnusableMesh(f"is not a Collada file: its root element is <{root.tag}>")
     return root
 
 
 def _asset(root: Element) -> tuple[float, str]:
-    """Metres per unit, and the up axis; "" where none is stated."""
+    """Metres per unit, and the up axis or ""."""
     unit, axis = root.find("asset/unit"), root.find("asset/up_axis")
     (meter,) = _floats(unit.get("meter", "1") if unit is not None else "1", 1, "unit")
     if not 0.0 < meter < math.inf:
-        raise UnusableMesh(f"states a unit of {meter:g} m")
+        raise UnusableMesh(f"has a unit of {meter:g} m; expected a positive length")
     name = (axis.text or "").strip() if axis is not None else ""
     if axis is not None and name not in UP_AXES:
-        raise UnusableMesh(f"states the up axis '{name[:20]}'; expected one of {', '.join(UP_AXES)}")
+        raise UnusableMesh(f"has the unknown up axis '{name[:20]}'; expected one of {', '.join(UP_AXES)}")
     return meter, name
 
 
 class _Scene:
-    """Walks the nodes of the scene and gathers triangles."""
+    """Traverses the nodes of the scene and collects triangles."""
 
     def __init__(self, root: Element) -> None:
         self._root = root
@@ -124,14 +124,16 @@ class _Scene:
     def _named(self, url: str, tag: str) -> Element:
         node = self._by_id.get(url[1:]) if url.startswith("#") else None
         if node is None or node.tag != tag:
-            raise UnusableMesh(f"is damaged: it names {tag} '{url[:60]}', which is not in it")
+            raise UnusableMesh(f"is damaged: it refers to an unknown {tag} '{url[:60]}'")
         return node
 
     def place(self, node: Element, X: Array, depth: int) -> None:
-        """Adds what `node` and the nodes below it hold; `X` (4, 4) places its parent."""
+        """Adds the geometry of `node` and of the nodes below it; `X` (4, 4) is the pose of its parent."""
         self._instances += 1
         if depth > MAX_DEPTH or self._instances > MAX_INSTANCES:
-            raise UnusableMesh(f"has more than {MAX_INSTANCES} nodes, or {MAX_DEPTH} nested (or nodes in a circle)")
+            raise UnusableMesh(
+                f"has more than {MAX_INSTANCES} nodes, nodes nested more than {MAX_DEPTH} deep, or a circle"
+            )
         for child in node:
             made = _transform(child)
             if made is not None:
@@ -150,7 +152,7 @@ class _Scene:
                     self.add(self._named(skin.get("source", ""), "geometry"), X, child)
 
     def add(self, geometry: Element, X: Array, instance: Element | None = None) -> None:
-        """Adds a geometry; `instance` binds the names that it calls its materials by."""
+        """Adds a geometry; `instance` binds the material symbols."""
         if geometry not in self._meshes:
             parts = [part for mesh in geometry.findall("mesh") for part in mesh if part.tag in _PRIMITIVES]
             self._meshes[geometry] = [(*self._triangles_of(part), part.get("material", "")) for part in parts]
@@ -164,7 +166,7 @@ class _Scene:
                 self.placed.append((placed, faces, self._colour(symbol, instance)))
 
     def _colour(self, symbol: str, instance: Element | None) -> Rgba | None:
-        """The diffuse colour behind a material's name; None where there is none, as with a texture: it is no fault."""
+        """The diffuse colour of a material symbol; None without a plain colour, as with a texture."""
         uses = instance.iter("instance_material") if instance is not None else ()
         bound = {use.get("symbol"): use.get("target", "").removeprefix("#") for use in uses}
         material = self._by_id.get(bound.get(symbol) or symbol)
@@ -181,7 +183,7 @@ class _Scene:
         return None
 
     def _triangles_of(self, part: Element) -> tuple[Array, Faces]:
-        """Vertices (n, 3) of one primitive element and its faces (m, 3)."""
+        """Vertices (n, 3) and faces (m, 3) of a primitive element."""
         inputs = part.findall("input")
         vertex = part.find("input[@semantic='VERTEX']")
         if vertex is None:
@@ -195,7 +197,7 @@ class _Scene:
         faces = _faces(part, stride, _whole(vertex.get("offset", "0")))
         if len(faces) and (int(faces.min()) < 0 or int(faces.max()) >= len(points)):
             wrong = int(faces.min()) if int(faces.min()) < 0 else int(faces.max())
-            raise UnusableMesh(f"is damaged: a triangle names vertex {wrong} of {len(points)}")
+            raise UnusableMesh(f"is damaged: a triangle has vertex {wrong} of {len(points)}")
         return points, faces
 
 
@@ -206,7 +208,7 @@ def _points(source: Element) -> Array:
     words = (array.text or "").split()
     declared = array.get("count")
     if declared is not None and _whole(declared) != len(words):
-        raise UnusableMesh(f"is damaged: <float_array> says {declared} numbers and has {len(words)}")
+        raise UnusableMesh(f"is damaged: <float_array> declares {declared} numbers and has {len(words)}")
     values = _floats(words, len(words), "float_array")
     stride, first, count = 3, 0, len(values) // 3
     accessor = source.find("technique_common/accessor")
@@ -215,15 +217,15 @@ def _points(source: Element) -> Array:
             _whole(accessor.get(key, default)) for key, default in (("stride", "1"), ("offset", "0"), ("count", "0"))
         )
     if stride < 3 or first + stride * count > len(values):
-        raise UnusableMesh(f"is damaged: {count} positions of {stride} numbers do not fit into {len(values)}")
+        raise UnusableMesh(f"is damaged: {count} positions of {stride} numbers exceed the {len(values)} numbers given")
     return values[first : first + stride * count].reshape(-1, stride)[:, :3]
 
 
 def _faces(part: Element, stride: int, offset: int) -> Faces:
-    """Triangles (m, 3) as indices of vertices; polygons become fans."""
+    """Triangles (m, 3) as vertex indices; polygons become fans."""
     runs = [_indices(p.text) for p in (*part.findall("p"), *part.findall("ph/p"))]
     if any(len(run) % stride for run in runs):
-        raise UnusableMesh(f"is damaged: <p> of <{part.tag}> does not hold {stride} numbers a vertex")
+        raise UnusableMesh(f"is damaged: <p> of <{part.tag}> does not have {stride} numbers per vertex")
     corners = [run[offset::stride] for run in runs]
     flat = np.concatenate([np.empty(0, dtype=np.int64), *corners])
     if part.tag == "triangles":
@@ -234,20 +236,20 @@ def _faces(part: Element, stride: int, offset: int) -> Faces:
     if part.tag == "polylist":
         sizes = _indices(part.findtext("vcount"))
         if int(sizes.sum()) != len(flat) or (len(sizes) and int(sizes.min()) < 0):
-            raise UnusableMesh(f"is damaged: <vcount> says {int(sizes.sum())} vertices, <p> has {len(flat)}")
+            raise UnusableMesh(f"is damaged: <vcount> declares {int(sizes.sum())} vertices, <p> has {len(flat)}")
         if len(sizes) and bool((sizes == 3).all()):
             return flat.reshape(-1, 3)
         corners = np.split(flat, np.cumsum(sizes)[:-1])
     if sum(max(0, len(run) - 2) for run in corners) > MAX_TRIANGLES:
         raise UnusableMesh(f"has more than {MAX_TRIANGLES} triangles")
-    strip = part.tag == "tristrips"  # its triangles begin with the vertex before; those of a fan with the first
+    strip = part.tag == "tristrips"  # its triangles begin with the previous vertex, those of a fan with the first
     begins = [run[:-2] if strip else np.full(len(run) - 2, run[0]) if len(run) >= 3 else run[:0] for run in corners]
     made = [np.stack([a, run[1:-1], run[2:]], axis=1) for a, run in zip(begins, corners, strict=True) if len(a)]
     return np.concatenate(made) if made else np.empty((0, 3), dtype=np.int64)
 
 
 def _transform(node: Element) -> Array | None:
-    """The transform (4, 4) that an element states; None where it states none."""
+    """The transform (4, 4) of an element; None if it is not a transform."""
     X = np.eye(4)
     match node.tag:
         case "matrix":
@@ -264,7 +266,7 @@ def _transform(node: Element) -> Array | None:
                 s = math.sin(half) / length
                 X[:3, :3] = Transform.of(quat_xyzw=(x * s, y * s, z * s, math.cos(half))).R
         case "lookat" | "skew":
-            raise UnusableMesh(f"places a node by <{node.tag}>, which is not read", hint="export it with matrices")
+            raise UnusableMesh(f"uses <{node.tag}>, which is not supported", hint="export it with matrices")
         case _:
             return None
     return X
@@ -274,7 +276,7 @@ def _indices(text: str | None) -> Faces:
     try:
         return np.array((text or "").split(), dtype=np.int64)
     except (ValueError, OverflowError) as error:
-        raise UnusableMesh(f"is damaged: an index is no whole number ({str(error)[:60]})") from error
+        raise UnusableMesh(f"is damaged: an index is not a whole number ({str(error)[:60]})") from error
 
 
 def _whole(text: str) -> int:
@@ -283,7 +285,7 @@ def _whole(text: str) -> int:
     except ValueError:
         value = -1
     if value < 0:
-        raise UnusableMesh(f"is damaged: '{text[:20]}' is no count")
+        raise UnusableMesh(f"is damaged: '{text[:20]}' is not a count")
     return value
 
 
@@ -291,7 +293,7 @@ def _floats(text: str | list[str] | None, count: int, what: str) -> Array:
     try:
         values = np.array((text or "").split() if not isinstance(text, list) else text, dtype=np.float64)
     except ValueError as error:
-        raise UnusableMesh(f"is damaged: a <{what}> holds what is no number") from error
+        raise UnusableMesh(f"is damaged: <{what}> contains text instead of a number") from error
     if len(values) != count:
-        raise UnusableMesh(f"is damaged: a <{what}> holds {len(values)} numbers instead of {count}")
+        raise UnusableMesh(f"is damaged: <{what}> has {len(values)} numbers; expected {count}")
     return values

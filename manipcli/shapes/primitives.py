@@ -1,4 +1,4 @@
-"""Geometric primitives and mesh references, placed in a frame. Immutable."""
+"""Geometric primitives and mesh references, placed in a frame; immutable."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh file: `uri` as `package://NAME/...`, `path` where it was found, `scale` per axis."""
+    """A mesh file: `uri` as `package://NAME/...`, `path` of the file, `scale` per axis."""
 
     uri: str
     path: Path
@@ -47,7 +47,7 @@ Shape = Box | Sphere | Cylinder | Mesh
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """A shape placed in the frame of a link or an object; `rgba` only matters to what is drawn."""
+    """A shape at `X_LS` in the frame of a link or a body; `rgba` is used for drawing only."""
 
     X_LS: Transform
     shape: Shape

@@ -1,4 +1,4 @@
-"""Convex shapes, distances and contacts between them, through coal: the one module that imports coal."""
+"""Convex shapes, distances and contacts between them, computed by coal; no other module imports coal."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Proximity:
-    """Two shapes A and B in world coordinates.
+    """Distance between two shapes A and B, in world coordinates.
 
     Attributes:
-        distance: [m]; negative where they overlap.
-        point: (3,) halfway between their nearest points.
-        normal: (3,) from A to B; not finite where it is undefined.
+        distance: [m]; negative for an overlap.
+        point: (3,) [m] midpoint of their nearest points.
+        normal: (3,) from A to B; not finite if undefined.
     """
 
     distance: float
@@ -33,10 +33,10 @@ class Proximity:
 
 
 def coal_shape(shape: Shape) -> CollisionGeometry:
-    """Coal's own shape; a mesh becomes the convex hull of the vertices of its triangles.
+    """The shape for coal; a mesh becomes its convex hull.
 
     Raises:
-        ValueError: the mesh cannot be read, or its points span no volume.
+        ValueError: the mesh cannot be read, or is flat.
     """
     import coal
 
@@ -52,7 +52,7 @@ def coal_shape(shape: Shape) -> CollisionGeometry:
                 mesh = read_mesh(path)
             except UnusableMesh as error:
                 raise ValueError(f"mesh '{uri}' {error.reason}") from error
-            if mesh.flat:  # qhull inside coal ends the process on points without a volume
+            if mesh.flat:  # qhull inside coal terminates the process on points without volume
                 raise ValueError(f"mesh '{uri}' is flat")
             return _hull(mesh.vertices[np.unique(mesh.faces)] * np.array(scale))
 
@@ -68,7 +68,7 @@ def _hull(points: Array) -> CollisionGeometry:
 
 
 def surface(shape: Shape, *, most_triangles: int) -> CollisionGeometry | None:
-    """The triangles of a mesh instead of its hull; None for a mesh of more than `most_triangles`."""
+    """The triangles of a mesh instead of its hull; None for a mesh with more than `most_triangles`."""
     import coal
 
     if not isinstance(shape, Mesh):
@@ -88,7 +88,7 @@ def surface(shape: Shape, *, most_triangles: int) -> CollisionGeometry | None:
 
 
 def distance(a: CollisionGeometry, X_WA: Transform, b: CollisionGeometry, X_WB: Transform) -> Proximity:
-    """How far apart two shapes are, and where."""
+    """Distance, midpoint and normal between two shapes."""
     import coal
 
     result = coal.DistanceResult()

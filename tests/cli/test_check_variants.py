@@ -35,7 +35,7 @@ def task(pendulum: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> str:
     [
         ([], ""),
         (["--set", "robot.poses.up.all.0=1.9"], ""),
-        (["--set", "robot.poses.up.all.0=2.1"], "outside of"),
+        (["--set", "robot.poses.up.all.0=2.1"], "outside its limits"),
         (["--set", "robot.pose.up.all.0=2.1"], "error[ROBOT"),
         (["--sample", "1"], ""),
         (["--set", "robot.limits.hinge.upper=1.4"], ""),

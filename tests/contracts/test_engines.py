@@ -533,8 +533,8 @@ def test_bullet_holds_127_joints_and_says_so_of_128(opens: Opens) -> None:
 def test_bullet_refuses_a_joint_that_moves_no_mass(opens: Opens) -> None:
     model = robot([joint("a", "x"), joint("b", "y", parent="x")], [inertial(1.0), None])
     (finding,) = ENGINES["pybullet"].refuses(model)
-    assert finding.message.startswith("link 'y', which joint 'b' moves, has no mass")
-    with pytest.raises(InvalidInput, match="joint 'b' moves, has no mass"):
+    assert finding.message.startswith("link 'y' has no mass")
+    with pytest.raises(InvalidInput, match=r"link 'y' has no mass .* moved by joint 'b'"):
         opens(ENGINES["pybullet"], model)
     assert ENGINES["kinematic"].refuses(model) == ()
 

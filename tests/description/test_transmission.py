@@ -92,7 +92,7 @@ def test_the_four_bar_efforts_of_ros1_come_back_and_lose_power() -> None:
 @pytest.mark.parametrize("offset", [0.0, 1.0, -1.0])
 def test_an_impossible_reduction_is_refused(reduction: float, offset: float) -> None:
     """Case 1: a reduction of 0 is refused whatever the offset."""
-    with pytest.raises(InvalidArgument, match=r"reduction = .* not possible"):
+    with pytest.raises(InvalidArgument, match=r"reduction = .* not allowed"):
         SimpleTransmission(reduction=reduction, offset=offset)
 
 
@@ -172,7 +172,7 @@ def test_random_pairs_come_back_though_the_actuators_were_overwritten(kind: Call
 @pytest.mark.parametrize("field", ["actuator_reduction", "joint_reduction"])
 @pytest.mark.parametrize(
     ("bad", "why"),
-    [((0.0, 1.0), "= 0 is not"), ((1.0, 0.0), "= 0 is not"), ((1.0,), "has 1 number, not 2"), (5.0, "expected 2")],
+    [((0.0, 1.0), "= 0 is not"), ((1.0, 0.0), "= 0 is not"), ((1.0,), "has 1 number; expected 2"), (5.0, "expected 2")],
 )
 def test_a_pair_refuses_a_zero_and_a_wrong_count(
     kind: Callable[..., Transmission], field: str, bad: object, why: str
@@ -184,7 +184,7 @@ def test_a_pair_refuses_a_zero_and_a_wrong_count(
 
 
 def test_offsets_of_pairs_are_two_finite_numbers() -> None:
-    with pytest.raises(InvalidArgument, match="joint_offset has 3 numbers, not 2"):
+    with pytest.raises(InvalidArgument, match="joint_offset has 3 numbers; expected 2"):
         DifferentialTransmission((1.0, 1.0), joint_offset=(0.0, 0.0, 0.0))
     with pytest.raises(InvalidArgument, match="joint_offset = nan"):
         FourBarLinkageTransmission((1.0, 1.0), joint_offset=(0.0, float("nan")))

@@ -92,7 +92,7 @@ def test_an_attached_description_is_welded_on_with_its_prefix(file: Path) -> Non
 
 def test_two_hands_need_prefixes(file: Path) -> None:
     twice = [{"description": "hand.urdf", "parent": "flange"}, {"description": "hand.urdf", "parent": "wrist"}]
-    assert "link 'palm' is already there" in messages(file, attach=twice)
+    assert "link 'palm' already exists" in messages(file, attach=twice)
     assert "did you mean 'flange'" in messages(file, attach=[{"description": "hand.urdf", "parent": "flang"}])
 
 
@@ -112,12 +112,12 @@ def test_a_chain_is_the_independent_joints_on_the_way(file: Path) -> None:
     ("group", "expected"),
     [
         ({"chain": {"base": "base", "tip": "flang"}}, "did you mean 'flange'"),
-        ({"chain": {"base": "wrist", "tip": "upper"}}, "does not stand below"),
-        ({"chain": {"base": "wrist", "tip": "flange"}}, "no joint moves"),
+        ({"chain": {"base": "wrist", "tip": "upper"}}, "tip link 'upper' is not below base link 'wrist'"),
+        ({"chain": {"base": "wrist", "tip": "flange"}}, "no moving joint between 'wrist' and 'flange'"),
         ({"joints": ["j1", "j9"]}, "joint 'j9' is not in the robot"),
         ({"joints": ["j1", "end"]}, "joint 'end' is fixed"),
-        ({"joints": ["j1", "j1"]}, "listed twice"),
-        ({"joints": ["h_follow"]}, "follows 'h_open'"),
+        ({"joints": ["j1", "j1"]}, "duplicate joint 'j1'"),
+        ({"joints": ["h_follow"]}, "mimics 'h_open'"),
         ({"joints": ["j1"], "tip": "nowhere"}, "tip link 'nowhere' is not"),
     ],
 )
@@ -149,13 +149,13 @@ def test_no_pose_is_made_up(file: Path) -> None:
     ("poses", "expected"),
     [
         ({"p": {"arm": [0.0]}}, "1 values for the 2 joints"),
-        ({"p": {"arm": [0.0, 1.5]}}, "joint 'j2' at 1.5 is outside of -1 to 1"),
+        ({"p": {"arm": [0.0, 1.5]}}, "joint 'j2' at 1.5 is outside its limits -1 to 1"),
         ({"p": {"arm": {"j3": 0.0}}}, "joint 'j3' is not in group 'arm'"),
-        ({"p": {"leg": [0.0]}}, "no group 'leg'"),
+        ({"p": {"leg": [0.0]}}, "unknown group 'leg'"),
         ({"p": {"arm": "hom"}, "home": {"arm": [0, 0]}}, "did you mean 'home'"),
         ({"p": {"arm": "q"}, "q": {"arm": "p"}}, "refers to itself"),
         ({"p": {"arm": "p"}}, "refers to itself"),
-        ({"p": {"rail": "q"}, "q": {"arm": [0, 0]}}, "no pose 'q' of group 'rail'"),
+        ({"p": {"rail": "q"}, "q": {"arm": [0, 0]}}, "unknown pose 'q' of group 'rail'"),
     ],
 )
 def test_a_pose_that_cannot_be_is_told(file: Path, poses: dict[str, object], expected: str) -> None:
@@ -168,8 +168,8 @@ def test_a_group_that_a_pose_lacks_is_told_how_to_write(file: Path) -> None:
             build(file, poses=poses, **groups)
         return next(one.hint for one in refused.value.findings if one.code == "ROBOT320")
 
-    assert told({"p": {"leg": [0.0]}}) == "state it: groups: {leg: {joints: [...]}}"
-    joint = "'j1' is a joint; positions stand below a group: {arm: {j1: ...}}"
+    assert told({"p": {"leg": [0.0]}}) == "define it: groups: {leg: {joints: [...]}}"
+    joint = "'j1' is a joint; write its position below a group: {arm: {j1: ...}}"
     assert told({"p": {"j1": [0.0]}}, groups=GROUPS) == joint
     assert told({"p": {"j1": [0.0]}}) == joint.replace("arm", "GROUP")
     assert told({"p": {"amr": [0.0]}}, groups=GROUPS) == "did you mean 'arm'?"
@@ -228,7 +228,7 @@ def test_limits_narrow_and_complete_the_description(file: Path) -> None:
 @pytest.mark.parametrize(
     ("limits", "expected"),
     [
-        ({"j1": {"lower": -2.0}}, "lower -2 is outside of the description's -1 to 1"),
+        ({"j1": {"lower": -2.0}}, "lower -2 is outside the description's -1 to 1"),
         ({"j1": {"upper": 1.1}}, "upper 1.1 is outside"),
         ({"j1": {"upper": 45.0}}, "in degrees? write '45 deg'"),
         ({"j1": {"upper": -2.0}}, "upper -2 is outside"),
@@ -358,6 +358,6 @@ def test_a_joint_that_moves_no_mass_is_no_matter_for_physics(file: Path) -> None
     (file.parent / "arm.urdf").write_text(ARM.replace(link("wrist"), link("wrist", "")))
     robot = build(file)
     assert massless_joints(robot) == ("slide",)
-    with pytest.raises(InvalidInput, match=r"arm.urdf:.*link 'wrist', which joint 'slide' moves, has no mass"):
+    with pytest.raises(InvalidInput, match=r"arm.urdf:.*link 'wrist' has no mass .* is moved by joint 'slide'"):
         engine_urdf(robot, file.parent)
     assert massless_joints(build(file, **HANDED)) == ()  # the hand is fixed to it

@@ -101,7 +101,7 @@ def test_a_margin_makes_near_things_touch() -> None:
     assert hit is not None
     assert hit.distance == pytest.approx(0.01, abs=1e-6)
     assert checker.at(margin=0.02).touches(np.zeros(3))
-    assert str(hit) == "post and robot/c come as near as 10.0 mm"
+    assert str(hit) == "post and robot/c have a clearance of 10.0 mm"
 
 
 def test_allowed_contacts_are_allowed_in_either_order() -> None:

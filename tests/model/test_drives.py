@@ -106,7 +106,7 @@ def test_what_a_simple_transmission_states_is_read_and_the_rest_is_1_and_0(tmp_p
 @pytest.mark.parametrize(
     ("inside", "why"),
     [
-        ("<mechanical_reduction>0</mechanical_reduction>", "a reduction of 0 is not possible"),
+        ("<mechanical_reduction>0</mechanical_reduction>", "reduction is 0; expected a number other than 0"),
         ("<mechanical_reduction>fifty</mechanical_reduction>", "fifty</mechanical_reduction>: expected a finite"),
         ("<mechanical_reduction>1,5</mechanical_reduction>", "1,5</mechanical_reduction>: expected a finite"),
         ("<offset>nan</offset>", "nan</offset>: expected a finite number"),
@@ -127,11 +127,11 @@ def test_a_number_that_is_none_is_an_error_at_its_place(tmp_path: Path, inside: 
         (ros1("SimpleTransmission", *ROLES1), "has 2 joints and 2 actuators; expected 1 each"),
         (
             ros1("DifferentialTransmission", *(part.replace("joint2", "joint1") for part in ROLES1)),
-            "its joints have the roles 'joint1' and 'joint1'; expected joint1 and joint2",
+            "roles of its joints are 'joint1' and 'joint1'; expected joint1 and joint2",
         ),
         (
             ros2("FourBarLinkageTransmission", *(part.replace(' role="actuator1"', "") for part in ROLES2)),
-            "its actuators have the roles 'actuator2' and none",
+            "roles of its actuators are 'actuator2' and none",
         ),
         (ros1("SimpleTransmission", ROLES1[0].replace('"bar"', '"baz"'), ROLES1[2]), "did you mean 'bar'"),
     ],
@@ -201,7 +201,7 @@ SIMPLE = "transmissions: {t: {joints: [foo], actuators: [m]}}\n"
     [
         (SIMPLE.replace("foo", "fooo"), "robot.yaml:3:30: error[ROBOT340]: transmission 't': joint 'fooo' is not in"),
         (SIMPLE.replace("foo", "fooo"), "did you mean 'foo'"),
-        (SIMPLE.replace("foo", "copy"), "joint 'copy' follows 'bar' (mimic)"),
+        (SIMPLE.replace("foo", "copy"), "joint 'copy' mimics 'bar'"),
         (SIMPLE.replace("}}", "}, u: {joints: [foo], actuators: [n]}}"), "joint 'foo' belongs to transmission 't'"),
         (SIMPLE.replace("}}", "}, u: {joints: [bar], actuators: [m]}}"), "actuator 'm' belongs to transmission 't'"),
         (SIMPLE.replace("[foo]", "[foo, bar]"), "joints has 2 items; a simple transmission needs 1"),
@@ -226,15 +226,15 @@ def test_an_actuator_too_slow_for_its_joints_is_noted(tmp_path: Path) -> None:
     own = OWN.replace("3000 deg/s", "100")
     (note,) = [finding for finding in read(tmp_path, "", own)[1] if finding.code == "ROBOT345"]
     assert note.severity == "note"
-    assert "actuator 'left' reaches 100 rad/s or m/s, and would have to turn at 120 with foo and bar" in str(note)
+    assert "actuator 'left' is limited to 100 rad/s or m/s and needs 120 with foo and bar" in str(note)
     fast = read(tmp_path, "", own.replace("velocity: 100", "velocity: 120"))[1]
     assert "ROBOT345" not in {finding.code for finding in fast}
 
 
 def test_half_of_a_described_pair_is_not_replaced(tmp_path: Path) -> None:
     told = refused(tmp_path, ros1("DifferentialTransmission", *ROLES1), SIMPLE.replace("t:", "u:"))
-    assert "transmission 'u' takes joint 'foo' out of 't' of the description" in told
-    assert "'t' drives foo and bar: let 'u' drive all of them" in told
+    assert "transmission 'u' replaces only joint 'foo' of 't' in the description" in told
+    assert "let 'u' drive all joints of 't': foo and bar" in told
 
 
 def test_a_joint_that_both_generations_describe_is_driven_once(tmp_path: Path) -> None:

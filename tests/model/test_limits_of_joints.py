@@ -156,9 +156,12 @@ def test_a_robot_file_states_soft_limits(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("own", "told"),
     [
-        ({"soft_upper": 2.5, "k_position": 1.0}, "soft_upper 2.5 is outside of its limits"),
+        ({"soft_upper": 2.5, "k_position": 1.0}, "soft_upper 2.5 is outside its limits"),
         ({"soft_lower": 0.0}, "without k_position"),
-        ({"soft_lower": 0.5, "soft_upper": 0.5, "k_position": 1.0}, "leave nothing between them"),
+        (
+            {"soft_lower": 0.5, "soft_upper": 0.5, "k_position": 1.0},
+            "soft lower limit 0.5 is not below soft upper limit 0.5",
+        ),
     ],
 )
 def test_soft_limits_that_cannot_act_are_refused(tmp_path: Path, own: dict[str, float], told: str) -> None:

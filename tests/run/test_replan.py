@@ -222,7 +222,7 @@ def test_an_object_that_fell_is_no_longer_in_the_hand(world_at: WorldOf) -> None
     world = world_at(PLACE)
     before = world.before(PLACE)
     world.put("block", shifted(before.bodies[0], MISPLACED + 0.02))
-    assert world.told(PLACE) == ("'block' is not in the hand: it is 70.0 mm from its place in the hand",)
+    assert world.told(PLACE) == ("'block' is not in the hand: it is 70.0 mm from its planned pose in the hand",)
     assert world.measured.situation(before).carried is None
 
 

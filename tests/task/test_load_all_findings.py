@@ -399,7 +399,7 @@ def test_a_body_called_as_a_word_and_as_a_link_is_told_once(tmp_path: Path) -> N
     body = "{box: {size: [1 cm, 1 cm, 1 cm]}, pose: {xyz: [1, 0, 1]}, mass: 1}"
     told = findings(tmp_path, f"scene:\n  tool: {body}\nsteps: [wait: 1 s]\n")
     assert [line for line, *_ in told] == [5]
-    assert "the word means something else in a task" in told[0][2]
+    assert "the name is reserved" in told[0][2]
 
 
 def of_controllers(tmp_path: Path, text: str) -> list[tuple[int, str, str | None]]:

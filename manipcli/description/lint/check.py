@@ -1,4 +1,4 @@
-"""The contract of checks: what can be wrong with a description, one member a kind of defect."""
+"""The check seam: one member per kind of defect in a robot description."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from manipcli.description.packages import Packages
 from manipcli.description.urdf.urdf import Parts
 
 Tier = Literal["schema", "topology", "physics", "assets", "readiness"]
-"""What a defect is about, from the text to the simulation."""
+"""Area of a check, from the XML text to simulation readiness."""
 
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A description under examination.
+    """A description that is being checked.
 
     Attributes:
-        description: its expanded tree; every element knows where the user wrote it.
-        parts: links, joints and transmissions as far as they could be read, with the findings of reading.
-        packages: resolves what it names.
+        description: the expanded tree; every element has its place in the source file.
+        parts: links, joints and transmissions as far as they could be read, with the reader's findings.
+        packages: resolves the packages and files that the description names.
     """
 
     description: Description
@@ -35,18 +35,18 @@ Find = Callable[[Subject], Iterable[Diagnostic]]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A member of the seam.
+    """A check of descriptions.
 
     Attributes:
         code: stable, `URDF031`.
         name: one or a few words, joined by `-`, for tables.
-        tier: what it is about.
-        severity: of its findings, unless one says otherwise; none is graver. Loading makes the checks of errors.
-        summary: what is wrong, in one line without values.
-        reason: why it matters: what a simulator or planner does with it. For `--explain`.
-        bad: a whole description (URDF or xacro text) that has exactly this defect.
-        find: every occurrence in a subject.
-        files: what `bad` names besides, by path relative to it, made when it is asked for.
+        tier: the area that it checks.
+        severity: highest severity of its findings. Loading a robot runs only the checks of severity `error`.
+        summary: the defect, in one line without values.
+        reason: what a simulator or planner does with the defect; printed by `--explain`.
+        bad: a complete description (URDF or xacro text) with exactly this defect.
+        find: yields every occurrence in a subject.
+        files: creates the files that `bad` refers to, by path relative to it.
     """
 
     code: str
@@ -69,7 +69,7 @@ def check(
     bad: str,
     files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
 ) -> Callable[[Find], Check]:
-    """Makes the check of a function that finds. Its docstring is the summary, then the reason."""
+    """Decorator: makes a `Check` of a finder function, whose docstring is the summary, a blank line and the reason."""
 
     def made(find: Find) -> Check:
         summary, _, reason = (find.__doc__ or "").partition("\n\n")
@@ -81,7 +81,7 @@ def check(
 
 
 def found_while_reading(code: str) -> Find:
-    """The findings of this code that reading the description made: the one door every description comes through."""
+    """The findings with this code that `read_parts` reported."""
     return lambda subject: (finding for finding in subject.parts.findings if finding.code == code)
 
 
@@ -96,5 +96,5 @@ def reading_check(
     severity: Severity = "error",
     files: Callable[[], Mapping[str, bytes]] = dict[str, bytes],
 ) -> Check:
-    """A check that reading makes anyway; a file of them binds the tier first."""
+    """A check whose findings the reader reports; `functools.partial` binds the tier."""
     return Check(code, name, tier, severity, summary, reason, bad, found_while_reading(code), files)

@@ -1,4 +1,4 @@
-"""The parts of <ros2_control> and <transmission> elements that several checks ask for."""
+"""The parts of <ros2_control> and <transmission> elements that several checks use."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manipcli.description.located_xml import Element
 from manipcli.description.transmissions import TRANSMISSIONS
 
 SIZES: Final = {member.type: member.size for member in TRANSMISSIONS}
-"""Types, and how many joints and actuators each has."""
+"""Number of joints (and of actuators) of each transmission type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class ControlledJoint:
 
 @dataclass(frozen=True, slots=True)
 class WrittenTransmission:
-    """A <transmission>: `type` without its package, `ros1` where it stands below <robot>."""
+    """A <transmission>: `type` without its package; `ros1`: it is a child of <robot>."""
 
     name: str
     type: str
@@ -48,7 +48,7 @@ def controlled_joints(subject: Subject) -> Iterator[ControlledJoint]:
 
 
 def transmissions(subject: Subject) -> Iterator[WrittenTransmission]:
-    """Those that state a type; for the others reading has a finding."""
+    """The transmissions that state a type; the reader reports the others."""
     root = subject.description.root
     holders = [(root, True), *((control, False) for control in root.all("ros2_control"))]
     for holder, ros1 in holders:

@@ -1,4 +1,4 @@
-"""Mends what has one right answer, in the text itself: everything else in the file stays as it was written."""
+"""Automatic fixes of a URDF file, edited in its text: the rest of the file keeps its bytes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _LINE_END: Final = re.compile("\r\n|\r|\n")
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """`attribute` of the element at `place` gets `value`, for a reason."""
+    """A new `value` for `attribute` of the element at `place`, and the reason."""
 
     place: Place
     attribute: str
@@ -39,10 +39,10 @@ class Change:
 
 
 def mended(path: Path, description: Description) -> tuple[bytes, tuple[Change, ...]]:
-    """The bytes of a plain URDF file with everything mended that is safe to mend, and what that was.
+    """The bytes of a plain URDF file with all safe fixes applied, and the list of changes.
 
-    Axes get unit length; a robot without a name gets that of the file; blanks around names and numbers go; a mesh
-    named by an absolute path is named by its package, where that leads to the same file.
+    Axes are normalised; a robot without a name gets the file's; blanks around names and numbers are removed; an
+    absolute mesh path becomes a package URI if that resolves to the same file.
 
     Raises:
         InvalidInput: the file is not UTF-8.
@@ -51,7 +51,7 @@ def mended(path: Path, description: Description) -> tuple[bytes, tuple[Change, .
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        raise InvalidInput([Diagnostic("USE042", f"'{path}' is not UTF-8; only such files are mended")]) from None
+        raise InvalidInput([Diagnostic("USE042", f"'{path}' is not UTF-8; only UTF-8 files can be fixed")]) from None
     starts = [0, *(match.end() for match in _LINE_END.finditer(text))]
     changes = tuple(_changes(path, description))
     done = []
@@ -73,7 +73,7 @@ def _changes(path: Path, description: Description) -> Iterator[Change]:
         if place is None:
             continue
         if element.tag == "robot" and not element.name:
-            yield Change(place, "name", path.stem.partition(".")[0] or "robot", "the robot gets the name of the file")
+            yield Change(place, "name", path.stem.partition(".")[0] or "robot", "name the robot after the file")
         for attribute, value in element.attributes.items():
             new, reason = _better(element, attribute, value, packages)
             if new != value and new:
@@ -82,13 +82,13 @@ def _changes(path: Path, description: Description) -> Iterator[Change]:
 
 def _better(element: Element, attribute: str, value: str, packages: Packages) -> tuple[str, str]:
     if (element.tag, attribute) == ("axis", "xyz"):
-        return _unit(value), "the axis gets length 1"
+        return _unit(value), "normalise the axis to length 1"
     if (element.tag, attribute) == ("mesh", "filename"):
-        return _portable(value.strip(), packages), "the mesh is named by its package"
+        return _portable(value.strip(), packages), "name the mesh by its package"
     if attribute in _NAMES:
-        return value.strip(), "blanks around a name go"
+        return value.strip(), "remove blanks around the name"
     words = value.split()
-    return (" ".join(words) if all(finite(word) is not None for word in words) else value), "blanks go"
+    return (" ".join(words) if all(finite(word) is not None for word in words) else value), "remove extra blanks"
 
 
 def _unit(text: str) -> str:
@@ -114,7 +114,7 @@ def _portable(uri: str, packages: Packages) -> str:
 
 
 def _edit(text: str, starts: list[int], change: Change) -> tuple[int, int, str] | None:
-    """Where the value stands in the text, and what to put there; None where it cannot be told for sure."""
+    """(start, end, new text) of the change; None if the place is not certain."""
     if not 0 < change.place.line <= len(starts):
         return None
     at = starts[change.place.line - 1] + change.place.column - 1

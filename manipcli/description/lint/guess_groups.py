@@ -1,4 +1,4 @@
-"""What the groups of a robot probably are: chains of joints, and the hands at their ends."""
+"""Guess of a robot's groups: chains of joints, and the hands at their ends."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from manipcli.description.elements import Joint
 
 GroupKind = Literal["chain", "hand"]
 DEEPEST_FINGER: Final = 4
-"""Moving joints, one after the other, that a finger has at most."""
+"""Most moving joints in series in a finger."""
 
 
 @dataclass(frozen=True, slots=True)
 class GuessedGroup:
-    """`joints`: independent ones; `mimics`: those that follow; `base` and `tip`: links, '' for the tip of a hand."""
+    """`joints`: independent joints; `mimics`: mimic joints; `base` and `tip`: links, tip '' for a hand."""
 
     kind: GroupKind
     joints: tuple[str, ...]
@@ -27,9 +27,9 @@ class GuessedGroup:
 def guess_groups(root: str, joints: Sequence[Joint]) -> tuple[GuessedGroup, ...]:
     """The chains and hands of a tree.
 
-    A chain runs down to where moving joints branch. What branches there is a hand where no finger has more than
-    `DEEPEST_FINGER` joints one after the other, and a chain leads there or the robot is nothing else; otherwise
-    every branch is a chain of its own. Mimic joints beside the one branch that leads on are a linkage, no branches.
+    A chain extends until the moving joints branch. The branches are a hand if no finger has more than
+    `DEEPEST_FINGER` joints in series and a chain leads there, or if the robot has nothing else; otherwise each
+    branch is a chain. Mimic joints beside the only branch with independent joints are a linkage, not branches.
 
     Args:
         root: the root link.
@@ -52,7 +52,7 @@ def guess_groups(root: str, joints: Sequence[Joint]) -> tuple[GuessedGroup, ...]
 
 
 class _Tree:
-    """Who stands below whom, and how many moving joints one after the other."""
+    """Joints by parent link, and the number of moving joints in series below each link."""
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self._children: dict[str, list[Joint]] = {}
@@ -65,15 +65,15 @@ class _Tree:
             self._independent[joint.parent] = max(self._independent.get(joint.parent, 0), self._leading(joint))
 
     def depth(self, joint: Joint) -> int:
-        """The most moving joints on a way that begins with `joint`."""
+        """Most moving joints on a path that begins with `joint`."""
         return joint.moves + self._depth.get(joint.child, 0)
 
     def _leading(self, joint: Joint) -> int:
-        """The most independent joints on a way that begins with `joint`."""
+        """Most independent joints on a path that begins with `joint`."""
         return joint.independent + self._independent.get(joint.child, 0)
 
     def chain(self, base: str, first: Joint | None) -> tuple[list[Joint], str, list[Joint]]:
-        """Moving joints from `base` (through `first`) to the next branching; the link there, and its branches."""
+        """Moving joints from `base` (through `first`) to the next branch point; the link there, and its branches."""
         chain: list[Joint] = []
         at, joint = base, first
         while True:
@@ -92,7 +92,7 @@ class _Tree:
         return leading if len(leading) == 1 and self._leading(leading[0]) > 1 else moving
 
     def _end(self, link: str) -> str:
-        """The last link of a chain: down fixed joints, to a frame that is called a tool where there are several."""
+        """The last link of a chain: down fixed joints, preferring a link named as a tool."""
         while link in self._children:
             names = [joint.child for joint in self._children[link] if not joint.moves]
             tools = [name for name in names if any(word in name for word in ("tool", "tcp", "flange", "tip", "ee_"))]

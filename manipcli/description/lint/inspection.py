@@ -1,4 +1,4 @@
-"""A description examined and summed up: what `check-urdf` asks."""
+"""Examination and summary of a description: the library side of `check-urdf`."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from manipcli.description.packages import NotFound, Packages
 from manipcli.spec.load import sibling
 
 DESCRIPTIONS = (".urdf", ".xacro", ".xml")
-"""Ends of the names of descriptions; other files are YAML."""
+"""Suffixes of description files; other files are YAML."""
 
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """`summary` and `tree` (lines) are None and empty where the file could not be read or expanded."""
+    """`summary` is None and `tree` (lines) is empty if the file could not be read or expanded."""
 
     path: Path
     examination: Examination
@@ -33,7 +33,7 @@ class Inspection:
     tree: tuple[str, ...]
 
     def told(self, codes: Collection[str]) -> tuple[Diagnostic, ...]:
-        """The findings of these codes; all of them where the file could not be read: that cannot be ignored."""
+        """The findings with these codes; all findings if the file could not be read."""
         findings = self.examination.findings
         if self.examination.parts is None:
             return findings
@@ -41,10 +41,10 @@ class Inspection:
 
 
 def located(word: str, *, package_path: Sequence[Path] = ()) -> Path:
-    """The file that a user names: by its path, or `package://NAME/...`, found as from a robot file in this folder.
+    """The file that a user names: a path, or `package://NAME/...` as seen from the working directory.
 
     Raises:
-        InvalidInput: the package is not found, or the file is not in it.
+        InvalidInput: the package or the file is not found.
     """
     if not word.startswith(("package://", "model://")):
         return Path(word)
@@ -62,15 +62,16 @@ def inspect(
     allow_outside: bool = False,
     allow_env: Collection[str] = (),
 ) -> Inspection:
-    """Everything that can be said about a description; see `examine`.
+    """Findings, summary and tree of a description; see `examine`.
 
     Raises:
-        InvalidInput: there is no such file, or a bound of the user's own is none. Whatever a file holds is told in
-            findings.
+        InvalidInput: the file does not exist, or MANIPCLI_BOUNDS is invalid. Errors inside the file are findings.
     """
     bounds()
     if not os.path.lexists(path):
-        raise InvalidInput([Diagnostic("USE101", "there is no such file", Place(str(path), 0, 0), hint=sibling(path))])
+        raise InvalidInput(
+            [Diagnostic("USE101", "the file does not exist", Place(str(path), 0, 0), hint=sibling(path))]
+        )
     packages = Packages(path, package_path=package_path, allow_outside=allow_outside)
     examination = examine(path, packages=packages, arguments=arguments, allow_env=allow_env)
     if examination.description is None or examination.parts is None:
@@ -80,12 +81,12 @@ def inspect(
 
 
 def wanted_codes(select: Sequence[str], ignore: Sequence[str]) -> frozenset[str]:
-    """The codes to tell: those that `select` names (all when it is empty), less those that `ignore` names.
+    """The codes to report: those that `select` names (all if it is empty), minus those that `ignore` names.
 
-    A word is a code, the beginning of codes, a tier, or the name of a check.
+    A word is a code, a code prefix, a tier, or the name of a check.
 
     Raises:
-        InvalidInput: a word names no check.
+        InvalidInput: a word matches none of the checks.
     """
     chosen = _named(select) if select else {check.code for check in CHECKS}
     return frozenset(chosen - _named(ignore))
@@ -106,10 +107,10 @@ def _named(words: Sequence[str]) -> set[str]:
 
 
 def explained(code: str) -> Check:
-    """The check of a code, or of a name.
+    """The check with a code or name.
 
     Raises:
-        InvalidInput: there is none.
+        InvalidInput: unknown code or name.
     """
     for check in CHECKS:
         if code.upper() == check.code or code.lower() == check.name:
@@ -119,39 +120,39 @@ def explained(code: str) -> Check:
 
 def _unknown(word: str) -> Diagnostic:
     hint = did_you_mean(word[:40].upper(), [check.code for check in CHECKS], kind="codes")
-    return Diagnostic("USE046", f"no check has the code '{shorten(word)}'", hint=f"{hint}; `manipcli list checks`")
+    return Diagnostic("USE046", f"unknown check code '{shorten(word)}'", hint=f"{hint}; `manipcli list checks`")
 
 
 def mend(inspection: Inspection, *, in_place: bool, force: bool = False) -> tuple[Path, tuple[Change, ...]]:
-    """Writes the mended file: `NAME.fixed.urdf` beside it, or the file itself; nothing where nothing is to mend.
+    """Writes the fixed file: `NAME.fixed.urdf` beside it, or the file itself; nothing if there is nothing to fix.
 
     Args:
-        in_place: the file itself.
-        force: replace another file that is there.
+        in_place: overwrite the file itself.
+        force: overwrite an existing `NAME.fixed.urdf`.
 
     Returns:
-        The mended file, and what was changed.
+        The fixed file, and the changes.
 
     Raises:
-        InvalidInput: it is xacro, it could not be read, it is not UTF-8, or another file is in the way.
+        InvalidInput: it is xacro, it cannot be read, it is not UTF-8, or `NAME.fixed.urdf` exists.
     """
     path, description = inspection.path, inspection.examination.description
     if description is None:
         raise InvalidInput(
             [
                 *inspection.examination.findings,
-                Diagnostic("USE047", f"'{path}' cannot be read: there is nothing to mend"),
+                Diagnostic("USE047", f"'{path}' cannot be fixed: it cannot be read"),
             ]
         )
     if description.expanded:
-        message = f"'{path}' is xacro: what is mended there may be wrong where a macro is called elsewhere"
-        raise InvalidInput([Diagnostic("USE047", message, hint="mend it by hand; each finding says where")])
+        message = f"'{path}' is xacro and cannot be fixed automatically: a macro may be called in several places"
+        raise InvalidInput([Diagnostic("USE047", message, hint="fix it by hand at the place of each finding")])
     data, changes = mended(path, description)
     target = path if in_place else path.with_name(f"{path.name.removesuffix('.urdf')}.fixed.urdf")
     if changes:
         if not (in_place or force) and target.exists() and not _same(target, data):
-            message = f"'{target}' is there already, and is not what would be written"
-            raise InvalidInput([Diagnostic("USE084", message, hint="--force replaces it")])
+            message = f"'{target}' exists already and differs"
+            raise InvalidInput([Diagnostic("USE084", message, hint="overwrite it with --force")])
         partial = target.with_name(f".{target.name}.{os.getpid()}.partial")
         partial.write_bytes(data)
         if in_place:

@@ -1,4 +1,4 @@
-"""What moves as one: links joined by fixed joints; and how far the shapes of a link reach."""
+"""Rigid groups of links (joined by fixed joints), and bounding boxes of a link's shapes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Shape
 
 LARGEST = 1e9
-"""[m]: a shape beyond is not measured."""
+"""[m]: larger shapes are not measured."""
 
 
 def moved_bodies(parts: Parts) -> Iterator[tuple[Joint, tuple[str, ...]]]:
-    """Each moving joint with the names of the links that it moves as one: its child and what is fixed to it."""
+    """Each moving joint with the names of the links that it moves rigidly: its child and all links fixed to it."""
     fixed: dict[str, list[str]] = {}
     for joint in parts.joints:
         if not joint.moves:
@@ -33,7 +33,7 @@ def moved_bodies(parts: Parts) -> Iterator[tuple[Joint, tuple[str, ...]]]:
 
 
 def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
-    """The elements of a tag directly below <robot>, by name; the first of several."""
+    """The elements of a tag directly below <robot>, by name; of duplicates the first."""
     found: dict[str, Element] = {}
     for element in root.all(tag):
         found.setdefault(element.name, element)
@@ -41,9 +41,9 @@ def elements_by_name(root: Element, tag: str) -> dict[str, Element]:
 
 
 def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
-    """Lowest and highest corner (3,) [m] of a box about a link's collision shapes, else its visuals, in the link.
+    """Lowest and highest corner (3,) [m] of a box about a link's collision shapes, else its visuals, in the link frame.
 
-    None where `element`, which describes the link, has neither, or one that could not be read, or is beyond all bounds.
+    None if `element`, the link's <link>, has no shape, or a shape could not be read or is larger than `LARGEST`.
     """
     for tag, shapes in (("collision", link.collisions), ("visual", link.visuals)):
         written = len(element.all(tag))
@@ -55,7 +55,10 @@ def extent(link: Link, element: Element) -> tuple[Array, Array] | None:
 
 @np.errstate(all="ignore")
 def box_about(geometries: Sequence[Geometry]) -> tuple[Array, Array] | None:
-    """A box about shapes, along the axes of the frame they are placed in: of each shape's own box, so not tight."""
+    """Lowest and highest corner (3,) [m] of a box about the boxes of the shapes, in their frame: not tight.
+
+    None without a shape, or if a mesh cannot be read.
+    """
     boxes = []
     for geometry in geometries:
         own = _box(geometry.shape)

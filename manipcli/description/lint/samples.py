@@ -1,4 +1,4 @@
-"""For the bad examples of checks: small descriptions without a fault, and a tetrahedron in every format of meshes."""
+"""Building blocks for the bad examples of checks: small valid descriptions, and a tetrahedron in each mesh format."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
 MOMENTS = '<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/>'
 INERTIAL = f'<inertial><mass value="1"/>{MOMENTS}</inertial>'
 CUBE = '<collision><geometry><box size="0.35 0.35 0.35"/></geometry></collision>'
-"""Of 1 kg it has the moments of `INERTIAL`."""
+"""A cube of 1 kg with this size has the moments of `INERTIAL`."""
 
 
 def robot(inside: str = "") -> str:
@@ -23,13 +23,13 @@ def robot(inside: str = "") -> str:
 
 
 def bare_joint(inside: str = "", *, kind: str = "fixed") -> str:
-    """Links `base` and `tip`, which have nothing, with joint `j` between them."""
+    """Empty links `base` and `tip` with joint `j` between them."""
     ends = '<parent link="base"/><child link="tip"/>'
     return robot(f'<link name="base"/><link name="tip"/><joint name="j" type="{kind}">{ends}{inside}</joint>')
 
 
 def one_joint(inside: str = LIMIT, *, kind: str = "revolute", tip: str = INERTIAL + CUBE, more: str = "") -> str:
-    """A description of links `base` and `tip` with joint `j` between them, and `more` beside them."""
+    """Links `base` and `tip` with joint `j` between them, and `more` elements of <robot>."""
     ends = '<parent link="base"/><child link="tip"/>'
     joint = f'<joint name="j" type="{kind}">{ends}{inside}</joint>'
     return robot(f'<link name="base"/><link name="tip">{tip}</link>{joint}{more}')
@@ -57,12 +57,11 @@ def transmission(inside: str = GEARED + MOTOR, *, kind: str = "SimpleTransmissio
 
 
 def one_link(mesh: str, *, role: str = "visual") -> str:
-    """A description of one link with a <mesh> of these attributes."""
+    """A description of one link with a <mesh> that has these attributes."""
     return robot(f'<link name="base"><{role}><geometry><mesh {mesh}/></geometry></{role}></link>')
 
 
 def ascii_tetrahedron() -> bytes:
-    """As STL of text."""
     facets = []
     for face in _FACES:
         vertices = "".join("vertex {} {} {}\n".format(*_CORNERS[k]) for k in face)
@@ -71,7 +70,6 @@ def ascii_tetrahedron() -> bytes:
 
 
 def collada_tetrahedron(*, up_axis: str = "Z_UP", meter: float = 1.0) -> bytes:
-    """As Collada."""
     numbers = " ".join(f"{value:g}" for corner in _CORNERS for value in corner)
     indices = " ".join(str(k) for face in _FACES for k in face)
     return f"""<?xml version="1.0"?>

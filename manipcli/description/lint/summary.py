@@ -1,4 +1,4 @@
-"""What a description consists of, sound or not: counts, groups, mass, reach, and its tree as text."""
+"""Summary of a description, valid or not: counts, groups, mass, reach, and its tree as text."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from manipcli.description.packages import NotFound
 from manipcli.description.urdf.urdf import Parts
 
 SWEEP: Final = 24
-"""Positions of one joint that are tried at a time for the reach."""
+"""Positions tried per joint when the reach is estimated."""
 MOST_LINES: Final = 2000
-"""Of a tree."""
+"""Most lines of a tree."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a description consists of. The counts are of what is written, sound or not.
+    """Contents of a description. The counts are of what is written, valid or not.
 
     Attributes:
         name: of the robot.
-        root: the root link; '' where there is none.
-        links, joints, moving, transmissions: how many; `moving` are the joints that are not fixed.
-        dof: moving joints that follow no other.
-        types: how many joints of each type, ((type, number), ...).
-        mimics: how many joints follow others.
-        groups: guessed; empty where there are errors.
+        root: the root link; '' without one.
+        links, joints, moving, transmissions: counts; `moving` joints are those that are not fixed.
+        dof: number of moving joints that are not mimic joints.
+        types: number of joints of each type, ((type, number), ...).
+        mimics: number of mimic joints.
+        groups: guessed; empty if there are errors.
         mass: of all links [kg].
-        massless: links without mass below a moving joint.
-        reach: how far the tip of the longest chain comes from its first joint [m]; 0 without chain.
-        meshes, meshes_found: files that are named, and those that are there.
+        massless: number of child links of moving joints that have no mass.
+        reach: largest distance of a chain's tip from the chain's first joint [m]; 0 without a chain.
+        meshes, meshes_found: number of mesh files that are named, and of those that exist.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Summary:
 
 
 def summarise(description: Description, parts: Parts) -> Summary:
-    """The summary of a description, from what is written and what could be read."""
+    """The summary of a description."""
     root = description.root
     joints = root.all("joint")
     types = Counter(joint.attributes.get("type", "") for joint in joints)
@@ -87,7 +87,7 @@ def summarise(description: Description, parts: Parts) -> Summary:
 
 
 def _meshes(description: Description) -> tuple[int, int]:
-    """How many mesh files are named, and how many of them are there."""
+    """How many mesh files are named, and how many of them exist."""
     holders = [each for link in description.root.all("link") for each in link.children]
     shapes = [shape for each in holders for shape in each.all("geometry")]
     uris = {mesh.attributes.get("filename", "").strip() for shape in shapes for mesh in shape.all("mesh")}
@@ -102,12 +102,12 @@ def _meshes(description: Description) -> tuple[int, int]:
 
 
 def _reach(parts: Parts, group: GuessedGroup) -> float:
-    """The farthest that the tip of a chain comes from the origin of its first joint [m], by moving joint after joint.
+    """Largest distance found of a chain's tip from the origin of its first joint [m], by coordinate ascent.
 
-    A lower bound: each joint in turn goes to the best of `SWEEP` positions, three times over.
+    A lower bound: each joint in turn goes to the best of `SWEEP` positions, in three rounds.
     """
-    way = _way(parts, group)
-    ranges = [_range(joint) for joint in way]
+    path = _path(parts, group)
+    ranges = [_range(joint) for joint in path]
     q = np.array([(lower + upper) / 2.0 + 0.1 * (upper - lower) for lower, upper in ranges])
     best = 0.0
     for _ in range(3):
@@ -116,24 +116,24 @@ def _reach(parts: Parts, group: GuessedGroup) -> float:
                 continue
             tried = np.repeat(q[None], SWEEP, axis=0)
             tried[:, k] = np.linspace(lower, upper, SWEEP)
-            distance = np.linalg.norm(_tip(way, tried), axis=1)
+            distance = np.linalg.norm(_tip(path, tried), axis=1)
             q = tried[int(distance.argmax())]
             best = max(best, float(distance.max()))
     return best if np.isfinite(best) else 0.0
 
 
-def _way(parts: Parts, group: GuessedGroup) -> list[Joint]:
-    """The joints from the first of a chain to its tip, fixed ones too."""
+def _path(parts: Parts, group: GuessedGroup) -> list[Joint]:
+    """The joints from the first of a chain to its tip, including fixed joints."""
     by_child = {joint.child: joint for joint in parts.joints}
-    way = []
+    path = []
     at = group.tip
     while at in by_child and at != group.base:
-        way.append(by_child[at])
+        path.append(by_child[at])
         at = by_child[at].parent
-    way.reverse()
-    while way and not way[0].moves:
-        way.pop(0)
-    return way[:100]
+    path.reverse()
+    while path and not path[0].moves:
+        path.pop(0)
+    return path[:100]
 
 
 def _range(joint: Joint) -> tuple[float, float]:
@@ -146,28 +146,28 @@ def _range(joint: Joint) -> tuple[float, float]:
     return max(lower, -np.pi), min(upper, np.pi)
 
 
-def _tip(way: Sequence[Joint], q: Array) -> Array:
-    """Positions (m, 3) of the tip for m positions (m, n) of the joints, from the origin of the first joint."""
+def _tip(path: Sequence[Joint], q: Array) -> Array:
+    """Positions (m, 3) of the tip for m joint positions (m, n), from the origin of the first joint."""
     p = np.zeros((len(q), 3))
-    for k in range(len(way) - 1, -1, -1):
-        joint = way[k]
+    for k in range(len(path) - 1, -1, -1):
+        joint = path[k]
         if joint.type == "prismatic":
             p = p + q[:, k, None] * joint.axis
         elif joint.moves:
-            p = _turned(joint.axis, q[:, k], p)
+            p = _rotated(joint.axis, q[:, k], p)
         if k > 0:
             p = p @ joint.X_PJ.R.T + joint.X_PJ.p
     return p
 
 
-def _turned(axis: Array, angles: Array, p: Array) -> Array:
+def _rotated(axis: Array, angles: Array, p: Array) -> Array:
     """Rodrigues: p cos a + (n x p) sin a + n (n . p)(1 - cos a), row by row."""
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     return np.asarray(p * cos + np.cross(axis, p) * sin + axis * (p @ axis)[:, None] * (1.0 - cos))
 
 
 def tree_lines(parts: Parts) -> tuple[str, ...]:
-    """The tree, or what there is of it: each link below the joint that carries it."""
+    """The tree as far as it could be read: each link with the joint that carries it."""
     children: dict[str, list[Joint]] = {}
     for joint in parts.joints:
         children.setdefault(joint.parent, []).append(joint)
@@ -182,9 +182,9 @@ def tree_lines(parts: Parts) -> tuple[str, ...]:
             if len(lines) >= MOST_LINES:
                 return (*lines, "...")
             follows = f", mimics {joint.mimic.joint}" if joint.mimic is not None else ""
-            again = " (already above)" if joint.child in seen else ""
+            repeated = " (already above)" if joint.child in seen else ""
             branch = "└─" if last else "├─"
-            lines.append(f"{indent}{branch} {joint.child}  [{joint.name}: {joint.type}{follows}]{again}")
+            lines.append(f"{indent}{branch} {joint.child}  [{joint.name}: {joint.type}{follows}]{repeated}")
             if joint.child in seen:
                 continue
             seen.add(joint.child)

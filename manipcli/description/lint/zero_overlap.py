@@ -1,4 +1,4 @@
-"""Which links of a description overlap with every joint at zero, or at its limit nearest to zero."""
+"""Pairs of links that overlap with every joint at zero, or at its limit nearest to zero."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from manipcli.shapes.primitives import Geometry, Mesh
 from manipcli.shapes.proximity import coal_shape, distance, overlap, surface
 
 TOLERANCE: Final = 0.002
-"""Depth [m] up to which shapes count as touching: descriptions are drawn without a gap."""
+"""Overlap [m] up to which shapes only touch: descriptions are modelled without gaps."""
 MOST_SHAPES: Final = 400
 MOST_TRIANGLES: Final = 100_000
-"""A mesh of more is not looked at."""
+"""Larger meshes are skipped."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A collision shape in the frame of the root; `body`: number of the links that move as one."""
+    """A collision shape in the frame of the root; `body`: number of its rigid group of links."""
 
     link: str
     body: int
@@ -35,9 +35,9 @@ class _Placed:
 
 
 def overlaps_at_zero(parts: Parts) -> Iterator[tuple[str, str, float]]:
-    """Pairs of links that no joint joins directly, and the depth [m] of their overlap; each pair once.
+    """Pairs of links without a joint between them, with the depth [m] of their overlap; each pair once.
 
-    Shapes are compared exactly: where the hulls of meshes overlap, their triangles must meet, too.
+    Meshes overlap only if both their hulls and their triangles do.
     """
     if not parts.root or parts.errors:
         return
@@ -48,17 +48,17 @@ def overlaps_at_zero(parts: Parts) -> Iterator[tuple[str, str, float]]:
     shapes = _placed(parts, bodies)
     if len(shapes) > MOST_SHAPES:
         return
-    told: set[frozenset[str]] = set()
+    reported: set[frozenset[str]] = set()
     for i, a in enumerate(shapes):
         for b in shapes[i + 1 :]:
             pair = frozenset((a.link, b.link))
-            if a.body == b.body or frozenset((a.body, b.body)) in near or pair in told:
+            if a.body == b.body or frozenset((a.body, b.body)) in near or pair in reported:
                 continue
             if bool(np.any(np.minimum(a.high, b.high) - np.maximum(a.low, b.low) < TOLERANCE)):
                 continue
             depth = _depth(a, b)
             if depth > TOLERANCE:
-                told.add(pair)
+                reported.add(pair)
                 yield a.link, b.link, depth
 
 
@@ -77,7 +77,7 @@ def _placed(parts: Parts, bodies: dict[str, int]) -> list[_Placed]:
 
 
 def _at_zero(joint: Joint) -> Transform:
-    """How far the joint has moved, (joint frame to child): not at all, but where zero is outside of its limits."""
+    """Joint frame to child link at zero, or at the limit nearest to zero."""
     if not joint.independent:
         return Transform.identity()
     q = joint.limits.nearest(0.0)
@@ -89,7 +89,7 @@ def _at_zero(joint: Joint) -> Transform:
 
 
 def _depth(a: _Placed, b: _Placed) -> float:
-    """How deep two shapes are in each other [m]; 0 when apart."""
+    """Depth of the overlap [m]; 0 if the shapes are apart."""
     try:
         shapes = [coal_shape(each.geometry.shape) for each in (a, b)]
     except ValueError:

@@ -1,4 +1,4 @@
-"""The transmissions: one file a member. `TRANSMISSIONS` is their registry."""
+"""The registry of transmissions, `TRANSMISSIONS`; one file per member."""
 
 from __future__ import annotations
 
@@ -10,4 +10,4 @@ from manipcli.description.transmissions.simple import SIMPLE
 
 TRANSMISSIONS: Seam[TransmissionMember] = Seam(kind="transmission", members=(SIMPLE, DIFFERENTIAL, FOUR_BAR))
 BY_TYPE = {member.type: member for member in TRANSMISSIONS}
-"""The members by their names in descriptions."""
+"""The members by their type in descriptions."""

@@ -1,4 +1,4 @@
-"""Two actuators that drive two joints by their sum and their difference, as in a wrist of bevel gears."""
+"""Differential transmission: two actuators drive two joints by their sum and difference, as in a bevel-gear wrist."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ class DifferentialTransmission(Transmission):
         velocity_j1 = (velocity_a1 / r1 + velocity_a2 / r2) / (2 s1)      effort_j1 = s1 (r1 effort_a1 + r2 effort_a2)
         velocity_j2 = (velocity_a1 / r1 - velocity_a2 / r2) / (2 s2)      effort_j2 = s2 (r1 effort_a1 - r2 effort_a2)
 
-    and position_j = what velocity does to position_a, + offset.
+    and position_j is the same map of position_a, plus offset.
 
     Attributes:
-        actuator_reduction: r (2), not 0; negative turns the other way.
+        actuator_reduction: r (2), not 0; negative reverses the direction.
         joint_reduction: s (2), not 0.
-        joint_offset: (2) position of the joints where the actuators are at 0 [rad or m].
+        joint_offset: (2) joint positions at actuator positions 0 [rad or m].
 
     Raises:
-        InvalidArgument: a reduction of 0, a number that is not finite, or not two of them.
+        InvalidArgument: a reduction of 0, a number that is not finite, or not two numbers.
     """
 
     actuator_reduction: Sequence[float]

@@ -1,4 +1,4 @@
-"""Two actuators, two joints: the second actuator moves the second joint against the first, as in a finger's linkage."""
+"""Four-bar linkage transmission: two actuators and two joints, the second joint coupled to the first."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class FourBarLinkageTransmission(Transmission):
         velocity_j1 = velocity_a1 / (s1 r1)                               effort_j1 = s1 r1 effort_a1 + r2 effort_a2
         velocity_j2 = (velocity_a2 / r2 - velocity_a1 / (s1 r1)) / s2     effort_j2 = s2 r2 effort_a2
 
-    and position_j = what velocity does to position_a, + offset. The efforts are those of ros2_control, which keep
+    and position_j is the same map of position_a, plus offset. The efforts are those of ros2_control, which conserve
     power. With compat="ros1" they are those of ros_control, which do not:
 
         effort_j1 = s1 r1 effort_a1                             effort_j2 = s2 (r2 effort_a2 - s1 r1 effort_a1)
 
     Attributes:
-        actuator_reduction: r (2), not 0; negative turns the other way.
+        actuator_reduction: r (2), not 0; negative reverses the direction.
         joint_reduction: s (2), not 0.
-        joint_offset: (2) position of the joints where the actuators are at 0 [rad or m].
-        compat: whose effort map, "ros2" or "ros1".
+        joint_offset: (2) joint positions at actuator positions 0 [rad or m].
+        compat: the effort map, "ros2" or "ros1".
 
     Raises:
-        InvalidArgument: a reduction of 0, a number that is not finite, not two of them, or another `compat`.
+        InvalidArgument: a reduction of 0, a number that is not finite, not two numbers, or an unknown `compat`.
     """
 
     actuator_reduction: Sequence[float]

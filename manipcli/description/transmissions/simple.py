@@ -1,4 +1,4 @@
-"""One actuator and one joint, with a gear between them."""
+"""Simple transmission: one actuator and one joint with a gear between them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from manipcli.description.transmission import Compat, Maps, Transmission, Transm
 
 @dataclass(frozen=True)
 class SimpleTransmission(Transmission):
-    """One actuator, one joint (or many values of such a pair, elementwise), as in ros_control and ros2_control.
+    """One actuator and one joint, applied elementwise to arrays, as in ros_control and ros2_control.
 
     position_j = position_a / n + offset;  velocity_j = velocity_a / n;  effort_j = n effort_a.
 
     Attributes:
-        reduction: n, actuator turns a joint turn; negative turns the other way; not 0.
-        offset: position of the joint where the actuator is at 0 [rad or m].
+        reduction: n, actuator revolutions per joint revolution; not 0; negative reverses the direction.
+        offset: joint position at actuator position 0 [rad or m].
 
     Raises:
         InvalidArgument: a reduction of 0, or a number that is not finite.
@@ -43,7 +43,7 @@ class SimpleTransmission(Transmission):
 
 
 def _of(tag: TransmissionTag, compat: Compat) -> SimpleTransmission:
-    """ROS 1 writes the reduction at the actuator, ros2_control at the joint; in a tag the other one is 1."""
+    """A tag has its reduction at the actuator (ROS 1) or at the joint (ros2_control); the other is 1."""
     return SimpleTransmission(
         reduction=tag.joint_reductions[0] * tag.actuator_reductions[0], offset=tag.joint_offsets[0]
     )

@@ -1,13 +1,13 @@
-"""What a <ros2_control> says about the limits of joints: `min` and `max` of their command interfaces, `<limits>`.
+"""Joint limits from <ros2_control>: `min` and `max` of command interfaces, and `<limits>`.
 
     <joint name="elbow">
       <command_interface name="position"><param name="min">-1</param><param name="max">1</param></command_interface>
       <command_interface name="velocity"><limits enable="false"/></command_interface>
     </joint>
 
-As in ros2_control, they narrow what the joint's own <limit> says and never widen it: a velocity, effort, acceleration
-or jerk is then limited to the smaller of |min| and |max|. `enable="false"` takes the limit of its interface away, or,
-directly below <joint>, those of all its interfaces.
+As in ros2_control, they narrow the joint's own <limit> and never widen it: a velocity, effort, acceleration or jerk
+limit becomes the smaller of |min| and |max|. `enable="false"` removes the limit of its interface or, directly below
+<joint>, the limits of all interfaces.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from manipcli.description.urdf.numbers import finite
 
 
 def with_control_limits(root: Element, joints: Mapping[str, Joint]) -> dict[str, Joint]:
-    """The joints with their limits as a description's <ros2_control> elements leave them."""
+    """The joints with their limits narrowed or removed by the <ros2_control> elements of a description."""
     found = dict(joints)
     for component in root.all("ros2_control"):
         for element in component.all("joint"):
@@ -42,11 +42,11 @@ def _limited(joint: Joint, element: Element) -> JointLimits:
             continue
         low, high = _bound(interface, "min"), _bound(interface, "max")
         if low is not None and high is not None and low > high:
-            continue  # the check of numbers tells
+            continue  # reported by check control-number
         if name == "position" and joint.type != "continuous":
             lower = max((v for v in (limits.lower, low) if v is not None), default=None)
             upper = min((v for v in (limits.upper, high) if v is not None), default=None)
-            if lower is None or upper is None or lower <= upper:  # else the check of numbers tells
+            if lower is None or upper is None or lower <= upper:  # else reported by check control-number
                 limits = dataclasses.replace(limits, lower=lower, upper=upper)
         elif name == "velocity":
             limits = dataclasses.replace(limits, velocity=_smaller(limits.velocity, low, high))
@@ -82,7 +82,7 @@ def _bound(interface: Element, key: str) -> float | None:
 
 
 def _smaller(limit: float | None, low: float | None, high: float | None) -> float | None:
-    """Of the limit and of both bounds' sizes; bounds of 0 or of one side only say nothing."""
+    """The smallest of `limit`, |low| and |high|; bounds of 0 or on one side only have no effect."""
     sizes = [abs(v) for v in (low, high) if v is not None]
     if len(sizes) < 2 or min(sizes) == 0.0:
         return limit

@@ -1,4 +1,4 @@
-"""<joint> and <transmission>."""
+"""Reader of <joint> and <transmission> elements."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _TYPES: dict[str, JointType] = {
     "planar": "fixed",
 }
 _HELD = frozenset({"floating", "planar"})
-"""Types of several degrees of freedom: where such a joint stands, the link is held."""
+"""Types with several degrees of freedom, which are treated as fixed."""
 UNBOUNDED: Final = sys.float_info.max
-"""Limits of a joint that has none, where URDF asks for some."""
+"""Written as the limit of an unlimited joint where URDF requires one."""
 
 
 def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
-    """The joint that `element` describes; None, with findings, where it does not say which links it joins.
+    """The joint of a <joint> element; None, with findings, if its parent or child is missing.
 
-    Its links and its mimic are not looked up here.
+    Links and mimic joint are resolved later.
     """
     text = element.attributes.get("type")
     kind = _TYPES.get(text or "")
@@ -42,8 +42,8 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
         what = f"the unknown type '{shorten(text)}'" if text else "no attribute 'type'"
         reader.report("URDF008", f"joint '{name}' has {what}", element.place, hint=reader.near(text or "", _TYPES))
     if text in _HELD:
-        message = f"joint '{name}' is {text}, which is not supported: its link is held where it is"
-        hint = "use joints of one degree of freedom, or place the robot with `mount:` in the robot file"
+        message = f"joint '{name}' is {text}, which is not supported: it is treated as fixed"
+        hint = "use joints with one degree of freedom, or place the robot with `mount:` in the robot file"
         reader.report("URDF065", message, element.place, hint=hint, severity="warning")
     ends = [_end(reader, element, name, tag) for tag in ("parent", "child")]
     X_PJ = reader.origin(element)
@@ -56,7 +56,7 @@ def read_joint(reader: Reader, element: Element, name: str) -> Joint | None:
     if ends[0] is None or ends[1] is None:
         return None
     moves = kind != "fixed"
-    # What is wrong is told; what stands in for it lets the rest of the description be looked at.
+    # Errors are reported; placeholder values allow the rest of the description to be checked.
     return Joint(
         name=name,
         type=kind or "continuous",
@@ -80,7 +80,7 @@ def _end(reader: Reader, element: Element, name: str, tag: Literal["parent", "ch
 
 
 def _axis(reader: Reader, element: Element, name: str) -> Array:
-    """Unit axis; x where none, or none that can be used, is written."""
+    """Unit axis (3,); x if it is missing or invalid."""
     axis = element.first("axis")
     if axis is None or "xyz" not in axis.attributes:
         return frozen([1.0, 0.0, 0.0])
@@ -93,10 +93,10 @@ def _axis(reader: Reader, element: Element, name: str) -> Array:
         reader.report("URDF009", f"joint '{name}' has {what}; expected a direction", axis.place)
         return frozen([1.0, 0.0, 0.0])
     if abs(length - 1.0) > UNIT_TOLERANCE:
-        message = f"joint '{name}': the axis has length {length:g}; its direction is used"
+        message = f"joint '{name}': axis has length {length:g}; it is normalised"
         reader.report("URDF034", message, axis.place, severity="warning")
     unit = np.array(values)
-    # An axis as near to unit length as numbers can say stays as written: reading what we wrote changes nothing.
+    # An axis of unit length within rounding is kept, so that reading a written file changes nothing.
     return frozen(unit if abs(length - 1.0) < 1e-15 else unit / length)
 
 
@@ -112,7 +112,7 @@ def _not_negative(
 
 
 def _with_soft(reader: Reader, element: Element, name: str, kind: JointType) -> JointLimits:
-    """The limits, and the soft ones of a <safety_controller>; soft positions that are both 0 are none."""
+    """The limits with the soft limits of a <safety_controller>; equal soft positions have no effect."""
     limits = _limits(reader, element, name, kind)
     safety = element.first("safety_controller")
     if safety is None:
@@ -142,30 +142,31 @@ def _limits(reader: Reader, element: Element, name: str, kind: JointType) -> Joi
     lower, upper = (reader.number(limit, side) if side in limit.attributes else 0.0 for side in ("lower", "upper"))
     for side, other in (("lower", "upper"), ("upper", "lower")):
         if kind != "continuous" and side not in limit.attributes and other in limit.attributes:
-            message = f"joint '{name}': the {side} limit is missing; it counts as 0"
-            reader.report("URDF036", message, limit.place, hint=f'write {side}="0" if it is', severity="note")
+            message = f"joint '{name}': {side} limit is missing; 0 is used"
+            hint = f'write {side}="0" if this is intended'
+            reader.report("URDF036", message, limit.place, hint=hint, severity="note")
     velocity, effort = (_stated(reader, limit, attribute, name) for attribute in ("velocity", "effort"))
     if kind == "continuous" or lower is None or upper is None or (lower == -UNBOUNDED and upper == UNBOUNDED):
         return JointLimits(velocity=velocity, effort=effort)
     if lower > upper:
-        message = f"joint '{name}': lower {lower:g} is above upper {upper:g}"
+        message = f"joint '{name}': lower limit {lower:g} is above upper limit {upper:g}"
         reader.report("URDF010", message, limit.place)
         return JointLimits(velocity=velocity, effort=effort)
     if lower == upper:
-        message = f"joint '{name}' cannot move: lower and upper are both {lower:g}"
+        message = f"joint '{name}' cannot move: lower and upper limit are both {lower:g}"
         reader.report("URDF035", message, limit.place, severity="warning")
     return JointLimits(lower=lower, upper=upper, velocity=velocity, effort=effort)
 
 
 def _stated(reader: Reader, limit: Element, attribute: str, joint: str) -> float | None:
-    """A limit of velocity or effort; 0 and nothing both count as not stated."""
+    """A velocity or effort limit; None if it is 0 or missing."""
     value = _not_negative(reader, limit, attribute, joint)
     if value:
         return value
     if value == 0.0 or attribute not in limit.attributes:
         how = "is 0" if value == 0.0 else "is missing"
-        message = f"joint '{joint}': the {attribute} limit {how}; it counts as not stated"
-        hint = f"state it in the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
+        message = f"joint '{joint}': {attribute} limit {how}; it is unknown"
+        hint = f"add it to the robot file: limits: {{{joint}: {{{attribute}: ...}}}}"
         reader.report("URDF036", message, limit.place, hint=hint, severity="warning")
     return None
 
@@ -208,11 +209,11 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
             reader.report("URDF015", message, joint.place, hint=reader.near(joint_name, joints))
     if not joint_elements:
         reader.report("URDF015", f"transmission '{name}' has no <joint>", element.place)
-    joint_reductions = [_reduction(reader, each, name) for each in joint_elements]
-    actuator_reductions = [_reduction(reader, each, name) for each in actuator_elements]
+    joint_reductions = [_reduction(reader, joint, name) for joint in joint_elements]
+    actuator_reductions = [_reduction(reader, actuator, name) for actuator in actuator_elements]
     kind_name = kind.text.strip().rpartition("/")[2]
     if kind_name == "SimpleTransmission" and len(joint_elements) == 1 and len(actuator_elements) <= 1:
-        ros1 = kind.tag == "type"  # ros_control reads that of the actuator, ros2_control that of the joint
+        ros1 = kind.tag == "type"  # ros_control reads the reduction of the actuator, ros2_control that of the joint
         actuator_names = actuator_names or [name]
         actuator_reductions = (actuator_reductions or [1.0]) if ros1 else joint_reductions
         joint_reductions = [1.0]
@@ -228,12 +229,12 @@ def _transmission(reader: Reader, element: Element, joints: Collection[str]) -> 
 
 
 def _by_role(elements: tuple[Element, ...]) -> list[Element]:
-    """In the order of their roles (joint1, joint2, ...) where they have roles, else as written."""
+    """In the order of their roles (joint1, joint2, ...); without roles in the order of the file."""
     return sorted(elements, key=role)
 
 
 def role(element: Element) -> str:
-    """As ROS 1 writes it (an element) or ros2_control (an attribute); '' where it has none."""
+    """The role from a child element (ROS 1) or an attribute (ros2_control); '' if missing."""
     child = element.first("role")
     return (child.text if child is not None else element.attributes.get("role", "")).strip()
 
@@ -242,7 +243,7 @@ def _reduction(reader: Reader, element: Element, transmission: str) -> float:
     child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
     value = reader.text_number(child, 1.0)
     if value == 0.0:
-        message = f"transmission '{transmission}': a reduction of 0 is not possible"
+        message = f"transmission '{transmission}': reduction is 0; expected a number other than 0"
         reader.report("URDF015", message, (child or element).place)
         return 1.0
     return value

@@ -1,4 +1,4 @@
-"""<link>: inertial, visuals, collisions."""
+"""Reader of <link> elements: inertial, visuals, collisions."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from manipcli.shapes.mesh_formats import UnusableMesh
 from manipcli.shapes.primitives import Box, Cylinder, Geometry, Mesh, Rgba, Shape, Sphere
 
 TRIANGLE_TOLERANCE = 1e-2
-"""By which share one principal moment may exceed the sum of the others: descriptions are written with 2-3 digits."""
+"""Relative excess of a principal moment over the sum of the others that is accepted: files have 2-3 digits."""
 _SHAPES = ("box", "sphere", "cylinder", "mesh")
 _ELSEWHERE = frozenset({"capsule", "plane", "cone", "ellipsoid", "polyline", "heightmap", "sdf"})
-"""Shapes of other formats and of other programs' URDF."""
+"""Shapes of other formats and of URDF extensions."""
 WITHOUT_IT: Final = (
-    "put the file there, or a <box>, <cylinder> or the mesh of the <visual> in its place, or take the <collision> out: "
-    "the link then touches nothing"
+    "add the file, replace the mesh by a <box>, a <cylinder> or the mesh of the <visual>, or delete the <collision>: "
+    "the link then has no contacts"
 )
 
 
 def read_link(reader: Reader, element: Element, name: str, packages: Packages, materials: Mapping[str, Rgba]) -> Link:
-    """The link that `element` describes; what cannot be read is left out, with a finding."""
+    """The link of a <link> element; invalid parts are omitted, with a finding."""
     return Link(
         name=name,
         inertial=_inertial(reader, element, name),
@@ -40,7 +40,7 @@ def read_link(reader: Reader, element: Element, name: str, packages: Packages, m
 
 
 def read_materials(reader: Reader, root: Element) -> dict[str, Rgba]:
-    """Colours by the name of the material, wherever it is defined."""
+    """Colours by material name, from all definitions."""
     found: dict[str, Rgba] = {}
     visuals = [visual for link in root.all("link") for visual in link.all("visual")]
     for parent in (root, *visuals):
@@ -70,7 +70,7 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
         reader.report("URDF011", f"link '{name}' has mass {mass:g} kg; expected a positive number", mass_element.place)
         return None
     if mass == 0.0:
-        message = f"link '{name}' has mass 0: it counts as having no inertia at all"
+        message = f"link '{name}' has mass 0: its inertial is ignored"
         reader.report("URDF031", message, mass_element.place, severity="note")
         return None
     if moments is None:
@@ -87,24 +87,26 @@ def _inertial(reader: Reader, link: Element, name: str) -> Inertial | None:
 
 
 def _product(reader: Reader, moments: Element, key: str) -> float:
-    """A product of inertia; 0 where it is not written, which other programs refuse."""
+    """A product of inertia; 0 with a warning if missing."""
     if key not in moments.attributes:
-        message = f"<inertia> has no attribute '{key}'; it counts as 0"
+        message = f"<inertia> has no attribute '{key}'; 0 is used"
         reader.report("URDF059", message, moments.place, severity="warning")
     return reader.number(moments, key, 0.0) or 0.0
 
 
 def _plausible(reader: Reader, I: Array, name: str, element: Element) -> bool:  # noqa: E741  (the inertia matrix)
     if not I.any():
-        return True  # a point mass: `read_parts` refuses it where a joint moves it
+        return True  # a point mass: `read_parts` rejects it on a moving joint
     principal = np.linalg.eigvalsh(I)
     shown = ", ".join(f"{value:.4g}" for value in principal)
     if principal[0] <= 0.0:
-        message = f"link '{name}': the inertia is not positive definite (principal moments {shown} kg m2)"
+        message = f"link '{name}': inertia is not positive definite (principal moments {shown} kg m2)"
         reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
         return False
     if principal[2] > (principal[0] + principal[1]) * (1.0 + TRIANGLE_TOLERANCE):
-        message = f"link '{name}': no body has the principal moments {shown} kg m2: one is larger than the others' sum"
+        message = (
+            f"link '{name}': impossible principal moments {shown} kg m2: the largest exceeds the sum of the others"
+        )
         reader.report("URDF011", message, element.place, hint="compute it from the shape and the mass of the link")
         return False
     return True
@@ -121,12 +123,12 @@ def _geometries(
         shapes = [child for child in holder.children if not is_foreign(child.tag)] if holder is not None else []
         if not shapes:
             expected = " or ".join(f"<{shape}>" for shape in _SHAPES)
-            message = f"<{tag}> needs a <geometry> with one shape: {expected}"
+            message = f"<{tag}> has no shape; expected a <geometry> with {expected}"
             reader.report("URDF012", message, (holder or element).place)
             continue
         if len(shapes) > 1:
-            message = f"<geometry> holds {len(shapes)} shapes; only the first, <{shapes[0].tag}>, is used"
-            hint = f"give each shape a <{tag}> of its own"
+            message = f"<geometry> has {len(shapes)} shapes; only the first, <{shapes[0].tag}>, is used"
+            hint = f"use one <{tag}> per shape"
             reader.report("URDF061", message, shapes[1].place, hint=hint, severity="warning")
         if shapes[0].tag == "capsule":
             found += _capsule(reader, shapes[0], X_LS, rgba)
@@ -138,11 +140,11 @@ def _geometries(
 
 
 def _capsule(reader: Reader, element: Element, X_LS: Transform, rgba: Rgba | None) -> list[Geometry]:
-    """A cylinder of the capsule's `length` along z and a sphere at each of its ends: the same set of points."""
+    """The capsule as a cylinder of its `length` along z and a sphere at each end."""
     radius, length = _sizes(reader, element, "radius", 1), _sizes(reader, element, "length", 1)
     if radius is None or length is None:
         return []
-    message = "<capsule> is not understood by most programs; it is read as a cylinder and two spheres"
+    message = "<capsule> is not supported by most programs; it is read as a cylinder and two spheres"
     reader.report("URDF062", message, element.place, severity="warning")
     ends = [X_LS @ Transform.of(xyz=(0.0, 0.0, side * length[0] / 2.0)) for side in (-1.0, 1.0)]
     return [
@@ -164,23 +166,23 @@ def _shape(reader: Reader, element: Element, tag: str, packages: Packages) -> Sh
     if element.tag == "mesh":
         return _mesh(reader, element, tag, packages)
     if element.tag in _ELSEWHERE:
-        left_out = tag == "visual"
-        message = f"<{element.tag}> is no shape of URDF" + ("; it is left out" if left_out else "")
+        ignored = tag == "visual"
+        message = f"<{element.tag}> is not a URDF shape" + ("; it is ignored" if ignored else "")
         hint = "use " + " or ".join(f"<{shape}>" for shape in _SHAPES)
-        reader.report("URDF062", message, element.place, hint=hint, severity="warning" if left_out else "error")
+        reader.report("URDF062", message, element.place, hint=hint, severity="warning" if ignored else "error")
         return None
     reader.report("URDF012", f"unknown shape <{element.tag}>", element.place, hint=reader.near(element.tag, _SHAPES))
     return None
 
 
 def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mesh | None:
-    """The mesh that `element` names, below a <visual> or <collision> (`tag`); None, with a finding, for none."""
+    """The mesh of a <mesh> below a <visual> or <collision> (`tag`); None with a finding if it cannot be used."""
     uri = reader.name(element, "filename")
     scale = reader.numbers(element, "scale", 3) if "scale" in element.attributes else (1.0, 1.0, 1.0)
     if uri is None or scale is None:
         return None
     if 0.0 in scale:
-        reader.report("URDF012", "a mesh is scaled by 0", element.place)
+        reader.report("URDF012", "a mesh has scale 0", element.place)
         return None
     try:
         path = packages.resolve(uri)
@@ -192,10 +194,10 @@ def _mesh(reader: Reader, element: Element, tag: str, packages: Packages) -> Mes
         if tag == "collision":
             hint = error.hint
             if isinstance(error, Absent):
-                hint = f"{hint} Else: {WITHOUT_IT}" if hint else WITHOUT_IT
+                hint = f"{hint} Otherwise {WITHOUT_IT}" if hint else WITHOUT_IT
             reader.report("URDF013", f"collision mesh: {error.message}", element.place, hint=hint)
         else:
-            message = f"visual mesh, left out: {error.message}"
+            message = f"visual mesh, ignored: {error.message}"
             reader.report("URDF033", message, element.place, hint=error.hint, severity="warning")
         return None
     if tag == "collision" and packages.reads and not _usable_mesh(reader, element, uri, packages):
@@ -210,7 +212,7 @@ def _usable_mesh(reader: Reader, element: Element, uri: str, packages: Packages)
         reader.report("URDF200", f"collision mesh '{uri}' {error.reason}", element.place, hint=error.hint)
         return False
     if facts.flat:
-        message = f"collision mesh '{uri}' is flat: nothing can be inside of it"
+        message = f"collision mesh '{uri}' is flat: its convex hull has no volume"
         reader.report("URDF210", message, element.place, hint="use a thin <box>")
     return not facts.flat
 

@@ -1,4 +1,4 @@
-"""Mimic joints: their targets exist and move, and follow no one themselves once chains are multiplied out."""
+"""Resolution of mimic joints: checks of their targets, and chains of mimic joints reduced to one step."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ def resolve_mimics(reader: Reader, joints: Mapping[str, Joint], elements: Mappin
     """The joints, each mimic following an independent joint: q = m1 (m2 q' + o2) + o1 = (m1 m2) q' + (m1 o2 + o1).
 
     Args:
-        reader: takes the findings: unknown target, itself, a fixed joint, multiplied by 0, a circle.
-        joints: those that could be read.
-        elements: <joint> of every joint of the description.
+        reader: receives the findings: target unknown, fixed or the joint itself, multiplier 0, a circle.
+        joints: the joints that could be read.
+        elements: <joint> of every joint in the description.
     """
     direct = {name: _direct(reader, joint, joints, elements) for name, joint in joints.items()}
     resolved: dict[str, Mimic | None] = {}
     for start in joints:
-        way: dict[str, Mimic] = {}
+        path: dict[str, Mimic] = {}
         at = start
-        while at not in resolved and at not in way:
+        while at not in resolved and at not in path:
             mimic = direct[at]
             if mimic is None:
                 resolved[at] = None
                 break
-            way[at] = mimic
+            path[at] = mimic
             at = mimic.joint
-        if at in way:
-            circle = list(way)[list(way).index(at) :]
+        if at in path:
+            circle = list(path)[list(path).index(at) :]
             shown = " -> ".join([*circle[:12], *(["..."] if len(circle) > 12 else []), at])
             reader.report("URDF084", f"joints mimic each other in a circle: {shown}", _place(elements, at))
             resolved |= dict.fromkeys(circle)
-        for name, mimic in reversed(way.items()):
+        for name, mimic in reversed(path.items()):
             if name not in resolved:
                 resolved[name] = _followed(mimic, resolved[mimic.joint])
     return {name: dataclasses.replace(joint, mimic=resolved[name]) for name, joint in joints.items()}
 
 
 def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements: Mapping[str, Element]) -> Mimic | None:
-    """Whom a joint says it follows; None with a finding where it cannot."""
+    """The mimic as written; None with a finding if it is invalid."""
     mimic = joint.mimic
     if mimic is None:
         return None
@@ -56,8 +56,8 @@ def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements:
     elif mimic.joint in joints and not joints[mimic.joint].moves:
         reader.report("URDF014", f"joint '{joint.name}' mimics '{mimic.joint}', which is fixed", place)
     elif mimic.multiplier == 0.0:
-        message = f"joint '{joint.name}' mimics '{mimic.joint}' with a multiplier of 0: it follows nothing"
-        hint = f'make it type="fixed", with its <origin> where it stands at {mimic.offset:g}'
+        message = f"joint '{joint.name}' mimics '{mimic.joint}' with multiplier 0: it never moves"
+        hint = f'use type="fixed", with the <origin> at position {mimic.offset:g}'
         reader.report("URDF014", message, place, hint=hint)
     elif mimic.joint in joints:
         return mimic
@@ -65,7 +65,7 @@ def _direct(reader: Reader, joint: Joint, joints: Mapping[str, Joint], elements:
 
 
 def _followed(mimic: Mimic, inner: Mimic | None) -> Mimic:
-    """`mimic` of a joint that itself follows as `inner` says."""
+    """`mimic` of a joint that is itself a mimic joint with `inner`."""
     if inner is None:
         return mimic
     return Mimic(

@@ -1,4 +1,4 @@
-"""Numbers, names and frames of URDF elements; what is wrong becomes a finding, and reading goes on."""
+"""Reader of numbers, names and frames of URDF elements; errors become findings, and reading continues."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from manipcli.description.located_xml import Element
 
 MOST_HINTS: Final = 50
 MOST_NAMES: Final = 2000
-"""The nearest name is looked for this often and among this many: a file of errors may not cost minutes."""
+"""Most searches for a similar name, and most candidates: a bound on the time for a file full of errors."""
 
 FARTHEST: Final = 1e6
-"""[m, rad] of what a description places or measures; beyond it engines, which count in single precision, break."""
+"""[m, rad]: largest position, size or angle; beyond it engines in single precision fail."""
 LARGEST: Final = 1e9
-"""Of masses, moments, damping and friction, in SI."""
+"""Largest mass, moment of inertia, damping and friction, in SI."""
 
 
 def finite(word: str) -> float | None:
-    """The finite number that a word is: digits as C reads them, no `1_000`, no other script's digits; else None."""
+    """The finite number of a word in C notation (no `1_000`, ASCII digits only); else None."""
     try:
         value = float(word)
     except ValueError:
@@ -31,7 +31,7 @@ def finite(word: str) -> float | None:
 
 
 class Reader:
-    """Gathers findings while a description is read."""
+    """Collects findings while a description is read."""
 
     def __init__(self) -> None:
         self.findings: list[Diagnostic] = []
@@ -49,28 +49,28 @@ class Reader:
         self.findings.append(Diagnostic(code=code, message=message, place=place, hint=hint, severity=severity))
 
     def near(self, name: str, known: Collection[str]) -> str | None:
-        """The hint for an unknown name."""
+        """The hint with similar names, or None."""
         self._hints += 1
         if self._hints > MOST_HINTS or len(known) > MOST_NAMES or len(name) > 200:
             return None
         return did_you_mean(name, known)
 
     def name(self, element: Element, attribute: str = "name") -> str | None:
-        """A name that is there and can be printed; else a finding and None."""
+        """A non-empty printable name; else None with a finding."""
         value = element.attributes.get(attribute, "").strip()
         if not value:
             how = "an empty" if attribute in element.attributes else "no"
             self.report("URDF003", f"<{element.tag}> has {how} attribute '{attribute}'", element.place)
             return None
         if not value.isprintable() or len(value) > 200:
-            self.report("URDF003", f"<{element.tag}>: {value[:40]!r} is no usable name", element.place)
+            self.report("URDF003", f"<{element.tag}>: invalid name {value[:40]!r}", element.place)
             return None
         return value
 
     def numbers(
         self, element: Element, attribute: str, count: int, *, most: float = math.inf
     ) -> tuple[float, ...] | None:
-        """`count` finite numbers, none larger than `most`; None where it is missing or (with a finding) wrong."""
+        """`count` finite numbers up to `most`; None if missing or (with a finding) invalid."""
         text = element.attributes.get(attribute)
         if text is None:
             return None
@@ -79,26 +79,26 @@ class Reader:
         written = f'<{element.tag} {attribute}="{shorten(text)}">'
         wrong = next((word for word in words if finite(word) is None), None)
         if wrong is not None:
-            message = f"{written}: expected {expected}; '{shorten(wrong)}' is no finite number"
+            message = f"{written}: '{shorten(wrong)}' is not a finite number; expected {expected}"
             self.report("URDF004", message, element.place)
             return None
         if len(words) != count:
             self.report("URDF058", f"{written}: expected {expected}, found {len(words)}", element.place)
             return None
         if any(abs(float(word)) > most for word in words):
-            self.report("URDF004", f"{written}: beyond all that is real; expected {most:g} or less", element.place)
+            self.report("URDF004", f"{written}: implausibly large; expected {most:g} or less", element.place)
             return None
-        return tuple(float(word) + 0.0 for word in words)  # no -0.0: it would not be written again
+        return tuple(float(word) + 0.0 for word in words)  # no -0.0, which is never written
 
     def number(
         self, element: Element, attribute: str, default: float | None = None, *, most: float = math.inf
     ) -> float | None:
-        """One number; `default` where it is missing or (with a finding) wrong."""
+        """One number; `default` if missing or (with a finding) invalid."""
         values = self.numbers(element, attribute, 1, most=most)
         return default if values is None else values[0]
 
     def required(self, element: Element, attribute: str, *, most: float) -> float | None:
-        """One number that must be there; None with a finding otherwise."""
+        """One required number; None with a finding if missing or invalid."""
         if attribute not in element.attributes:
             self.missing(element, attribute)
             return None
@@ -108,7 +108,7 @@ class Reader:
         self.report("URDF059", f"<{element.tag}> has no attribute '{attribute}'", element.place)
 
     def text_number(self, element: Element | None, default: float) -> float:
-        """A number that stands as the text of an element."""
+        """The number in the text of an element."""
         if element is None:
             return default
         value = finite(element.text)
@@ -119,7 +119,7 @@ class Reader:
         return value
 
     def origin(self, parent: Element) -> Transform:
-        """The <origin> of an element; identity where it has none."""
+        """The <origin> of an element; identity if missing."""
         element = parent.first("origin")
         if element is None:
             return Transform.identity()

@@ -1,4 +1,4 @@
-"""Which elements and attributes URDF has, and where: the table that the checks of the schema tier read."""
+"""Table of the elements and attributes of URDF, for the checks of the schema tier."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manipcli.description.located_xml import Element
 
 @dataclass(frozen=True, slots=True)
 class ElementRule:
-    """`once`: children of which one is read; `many`: children that may be repeated."""
+    """Attributes and children of an element; `once`: at most one such child, `many`: any number."""
 
     attributes: frozenset[str] = frozenset()
     once: frozenset[str] = frozenset()
@@ -54,7 +54,7 @@ RULES: Final[dict[str, ElementRule]] = {
     "safety_controller": _rule("soft_lower_limit soft_upper_limit k_position k_velocity"),
     "mimic": _rule("joint multiplier offset"),
 }
-"""By tag: in URDF an element means the same wherever it stands, `joint` below a transmission apart."""
+"""By tag: a URDF element has the same rule everywhere, except `joint` below a transmission."""
 
 PARENTS: Final[dict[str, tuple[str, ...]]] = {
     tag: tuple(parent for parent, rule in RULES.items() if tag in rule.children) for tag in RULES if tag != "robot"
@@ -75,20 +75,20 @@ FOREIGN: Final = frozenset(
         "self_collide",
     }
 )
-"""Elements of other programs that descriptions carry; what is in them is not looked at here."""
+"""Elements of other programs; their content is not checked."""
 
 
 def is_foreign(tag: str) -> bool:
-    """Whether an element is addressed to another program: a known one, or anything with a prefix (`drake:capsule`)."""
+    """Whether an element is for another program: a known tag, or any tag with a prefix (`drake:capsule`)."""
     return ":" in tag or tag in FOREIGN
 
 
 def known_elements(root: Element) -> Iterator[tuple[Element, ElementRule]]:
-    """Every element that URDF knows and that stands where it belongs, parents before children, with its rule."""
+    """Every URDF element in its proper place with its rule, parents before children."""
     stack = [root]
     while stack:
         element = stack.pop()
         rule = RULES[element.tag]
         yield element, rule
-        # What is below a transmission has rules of its own.
+        # Elements below a transmission follow other rules.
         stack += [child for child in reversed(element.children) if child.tag in rule.children & RULES.keys()]

@@ -1,4 +1,4 @@
-"""The links and joints of a description form one tree."""
+"""Check that the links and joints of a description form one tree."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def check_tree(
     """Name of the root link, or '' with findings: undefined links, two parents, loops, several roots.
 
     Args:
-        reader: takes the findings.
+        reader: receives the findings.
         links: <link> by name.
-        joints: by name; None for one that could not be read, whose links are unknown.
+        joints: by name; None for a joint that could not be read.
         elements: <joint> by name.
-        complete: there are no further joints, without a name or with one that is taken.
+        complete: `joints` has all joints of the description; False if some have a missing or duplicate name.
     """
     before = len(reader.findings)
     parent_joint: dict[str, Joint] = {}
@@ -38,7 +38,7 @@ def check_tree(
                 message = f"joint '{name}': {role} link '{link}' is not in the description"
                 reader.report("URDF006", message, (element.first(role) or element).place, hint=reader.near(link, links))
         if joint.parent == joint.child:
-            reader.report("URDF083", f"joint '{name}' joins link '{joint.parent}' to itself", element.place)
+            reader.report("URDF083", f"joint '{name}' connects link '{joint.parent}' to itself", element.place)
         elif joint.child in parent_joint:
             other = parent_joint[joint.child].name
             message = f"link '{joint.child}' is the child of two joints, '{other}' and '{name}'"
@@ -48,10 +48,10 @@ def check_tree(
             parent_joint[joint.child] = joint
     loops = _loops(links, parent_joint)
     for loop in loops:
-        message = f"links form a loop: {_way(loop)}"
-        # The joint that was written last most likely closed it.
+        message = f"links form a loop: {_shown(loop)}"
+        # The last joint in the file most likely closed it.
         closing = max((elements[parent_joint[link].name] for link in loop), key=_line)
-        hint = "a URDF is a tree: leave one joint out"
+        hint = "remove one joint: a URDF is a tree"
         reader.report("URDF081", message, closing.place, hint=hint)
     if not complete or len(reader.findings) > before or None in joints.values():
         return ""
@@ -65,29 +65,29 @@ def check_tree(
 def _report_roots(
     reader: Reader, roots: list[str], links: Mapping[str, Element], parent_joint: Mapping[str, Joint]
 ) -> None:
-    """Says which links cannot be reached from the root of the largest tree, at the first that cannot."""
+    """Reports the links that are not connected to the largest tree, at the first of them."""
     root_of: dict[str, str] = {}
     for link in links:
-        way = []
+        path = []
         at = link
         while at not in root_of and at in parent_joint:
-            way.append(at)
+            path.append(at)
             at = parent_joint[at].parent
         root = root_of.setdefault(at, at)
-        root_of |= dict.fromkeys(way, root)
+        root_of |= dict.fromkeys(path, root)
     size = {root: sum(top == root for top in root_of.values()) for root in roots[:50]}
     largest = max(size, key=lambda root: size[root])
     others = [root for root in roots if root != largest]
     unreached = [link for link, root in root_of.items() if root != largest]
     message = (
-        f"the description has {len(roots)} root links: {listed(map(repr, roots))}; expected one tree; "
-        f"not reached from '{largest}': {listed(unreached)}"
+        f"the description has {len(roots)} root links: {listed(map(repr, roots))}; expected 1; "
+        f"not connected to '{largest}': {listed(unreached)}"
     )
-    hint = f"join '{others[0]}' to '{largest}' with a fixed joint, or delete it"
+    hint = f"connect '{others[0]}' to '{largest}' with a fixed joint, or delete it"
     reader.report("URDF007", message, links[others[0]].place, hint=hint)
 
 
-def _way(loop: list[str]) -> str:
+def _shown(loop: list[str]) -> str:
     shown = loop if len(loop) <= 12 else [*loop[:11], "..."]
     return " -> ".join([*shown, loop[0]])
 
@@ -97,24 +97,24 @@ def _line(element: Element) -> tuple[int, int]:
 
 
 def _loops(links: Mapping[str, Element], parent_joint: Mapping[str, Joint]) -> list[list[str]]:
-    """Every circle once, each as the links on it, parents first."""
+    """Every loop once, as its links with parents first."""
     done: set[str] = set()
     loops = []
     for link in links:
-        way: dict[str, None] = {}
+        path: dict[str, None] = {}
         at: str | None = link
-        while at is not None and at not in done and at not in way:
-            way[at] = None
+        while at is not None and at not in done and at not in path:
+            path[at] = None
             at = parent_joint[at].parent if at in parent_joint else None
-        if at is not None and at in way:
-            names = list(way)
+        if at is not None and at in path:
+            names = list(path)
             loops.append(names[names.index(at) :][::-1])
-        done.update(way)
+        done.update(path)
     return loops
 
 
 def depth_first(root: str, joints: Mapping[str, Joint]) -> tuple[Joint, ...]:
-    """The joints of a tree from its root, depth first, siblings in the order of the file."""
+    """The joints of a tree in depth-first order, siblings in the order of the file."""
     children: dict[str, list[Joint]] = {}
     for joint in joints.values():
         children.setdefault(joint.parent, []).append(joint)

@@ -1,7 +1,7 @@
-"""A description's tree to links, joints and transmissions; every error of it at once.
+"""Links, joints and transmissions of a description's tree, with all errors at once.
 
-Nothing that an engine would crash on or silently misread gets through: names, references, one tree, finite numbers,
-axes, limits, masses and inertias, shapes, meshes.
+Rejects everything that an engine would crash on or silently misread: names, references, tree structure, finite
+numbers, axes, limits, masses and inertias, shapes, meshes.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from manipcli.description.urdf.topology import check_tree, depth_first
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a description consists of. `root` is '' and the rest is what could be read, where there are errors.
+    """Contents of a description. With errors, `root` may be '' and the rest is what could be read.
 
-    `findings`: errors and warnings, in the order of the file.
+    `findings`: errors and warnings, in the order of reading.
     """
 
     name: str
@@ -53,9 +53,9 @@ def read_parts(description: Description) -> Parts:
     if not links_by_name:
         hint = None
         if root.first("group") or root.first("disable_collisions"):
-            hint = "this looks like an SRDF: give the URDF that belongs to it"
+            hint = "this looks like an SRDF: use the URDF that belongs to it"
         elif description.expanded:
-            hint = "macros do nothing until they are called: give the file that calls them"
+            hint = "use the file that calls the macros"
         reader.report("URDF080", "the description has no link", root.place, hint=hint)
     materials = read_materials(reader, root)
     links = {key: read_link(reader, each, key, description.packages, materials) for key, each in links_by_name.items()}
@@ -81,12 +81,12 @@ def read_parts(description: Description) -> Parts:
 def _check_point_masses(
     reader: Reader, links: Mapping[str, Link], joints: Mapping[str, Joint], places: Mapping[tuple[str, str], Place]
 ) -> None:
-    """A link with mass and no moments of inertia may stand only where it is fixed to another."""
+    """Reports links with mass and without moments of inertia: an error below a moving joint, else a warning."""
     moved = {joint.child for joint in joints.values() if joint.moves}
     for name, link in links.items():
         if link.inertial is None or link.inertial.inertia.any():
             continue
-        message = f"link '{name}' has a mass but no moments of inertia"
+        message = f"link '{name}' has mass but no moments of inertia"
         hint = "compute them from the shape and the mass of the link"
         if name in moved:
             reader.report("URDF011", message, places.get(("link", name)), hint=hint)
@@ -102,8 +102,8 @@ def _named(reader: Reader, root: Element, tag: str, places: dict[tuple[str, str]
             continue
         if name in found:
             first = found[name].place
-            made = f" ({first.expanded})" if first is not None and first.expanded else ""
-            message = f"{tag} '{name}' is written twice; the first is at {first}{made}"
+            origin = f" ({first.expanded})" if first is not None and first.expanded else ""
+            message = f"duplicate {tag} '{name}'; the first is at {first}{origin}"
             reader.report("URDF005", message, element.place)
             continue
         found[name] = element

@@ -1,7 +1,7 @@
-"""Expands xacro with the library, but as data: no expression runs code, no environment is read, no file is far away.
+"""Safe expansion of xacro: the xacro library with its file access, evaluation and environment access replaced.
 
-The library's module is loaded a second time for each expansion and its doors are replaced in that private copy: reading
-files, evaluating expressions and `$(...)`, loading YAML, warnings. The module that others import stays as it is.
+Each expansion loads a private copy of the library's module and replaces its entry points there: reading files,
+evaluating expressions and `$(...)`, loading YAML, warnings. The module that others import is unchanged.
 """
 
 from __future__ import annotations
@@ -30,42 +30,42 @@ from manipcli.description.xacro.yaml_data import Mistyped, load_yaml
 
 _loading = threading.Lock()
 _ABOUT_A_CALL = ("Undefined parameters", "Unused block", "Not enough blocks", "Invalid parameter", "unknown macro")
-# The library's own pattern for `name:=^|default` tries exponentially many ways where a quote is not closed. This one
-# reads the same, with one way to read each character.
+# The library's own pattern for `name:=^|default` backtracks exponentially on an unclosed quote. This one matches the
+# same texts without ambiguity.
 _MACRO_ARGUMENT = re.compile(
     r"""^\s*([^\s:=]+?)\s*:?=\s*(\^\|?)?(\$\{.*?\}|\$\(.*?\)|(?:'[^'\n]*'|"[^"\n]*"|[^\s'"])+|)(?:\s+|$)(.*)"""
 )
 ALLOW_ENV = "MANIPCLI_ALLOW_ENV"
-"""Names the variables that descriptions may read, `A B`; every command that reads descriptions heeds it."""
+"""Environment variable that lists the variables that descriptions may read, `A B`, in all commands."""
 _NODE = 16
-"""What an attribute, a text or an element counts besides its characters: they take memory when they are empty, too."""
-_DATA = "descriptions are data: expressions compute numbers and text and cannot run code"
+"""Cost of an attribute, a text or an element in addition to its characters: empty nodes use memory, too."""
+_DATA = "expressions in a description can only compute numbers and text"
 
 
 def expand(
     path: Path, arguments: Mapping[str, str], packages: Packages, *, allow_env: Collection[str] = ()
 ) -> tuple[Document, tuple[Diagnostic, ...]]:
-    """The document of a xacro file with everything expanded; its elements know where they were written.
+    """The expanded document of a xacro file; its elements keep their places in the source files.
 
     Args:
         path: the file.
         arguments: values of `<xacro:arg>`.
-        packages: finds what it includes.
-        allow_env: environment variables that it may read.
+        packages: resolves included files.
+        allow_env: environment variables that the file may read.
 
     Returns:
-        The document and the warnings that the description itself or the expansion gave.
+        The document, and the warnings of the description and of the expansion.
 
     Raises:
-        InvalidInput: with the place of the innermost element that was being expanded, and the macros around it.
+        InvalidInput: with the place of the innermost element being expanded, and the macros around it.
     """
     return _Expansion(packages, frozenset(allow_env)).run(path, arguments)
 
 
 def _private_module() -> ModuleType:
-    """A copy of the xacro module of our own."""
+    """A private copy of the xacro module."""
     with _loading:
-        # xacro replaces this method of the standard library when it is loaded; others keep the original.
+        # xacro replaces this method of the standard library on import; restore it.
         original = xml.dom.minidom.Element.writexml
         try:
             spec = importlib.util.find_spec("xacro")
@@ -79,7 +79,7 @@ def _private_module() -> ModuleType:
 
 
 class _Expansion:
-    """The doors of one private module, and what they count."""
+    """The replaced entry points of one private module, and their counters."""
 
     def __init__(self, packages: Packages, allow_env: frozenset[str]) -> None:
         self._packages = packages
@@ -103,25 +103,25 @@ class _Expansion:
         self._macro_call = module.handle_macro_call
         self._check = module.check_attrs
         self._required = module.reqd_attrs
-        doors: dict[str, Callable[..., object]] = {
-            "parse": self._door_parse,
-            "safe_eval": self._door_eval,
-            "eval_extension": self._door_extension,
+        replaced: dict[str, Callable[..., object]] = {
+            "parse": self._on_parse,
+            "safe_eval": self._on_eval,
+            "eval_extension": self._on_extension,
             "load_yaml": self._load_yaml,
-            "get_include_files": self._door_include_files,
-            "eval_all": self._door_eval_all,
-            "eval_text": self._door_eval_text,
-            "handle_macro_call": self._door_macro_call,
-            "check_attrs": self._door_check_attrs,
-            "reqd_attrs": self._door_reqd_attrs,
+            "get_include_files": self._on_include_files,
+            "eval_all": self._on_eval_all,
+            "eval_text": self._on_eval_text,
+            "handle_macro_call": self._on_macro_call,
+            "check_attrs": self._on_check_attrs,
+            "reqd_attrs": self._on_reqd_attrs,
             "warning": self._warn,
             "error": self._warn,
             "message": lambda *words, **options: "",
             "print_location": lambda: None,
         }
-        for name, door in doors.items():
-            setattr(module, name, door)
-        # Names of the private copy of the library, which a module's type does not list.
+        for name, function in replaced.items():
+            setattr(module, name, function)
+        # Attributes of the private copy of the library, which ModuleType does not declare.
         module.re_macro_arg = _MACRO_ARGUMENT  # type: ignore[attr-defined]
         module._global_symbols = self._symbols()  # type: ignore[attr-defined]
 
@@ -135,10 +135,10 @@ class _Expansion:
         except InvalidInput:
             raise
         except RecursionError as error:
-            message = "macros, properties or elements are nested too deep for the stack; this cannot be raised"
+            message = "macros, properties or elements are nested too deeply for the stack; no bound changes this"
             raise invalid("XACRO004", message, self._place()) from error
         except MemoryError as error:
-            raise invalid("XACRO004", "the description needs more memory than there is", self._place()) from error
+            raise invalid("XACRO004", "out of memory while expanding the description", self._place()) from error
         except Exception as error:
             raise self._failed(error) from error
         unknown = [name for name in arguments if name not in self._known_arguments]
@@ -146,7 +146,7 @@ class _Expansion:
             known = ", ".join(sorted(self._known_arguments)) or "none"
             raise invalid(
                 "XACRO003",
-                f"the description has no argument {', '.join(repr(name) for name in unknown)}; it has: {known}",
+                f"unknown argument {', '.join(repr(name) for name in unknown)}; the description has: {known}",
                 place_of(document.documentElement) if document.documentElement else None,
             )
         return document, tuple(self._findings)
@@ -167,7 +167,7 @@ class _Expansion:
             elif isinstance(cause, NotFound):
                 own_hint = cause.hint
             elif isinstance(cause, Mistyped):
-                place, own_hint = cause.place, f"it is read at {self._place()}"
+                place, own_hint = cause.place, f"the file is loaded at {self._place()}"
             cause = getattr(cause, "exc", None) or cause.__cause__
         lines = re.sub(r" \(<unknown>, line \d+\)", "", str(error)).splitlines()
         message = "; ".join(line.strip() for line in lines if line.strip()) or repr(error)
@@ -180,29 +180,28 @@ class _Expansion:
             own_hint = near_macro(self._calls[-1].tagName, names_of(self._macros))
         elif "is not defined" in message:
             own_hint = own_hint or self._near
-        hints = [each for each in (own_hint, hint) if each]
-        return invalid(code, message, place, "; ".join(hints) or None)
+        return invalid(code, message, place, "; ".join(filter(None, (own_hint, hint))) or None)
 
     def _warn(self, *words: object, **options: object) -> str:
         message = " ".join(str(word) for word in words)
         self._findings.append(Diagnostic("XACRO010", message, self._place(), severity="warning"))
         return ""
 
-    # --- the doors, in the library's signatures ---
+    # --- the entry points, with the library's signatures ---
 
-    def _door_parse(self, inp: object, filename: str | None = None) -> Document:
+    def _on_parse(self, inp: object, filename: str | None = None) -> Document:
         *around, own = [Path(str(each)) for each in self._module.filestack]
         most = self._bounds.include_depth
         if len(around) >= most:
-            if own in around:  # no bound helps
+            if own in around:  # a larger bound would not help
                 circle = around[len(around) - 1 - around[::-1].index(own) :]
                 names = " -> ".join(each.name for each in [*circle, own])
-                message, hint = f"files include each other without end: {names}", "take one of these includes out"
+                message, hint = f"files include each other in a circle: {names}", "remove one of these includes"
                 raise invalid("XACRO004", message, self._place(), hint)
-            raise Beyond(f"files include each other more than {most} deep", "include_depth")
+            raise Beyond(f"includes are nested more than {most} deep", "include_depth")
         return read_document(Path(str(filename)))
 
-    def _door_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
+    def _on_eval(self, expr: str, globals: Mapping[str, object], locals: object = None) -> object:
         self._clock.look()
         try:
             return self._evaluate(expr, globals)
@@ -210,7 +209,7 @@ class _Expansion:
             self._near = near_name(error, names_of(globals))
             raise
 
-    def _door_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
+    def _on_eval_text(self, text: str, symbols: Mapping[str, object]) -> object:
         value: object = self._eval_text(text, symbols)
         size = size_of(value)
         if size > self._bounds.value_size:
@@ -218,7 +217,7 @@ class _Expansion:
         self._grow(size)
         return value
 
-    def _door_eval_all(self, node: DomElement, macros: object, symbols: object) -> None:
+    def _on_eval_all(self, node: DomElement, macros: object, symbols: object) -> None:
         self._count()
         self._grow(_NODE * (len(node.childNodes) + len(node.attributes)))
         self._current = node if place_of(node) is not None else self._current
@@ -227,14 +226,14 @@ class _Expansion:
         self._eval_all(node, macros, symbols)
 
     def _mark(self, body: DomElement) -> None:
-        """Leaves with the elements of a macro's body who called it: first and last are enough to find the others."""
+        """Stores at the elements of a macro's body the outermost and the innermost call."""
         ends = self._calls[:1] + self._calls[1:][-1:]
         calls = tuple(place for call in ends if (place := place_of(call)) is not None)
         for child in body.childNodes:
             if child.nodeType == child.ELEMENT_NODE:
                 called_from(child, calls)
 
-    def _door_macro_call(self, node: DomElement, macros: object, symbols: object) -> bool:
+    def _on_macro_call(self, node: DomElement, macros: object, symbols: object) -> bool:
         if not node.tagName.startswith("xacro:"):
             return False
         self._current = node
@@ -242,7 +241,7 @@ class _Expansion:
             return bool(self._macro_call(node, macros, symbols))
         self._count()
         if len(self._calls) >= self._bounds.macro_depth:
-            raise Beyond(f"macros call each other more than {self._bounds.macro_depth} deep", "macro_depth")
+            raise Beyond(f"macro calls are nested more than {self._bounds.macro_depth} deep", "macro_depth")
         self._calls.append(node)
         self._macros = macros
         done = bool(self._macro_call(node, macros, symbols))
@@ -252,7 +251,7 @@ class _Expansion:
     def _count(self) -> None:
         self._expansions += 1
         if self._expansions > self._bounds.expansions:
-            raise Beyond(f"more than {self._bounds.expansions} elements are expanded", "expansions")
+            raise Beyond(f"the expansion has more than {self._bounds.expansions} steps", "expansions")
         self._clock.look()
 
     def _grow(self, size: int) -> None:
@@ -260,7 +259,7 @@ class _Expansion:
         if self._characters > self._bounds.characters:
             raise Beyond(f"the description expands to more than {self._bounds.characters} characters", "characters")
 
-    def _door_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
+    def _on_check_attrs(self, tag: DomElement, required: list[str], optional: list[str]) -> list[str | None]:
         self._current = tag
         found: list[str | None] = self._check(tag, required, optional)
         if tag.tagName == "xacro:include":
@@ -269,16 +268,16 @@ class _Expansion:
             self._known_arguments.add(str(found[0]))
         return found
 
-    def _door_reqd_attrs(self, tag: DomElement, names: list[str]) -> list[str]:
+    def _on_reqd_attrs(self, tag: DomElement, names: list[str]) -> list[str]:
         self._current = tag
         found: list[str] = self._required(tag, names)
         return found
 
-    def _door_include_files(self, filename_spec: str, symbols: Mapping[str, object]) -> Iterator[str]:
-        spec = str(self._door_eval_text(filename_spec, symbols))
+    def _on_include_files(self, filename_spec: str, symbols: Mapping[str, object]) -> Iterator[str]:
+        spec = str(self._on_eval_text(filename_spec, symbols))
         if any(character in spec for character in "*[?"):
             parent, folder = Path(spec).parent, self._folder() / Path(spec).parent
-            # As the library, unlike Path.glob: `**` is `*`, so that no tree of folders is walked; nothing hidden.
+            # Like the library and unlike Path.glob: `**` means `*`, so no folder tree is walked; hidden files excluded.
             names = sorted(str(parent / name) for name in glob.glob(Path(spec).name, root_dir=folder))  # noqa: PTH207
             if not names:
                 self._warn(f"'{spec}' matches no file")
@@ -301,7 +300,7 @@ class _Expansion:
     def _folder(self) -> Path:
         return Path(str(self._module.filestack[-1])).parent
 
-    def _door_extension(self, text: str) -> object:
+    def _on_extension(self, text: str) -> object:
         command, _, rest = text[2:-1].strip().partition(" ")
         rest = rest.strip()
         if command == "find":
@@ -319,17 +318,17 @@ class _Expansion:
         if command in {"env", "optenv"}:
             return self._environment(command, rest)
         if command == "cwd":
-            hint = "$(dirname) is the folder of this file; $(find NAME), of a package"
-            raise Refused("$(cwd): a description may not depend on the working folder", hint=hint)
+            hint = "use $(dirname) for the folder of this file, or $(find NAME) for that of a package"
+            raise Refused("$(cwd): a description may not depend on the working directory", hint=hint)
         if command in {"command", "anon"}:
-            raise Refused(f"$({command} ...) is not allowed in a description; pass an argument ($(arg NAME)) instead")
+            raise Refused(f"$({command} ...) is not allowed in a description; use an argument, $(arg NAME), instead")
         raise Refused(f"unknown substitution '{text}'; known: $(find NAME), $(arg NAME), $(dirname), $(eval ...)")
 
     def _environment(self, command: str, rest: str) -> str:
-        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user named."""
+        """`$(env NAME)` and `$(optenv NAME DEFAULT)`, for variables that the user allowed."""
         name, _, default = rest.partition(" ")
         if name not in self._allow_env and name not in os.environ.get(ALLOW_ENV, "").replace(",", " ").split():
-            hint = f"allow it: {ALLOW_ENV}={name} before any command (check-urdf: --allow-env); or use $(arg NAME)"
+            hint = f"allow it with {ALLOW_ENV}={name} before the command (check-urdf: --allow-env), or use $(arg NAME)"
             raise Refused(f"$({command} {name}): a description may not read the environment", hint=hint)
         value = os.environ.get(name)
         if value is None and command == "env":
@@ -371,18 +370,18 @@ class _Expansion:
             "abs_filename": self._absolute,
             "dotify": self._module.YamlDictWrapper,
         }
-        speak = {"warning": self._warn, "error": self._warn, "message": lambda *words: "", "fatal": self._fatal}
+        messages = {"warning": self._warn, "error": self._warn, "message": lambda *words: "", "fatal": self._fatal}
         plain = python_symbols()
         everything: dict[str, object] = {**math_symbols(), **plain, **own}
         return everything | {
             "python": namespace(plain),
             "math": namespace(math_symbols()),
-            "xacro": namespace({**own, **speak, "tokenize": _tokenize, "arg": self._argument}),
+            "xacro": namespace({**own, **messages, "tokenize": _tokenize, "arg": self._argument}),
         }
 
 
 def _typed(text: str) -> object:
-    """An argument as `$(eval)` sees it: a number or truth value where it is one."""
+    """An argument as `$(eval)` sees it: a number or boolean if it is one, else text."""
     for kind in (int, float):
         try:
             return kind(text)

@@ -1,7 +1,7 @@
-"""Expressions of xacro, computed from their syntax tree: a small part of Python that can reach nothing.
+"""Safe evaluation of xacro expressions on their syntax tree, in a small subset of Python.
 
-Descriptions are data. What is not listed here is refused: no lambda, no attribute but the keys of loaded data and a few
-methods of text and mappings, no name that begins with two underscores, and every result has a bounded size.
+Everything that is not listed here is rejected: lambdas, attributes other than the keys of loaded data and a few methods
+of text and mappings, names that begin with two underscores. Every result has a bounded size.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ _METHODS: Final[dict[type, frozenset[str]]] = {
 
 
 class Evaluator:
-    """Computes expressions; one object serves one expansion and counts its operations.
+    """Evaluates the expressions of one expansion and counts the operations.
 
-    One operation touches values of bounded size, so that a look at the clock before each bounds the time of all.
+    Each operation acts on values of bounded size and checks the clock first, so the total time is bounded.
     """
 
     def __init__(self, clock: Clock | None = None) -> None:
@@ -80,20 +80,20 @@ class Evaluator:
         """The value of `text`.
 
         Raises:
-            Refused: not allowed, or too costly.
+            Refused: not allowed, or a bound is exceeded.
             NameError, SyntaxError, TypeError, ArithmeticError, LookupError, ValueError: as in Python.
         """
         if len(text) > MAX_EXPRESSION:
-            raise Refused(f"an expression of {len(text)} characters is not allowed")
+            raise Refused(f"expression has {len(text)} characters; at most {MAX_EXPRESSION} are allowed")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python's own doubts about a text (`1if x`) are no one's concern here
+            warnings.simplefilter("ignore")  # syntax warnings of Python (`1if x`)
             tree = ast.parse(text.strip(), mode="eval")
         return self._value(tree.body, symbols)
 
     def _value(self, node: ast.expr, names: Mapping[str, Value]) -> Value:
         self._left -= 1
         if self._left < 0:
-            raise Beyond("the expressions of the description compute too much", "operations")
+            raise Beyond("the expressions of the description take too many operations", "operations")
         self._clock.look()
         compute = getattr(self, "_" + type(node).__name__.lower(), None)
         if compute is None:
@@ -102,7 +102,7 @@ class Evaluator:
 
     def _constant(self, node: ast.Constant, names: Mapping[str, Value]) -> Value:
         if isinstance(node.value, bytes) or node.value is ...:
-            raise Refused("only numbers, text, True, False and None are constants")
+            raise Refused("only numbers, text, True, False and None are allowed as constants")
         return node.value
 
     def _name(self, node: ast.Name, names: Mapping[str, Value]) -> Value:
@@ -123,13 +123,13 @@ class Evaluator:
             return _formatted(left, right)
         numbers = isinstance(left, int | float) and isinstance(right, int | float)
         if isinstance(node.op, ast.Mod | ast.Pow) and not numbers:
-            raise Refused("only numbers have a remainder or a power")
+            raise Refused("% and ** are allowed only for numbers")
         if isinstance(node.op, ast.Pow) and isinstance(right, int | float) and abs(right) > MAX_EXPONENT:
-            raise Refused(f"an exponent beyond {MAX_EXPONENT} is not allowed")
+            raise Refused(f"an exponent above {MAX_EXPONENT} is not allowed")
         if isinstance(node.op, ast.Mult):
             most = bounds().value_size
-            for one, other in ((left, right), (right, left)):
-                if isinstance(one, int) and not isinstance(other, int | float) and size_of(other) * one > most:
+            for factor, other in ((left, right), (right, left)):
+                if isinstance(factor, int) and not isinstance(other, int | float) and size_of(other) * factor > most:
                     raise too_large("a value")
         return _BINARY[type(node.op)](left, right)
 
@@ -171,7 +171,7 @@ class Evaluator:
             if isinstance(node, ast.Starred):
                 several = held.add(self._value(node.value, names))
                 if not isinstance(several, str | list | tuple | dict | set):
-                    raise Refused(f"'{ast.unparse(node)[:80]}': only a list can be spread")
+                    raise Refused(f"'{ast.unparse(node)[:80]}': only a list can be unpacked with *")
                 found += several
             else:
                 found.append(held.add(self._value(node, names)))
@@ -189,7 +189,7 @@ class Evaluator:
             raise Refused(f"'{ast.unparse(node.value)[:80]}' has no items")
         index = self._index(node.slice, names)
         try:
-            # An index of the wrong kind is Python's to refuse: its TypeError becomes a finding.
+            # An index of the wrong type raises a TypeError, which becomes a finding.
             return container[index]  # type: ignore[call-overload,index]
         except LookupError:
             near = did_you_mean(str(index), map(str, list(container)[:100])) if isinstance(container, dict) else None
@@ -228,7 +228,7 @@ class Evaluator:
                 if size_of(owner) * size_of(list(arguments)) > bounds().value_size * 64:
                     raise too_large("a text")
             result = method(owner, *arguments)
-            # These three methods give views, which mypy cannot know from a name.
+            # These three methods return views, which mypy cannot infer from the name.
             return list(result) if name in {"keys", "values", "items"} else result  # type: ignore[call-overload]
 
         return call
@@ -242,13 +242,13 @@ class Evaluator:
         positional = self._each(node.args, names)
         given = self._each([keyword.value for keyword in node.keywords], names)
         named = {str(keyword.arg): value for keyword, value in zip(node.keywords, given, strict=True)}
-        if function is not isinstance:  # what others call again and again (map, the key of sorted) is watched
+        if function is not isinstance:  # callbacks that are called repeatedly (map, the key of sorted) are watched
             positional = [self._watched(value) if callable(value) else value for value in positional]
             named = {name: self._watched(value) if callable(value) else value for name, value in named.items()}
         return self._watched(function)(*positional, **named)
 
     def _watched(self, function: Callable[..., Value]) -> Callable[..., Value]:
-        """`function`, with a look at the clock before each call and a bound on what all calls give together."""
+        """`function` with a check of the clock before each call and a bound on the total size of all results."""
         held = Held()
         called = self._set if function is set else self._mapping if function is dict else function
 
@@ -273,8 +273,8 @@ class Evaluator:
         return found | named
 
     def _parts(self, values: Value = ()) -> Iterator[list[Value]]:
-        """A few items at a time: numbers can be chosen so that a hash table of many takes for ever."""
-        # What has no items is Python's to refuse: its TypeError becomes a finding.
+        """The items in blocks of 256: colliding hashes could make a large table take very long."""
+        # A value without items raises a TypeError, which becomes a finding.
         items = list(values)  # type: ignore[call-overload]
         for start in range(0, len(items), 256):
             self._clock.look()
@@ -291,7 +291,7 @@ class Evaluator:
     def _dictcomp(self, node: ast.DictComp, names: Mapping[str, Value]) -> Value:
         scopes = self._scopes(node.generators, _Scope(names, {}))
         held = Held()
-        return {held.add(self._value(node.key, one)): held.add(self._value(node.value, one)) for one in scopes}
+        return {held.add(self._value(node.key, scope)): held.add(self._value(node.value, scope)) for scope in scopes}
 
     def _setcomp(self, node: ast.SetComp, names: Mapping[str, Value]) -> Value:
         return self._set(self._listcomp(ast.ListComp(elt=node.elt, generators=node.generators), names))
@@ -303,7 +303,7 @@ class Evaluator:
         first, rest = generators[0], generators[1:]
         items = self._value(first.iter, scope)
         if not isinstance(items, str | list | tuple | dict):
-            raise Refused(f"'{ast.unparse(first.iter)[:80]}' cannot be gone through")
+            raise Refused(f"'{ast.unparse(first.iter)[:80]}' is not iterable")
         for item in items:
             inner = _Scope(scope, _targets(first.target, item))
             if all(self._value(test, inner) for test in first.ifs):
@@ -311,7 +311,7 @@ class Evaluator:
 
 
 class _Scope(Mapping[str, Value]):
-    """The variables of a comprehension before the names around it."""
+    """The variables of a comprehension, which shadow the outer names."""
 
     def __init__(self, outer: Mapping[str, Value], inner: dict[str, Value]) -> None:
         self._outer = outer
@@ -335,26 +335,26 @@ def _targets(target: ast.expr, item: Value) -> dict[str, Value]:
         for part, value in zip(target.elts, item, strict=True):
             found |= _targets(part, value)
         return found
-    raise Refused("a comprehension names its variables plainly")
+    raise Refused("only names and tuples of names are allowed as variables of a comprehension")
 
 
 def _of_integers(kind: ast.operator, left: Value, right: Value) -> Value:
     if not isinstance(left, int) or not isinstance(right, int):
-        raise Refused(f"operator {type(kind).__name__} is of integers alone")
+        raise Refused(f"operator {type(kind).__name__} is allowed only for integers")
     if isinstance(kind, ast.LShift) and right > MAX_SHIFT:
         raise Refused(f"a shift by more than {MAX_SHIFT} is not allowed")
     return _OF_INTEGERS[type(kind)](left, right)
 
 
 def _formatted(text: str, values: Value) -> Value:
-    """`text % values`, with widths of three digits at most.
+    """`text % values`, with widths of at most three digits.
 
     Raises:
-        Refused: another directive, or too much text.
+        Refused: unsupported directive, or the result is too large.
     """
     directives = _DIRECTIVE.findall(text)
     if "%" in _DIRECTIVE.sub("", text):
-        raise Refused(f"'{text[:80]}' is no format that is understood", hint="write %d, %s or %.3f; %% is the sign")
+        raise Refused(f"unsupported format '{text[:80]}'", hint="use %d, %s or %.3f, and %% for a percent sign")
     if len(directives) * size_of(values) > bounds().value_size * 4:
         raise too_large("a text")
     return text % values

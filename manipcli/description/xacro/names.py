@@ -1,4 +1,4 @@
-"""The names that a xacro file could have meant."""
+"""Suggestions of similar names for errors in a xacro file."""
 
 from __future__ import annotations
 
@@ -8,24 +8,23 @@ from typing import Final
 from manipcli.core.text import any_of, nearest
 
 _TAGS: Final = ("arg", "attribute", "call", "element", "if", "include", "insert_block", "macro", "property", "unless")
-"""Of xacro itself."""
 
 
 class UnknownArgument(NameError):
-    """`$(arg NAME)` of an argument that has neither a value nor a default."""
+    """`$(arg NAME)` of an argument without a value and a default."""
 
     def __init__(self, name: str, known: Collection[str]) -> None:
         close = nearest(name, known)
         self.hint = (
             f"did you mean {any_of(close)}?"
             if close
-            else f"give it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
+            else f"pass it: `args: {{{name}: VALUE}}` in a robot file, {name}:=VALUE on the command line"
         )
-        super().__init__(f"argument '{name}' is not given and has no default")
+        super().__init__(f"argument '{name}' has neither a value nor a default")
 
 
 def names_of(symbols: object) -> list[str]:
-    """The names that an expression could have meant: of a table of the library and of all around it."""
+    """The names in a symbol table of the xacro library and in its parents."""
     found: list[str] = []
     while isinstance(symbols, Mapping) and len(found) < 2000:
         found += [str(name) for name in dict.keys(symbols)] if isinstance(symbols, dict) else list(symbols)

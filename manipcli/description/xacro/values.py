@@ -1,4 +1,4 @@
-"""What expressions of xacro may hold and call: values of bounded size, functions whose cost that size bounds."""
+"""Values and functions of xacro expressions, bounded in size and cost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Value = object
 
 
 class Refused(Exception):
-    """An expression asks for something that descriptions may not do; `hint` says what to do instead."""
+    """An expression uses something that is not allowed; `hint`: the alternative."""
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         self.hint = hint
@@ -23,33 +23,33 @@ class Refused(Exception):
 
 
 class Beyond(Refused):
-    """A bound is met; `hint` says which and how it is raised."""
+    """A bound is exceeded; `hint`: the bound and how to raise it."""
 
     def __init__(self, message: str, bound: BoundName) -> None:
         super().__init__(message, hint=raised(bound))
 
 
 class Clock:
-    """The processor time of one expansion, looked at wherever something may be repeated."""
+    """The processor time of one expansion, checked in every loop."""
 
     def __init__(self) -> None:
         self._seconds = bounds().seconds
         self._until = time.process_time() + self._seconds
 
     def look(self) -> None:
-        """Raises Beyond when the time is over."""
+        """Raises Beyond when the time is used up."""
         if time.process_time() > self._until:
             raise Beyond(f"the expansion takes more than {self._seconds} s", "seconds")
 
 
 class Held:
-    """The characters and items of several values that are held at the same time."""
+    """The total size of several values that exist at the same time."""
 
     def __init__(self) -> None:
         self._held = 0
 
     def add(self, value: Value) -> Value:
-        """`value`; raises Beyond when all together are too large for one value."""
+        """`value`; raises Beyond if the total exceeds the bound for one value."""
         self._held += size_of(value)
         if self._held > bounds().value_size:
             raise too_large("a value")
@@ -57,7 +57,7 @@ class Held:
 
 
 def size_of(value: Value) -> int:
-    """Characters and items in `value` through nesting, counted no further than the bound + 1."""
+    """Characters and items in a nested `value`, counted up to the bound + 1."""
     limit = bounds().value_size
     total = 0
     stack = [value]
@@ -75,23 +75,23 @@ def size_of(value: Value) -> int:
 
 
 def bounded(value: Value) -> Value:
-    """`value`, if it is small enough.
+    """`value`, if its size is allowed.
 
     Raises:
-        Refused: a result too large.
+        Refused: it is too large.
     """
     if isinstance(value, bool | float) or value is None:
         return value
     if isinstance(value, int):
         if not -MAX_INTEGER < value < MAX_INTEGER:
-            raise Refused("an integer of this size is not allowed")
+            raise Refused("the integer is too large; expected less than 2**1024")
     elif size_of(value) > bounds().value_size:
         raise too_large("a value")
     return value
 
 
 def too_large(what: str) -> Beyond:
-    return Beyond(f"{what} of more than {bounds().value_size} characters or items is not allowed", "value_size")
+    return Beyond(f"{what} has more than {bounds().value_size} characters or items", "value_size")
 
 
 def math_symbols() -> dict[str, Value]:
@@ -110,14 +110,14 @@ def python_symbols() -> dict[str, Value]:
         return list(steps)
 
     def in_order(values: Iterable[Value], *, key: Callable[..., Value] | None = None, reverse: bool = False) -> Value:
-        # What cannot be compared is Python's to refuse: its TypeError becomes a finding.
+        # Values that cannot be compared raise a TypeError, which becomes a finding.
         return bounded(sorted(values, key=key, reverse=reverse))  # type: ignore[type-var,arg-type]
 
     def total(values: Iterable[Value], start: Value = 0) -> Value:
         items = list(values)
         if size_of(start) * len(items) > bounds().value_size * 64:
             raise too_large("a sum of lists")
-        # What cannot be added is Python's to refuse, too.
+        # Values that cannot be added raise a TypeError, too.
         return sum(items, start)  # type: ignore[call-overload]
 
     def text(value: Value = "") -> str:
@@ -128,7 +128,7 @@ def python_symbols() -> dict[str, Value]:
         return [held.add(function(*items)) for items in zip(*values, strict=False)]
 
     def listed(function: Callable[..., Value]) -> Callable[..., Value]:
-        # A Value may be a number; zip and its like answer that with the TypeError that becomes a finding.
+        # A Value may be a number, for which zip and others raise a TypeError, which becomes a finding.
         def call(*values: Value) -> Value:
             return bounded(list(function(*(bounded(value) for value in values))))  # type: ignore[call-overload]
 
@@ -139,7 +139,7 @@ def python_symbols() -> dict[str, Value]:
     own: dict[str, Callable[..., Value]] = {function.__name__: listed(function) for function in _LISTED}
     own |= {"range": bounded_range, "str": text, "map": apply, "sorted": in_order, "sum": total}
     for name, function in own.items():
-        function.__name__ = function.__qualname__ = name  # how Python's own messages call it
+        function.__name__ = function.__qualname__ = name  # shown in Python's messages
     return symbols | own | {"True": True, "False": False, "None": None}
 
 

@@ -1,4 +1,4 @@
-"""YAML data that a xacro file loads: read by a loader class of its own, with the unit tags that ROS users know."""
+"""Loader of YAML data for xacro files, with the unit tags of ROS (`!degrees`)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNITS = {
 
 
 class Mistyped(Exception):
-    """A file of data that is no YAML."""
+    """A data file is not valid YAML."""
 
     def __init__(self, message: str, place: Place) -> None:
         self.place = place
@@ -43,13 +43,13 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
         clock: of the expansion that reads it.
 
     Raises:
-        Refused: too large, unknown tags, or a value under a unit tag that is no number.
-        Mistyped: not YAML.
+        Refused: too large, unknown tags, or a value under a unit tag that is not a number.
+        Mistyped: not valid YAML.
     """
     import yaml
 
     class Loader(yaml.SafeLoader):
-        """Private, so that the constructors added here do not reach anyone else's safe_load."""
+        """A private class: the constructors added here do not affect other uses of safe_load."""
 
         merged = 0
 
@@ -60,24 +60,25 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
         def construct_object(self, node: yaml.Node, deep: bool = False) -> object:
             clock.look()
             if isinstance(node, yaml.ScalarNode) and node.tag in _NUMBERS and len(node.value) > MAX_NUMBER:
-                raise Refused(f"{path.name}: a number of {len(node.value)} characters is not allowed", hint=_PLAIN)
+                message = f"{path.name}: number with {len(node.value)} characters; at most {MAX_NUMBER} are allowed"
+                raise Refused(message, hint=_PLAIN)
             return super().construct_object(node, deep)
 
         def flatten_mapping(self, node: yaml.MappingNode) -> None:
             for key, value in node.value:
                 if key.tag == "tag:yaml.org,2002:merge":
-                    for one in value.value if isinstance(value, yaml.SequenceNode) else [value]:
-                        self.count(one)
+                    for merged in value.value if isinstance(value, yaml.SequenceNode) else [value]:
+                        self.count(merged)
             super().flatten_mapping(node)
 
         def count(self, merged: yaml.Node) -> None:
-            # Keys that are merged into each other can grow tenfold with each line.
+            # Nested merge keys can grow tenfold with each line.
             if isinstance(merged, yaml.MappingNode):
                 clock.look()
                 self.flatten_mapping(merged)
                 self.merged += len(merged.value)
                 if self.merged > bounds().value_size:
-                    raise too_large(f"{path.name}: merging (<<)")
+                    raise too_large(f"{path.name}: the merge (<<)")
 
     def construct(factor: float) -> Callable[[Loader, yaml.ScalarNode], float]:
         def constructor(loader: Loader, node: yaml.ScalarNode) -> float:
@@ -86,9 +87,9 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
                 value = evaluate(text)
             except (ValueError, ArithmeticError) as error:
                 place = Place(shown_path(path), mark.line + 1, mark.column + 1)
-                raise Mistyped(f"'{text}' has no value: {error}", place) from error
+                raise Mistyped(f"cannot evaluate '{text}': {error}", place) from error
             if not isinstance(value, int | float):
-                raise Refused(f"{path.name}: a number is expected, not '{value}'")
+                raise Refused(f"{path.name}: '{value}' is not a number")
             return float(value) * factor
 
         return constructor
@@ -112,4 +113,4 @@ def load_yaml(path: Path, evaluate: Callable[[str], object], clock: Clock) -> ob
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise Mistyped(f"not valid YAML: {error}", Place(shown_path(path), 1, 1)) from error
     except RecursionError as error:
-        raise Refused(f"{path.name}: nested too deep", hint=_PLAIN) from error
+        raise Refused(f"{path.name}: nested too deeply", hint=_PLAIN) from error

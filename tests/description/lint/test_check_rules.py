@@ -337,13 +337,13 @@ def test_a_joint_without_an_interface_is_told_that_of_its_actuator(tmp_path: Pat
 
 def test_what_is_taken_for_granted_or_refers_to_nothing_is_a_note(tmp_path: Path) -> None:
     for text, code, said in (
-        (one_joint(LIMIT.replace(' lower="-1"', "")), "URDF036", "the lower limit is missing; it counts as 0"),
-        (one_joint(more='<gazebo reference="tipp"/>'), "URDF330", "'tipp', which is no link and no joint"),
+        (one_joint(LIMIT.replace(' lower="-1"', "")), "URDF036", "lower limit is missing; 0 is used"),
+        (one_joint(more='<gazebo reference="tipp"/>'), "URDF330", "'tipp', which is neither a link nor a joint"),
     ):
         told = [found for found in findings(tmp_path, text) if said in found.message]
         assert [(found.code, found.severity) for found in told] == [(code, "note")]
     assert not any(
-        "no link" in found.message for found in findings(tmp_path, one_joint(more='<gazebo reference="j"/>'))
+        "neither a link" in found.message for found in findings(tmp_path, one_joint(more='<gazebo reference="j"/>'))
     )
 
 

@@ -61,9 +61,9 @@ def ranged(low: float, high: float) -> str:
 REFUSED = {
     "empty": ("", "not well-formed"),
     "another root": ('<robt name="r"/>', "the root element is <robt>"),
-    "unknown element": (description(component(BOTH, '<jiont name="first"/>')), "'hw' has an element <jiont>"),
+    "unknown element": (description(component(BOTH, '<jiont name="first"/>')), "'hw' has the unknown element <jiont>"),
     "no name": (description(component(BOTH, attributes='type="system"')), "a <ros2_control> has no name"),
-    "no type": (description(component(BOTH, attributes='name="hw"')), "'hw' is of type ''; expected system"),
+    "no type": (description(component(BOTH, attributes='name="hw"')), "'hw' has type ''; expected system"),
     "no plugin": (description(component(BOTH, hardware="<hardware/>")), "'hw' has no <hardware> with a <plugin>"),
     "no role": (description(component(BOTH, gear('<joint name="first"/>'))), "'t': a joint has no role"),
     "no name of a transmission": (description(component(BOTH, gear(name=""))), "a SimpleTransmission has no name"),
@@ -76,8 +76,8 @@ REFUSED = {
         description(component(joint("first", '<command_interface name="effort"><param>2</param></command_interface>'))),
         "'hw': a <param> has no name",
     ),
-    "size -1": (sized("-1"), "'first': the size of an interface is '-1'"),
-    "size 1.5": (sized("1.5"), "'first': the size of an interface is '1.5'"),
+    "size -1": (sized("-1"), "'first': interface size is '-1'"),
+    "size 1.5": (sized("1.5"), "'first': interface size is '1.5'"),
     "rate -1": (rated("-1"), "'hw': rw_rate is '-1'"),
     "rate 1.5": (rated("1.5"), "'hw': rw_rate is '1.5'"),
     "transmission of a joint elsewhere": (
@@ -86,7 +86,7 @@ REFUSED = {
     ),
     "actuator of two joints": (
         description(component(BOTH, attributes='name="hw" type="actuator"')),
-        "'hw' is an actuator and has 2 joints",
+        "'hw' is an actuator with 2 joints",
     ),
     "unknown driver": (
         description(component(joint("second", SILENT)), inside=FOLLOWS.format("third")),
@@ -94,27 +94,27 @@ REFUSED = {
     ),
     "driver elsewhere": (
         description(component(joint("second", SILENT)), inside=FOLLOWS.format("first")),
-        "joint 'second' follows 'first', which is not one of this ros2_control",
+        "joint 'second' mimics 'first', which is not in this ros2_control",
     ),
     "mimic without one": (
         description(component(joint("first"), joint("second", attributes='mimic="true"'))),
-        "joint 'second' shall follow another (mimic), but",
+        "joint 'second' has mimic=\"true\", but",
     ),
     "mimic with a command": (
         description(component(BOTH), inside=FOLLOWS.format("first")),
-        "joint 'second' follows 'first' and has a command interface",
+        "joint 'second' mimics 'first' and has a command interface",
     ),
     "fixed": (description(component(BOTH), inside="", kind="fixed"), "joint 'second' is fixed"),
     "two roots": (description(component(BOTH), links='<link name="z"/>'), "2 root links: 'a', 'z'"),
-    "a range above the limits": (ranged(50, 60), "joint 'first': min 50 leaves nothing of its limits -1 to 1"),
-    "a range below the limits": (ranged(-60, -50), "joint 'first': max -50 leaves nothing of its limits -1 to 1"),
+    "a range above the limits": (ranged(50, 60), "joint 'first': min 50 is outside its limits -1 to 1"),
+    "a range below the limits": (ranged(-60, -50), "joint 'first': max -50 is outside its limits -1 to 1"),
     "a comma for a point": (
         description(
             component(
                 joint("first", '<command_interface name="effort"><param name="max">0,5</param></command_interface>')
             )
         ),
-        "'first': '0,5' is no finite number for max",
+        "'first': max is '0,5'; expected a finite number",
     ),
 }
 ACCEPTED = {

@@ -65,9 +65,9 @@ def test_what_cannot_be_read_is_one_finding_with_a_place(tmp_path: Path, data: b
 @pytest.mark.parametrize("begin", [b"", b"\xef\xbb\xbf", b"\n  "])
 def test_a_file_of_another_kind_is_sent_to_its_own_command(tmp_path: Path, begin: bytes) -> None:
     (finding,) = look(tmp_path, begin + b"robot: arm\nurdf: arm.urdf\n", "robot.yaml").findings
-    assert finding.hint == "this is no XML; robot, controllers and task files: `manipcli check`"
+    assert finding.hint == "not XML; for robot, controller and task files use `manipcli check`"
     (broken,) = look(tmp_path, begin + b"<robot name='r'><link>", "r.urdf").findings
-    assert "is open" in (broken.hint or "")
+    assert (broken.hint or "").startswith("close <link> of line ")
 
 
 def test_a_folder_is_no_description(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def test_a_folder_is_no_description(tmp_path: Path) -> None:
     ("text", "name", "hint"),
     [
         ('<robot name="r"><group name="arm"/></robot>', "r.srdf", "SRDF"),
-        (f'{XACRO}<xacro:macro name="m"><link name="a"/></xacro:macro></robot>', "m.xacro", "calls them"),
+        (f'{XACRO}<xacro:macro name="m"><link name="a"/></xacro:macro></robot>', "m.xacro", "calls the macros"),
         ('<robot name="r"/>', "r.urdf", None),
     ],
 )
@@ -94,17 +94,17 @@ def test_a_description_without_links_is_sent_to_the_one_with_them(
 def test_an_element_that_is_never_closed_is_named(tmp_path: Path) -> None:
     found = look(tmp_path, '<robot name="r">\n<link name="a">\n</robot>')
     assert found.findings[0].place is not None
-    assert (found.findings[0].place.line, found.findings[0].hint) == (3, "<link> of line 2 is open")
+    assert (found.findings[0].place.line, found.findings[0].hint) == (3, "close <link> of line 2")
 
 
 @pytest.mark.parametrize(
     ("broken", "message", "column", "hint"),
     [
         ("<!-- Größe -->".encode("latin-1"), "the byte 0xf6 is not UTF-8", 8, "save it as UTF-8"),
-        (b"<<<<<<< HEAD\n=======\n>>>>>>> other", "a merge conflict is not resolved", 1, "keep one side"),
+        (b"<<<<<<< HEAD\n=======\n>>>>>>> other", "unresolved merge conflict", 1, "keep one side"),
         (b'<link name="${1 < 2}"/>', "invalid token", 17, "&lt;"),
         (b'<link name="a &amp; b"/><link name="a & b"/>', "invalid token", 40, "&amp;"),
-        (b"<!-- a -- b -->", "invalid token", 10, "take '--' out"),
+        (b"<!-- a -- b -->", "invalid token", 10, "remove '--'"),
         (b"<link name=a/>", "invalid token", 12, "in quotes"),
         (b"<xacro:arg/>", "unbound prefix 'xacro'", 1, 'xmlns:xacro="http://www.ros.org/wiki/xacro"'),
         (b"<sensor:ray/>", "unbound prefix 'sensor'", 1, 'xmlns:sensor="..."'),
@@ -212,7 +212,7 @@ def test_a_bound_is_raised_as_its_error_says(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setenv("MANIPCLI_BOUNDS", "depth=99999")
     assert codes(look(tmp_path, deep.replace("<x>", "<x>" * 30).replace("</x>", "</x>" * 30))) == ["URDF052"]
     monkeypatch.setenv("MANIPCLI_BOUNDS", "deep=3")
-    with pytest.raises(InvalidInput, match="'deep=3' is no bound") as refused:
+    with pytest.raises(InvalidInput, match="invalid bound 'deep=3'") as refused:
         bounds()
     assert "did you mean 'depth'" in (refused.value.findings[0].hint or "")
 
@@ -220,9 +220,9 @@ def test_a_bound_is_raised_as_its_error_says(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.parametrize("number", ["0.5", "0", "-1", "1e3", ""])
 def test_a_bound_that_is_no_whole_number_is_told_that(number: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MANIPCLI_BOUNDS", f"seconds={number}")
-    with pytest.raises(InvalidInput, match=f"'seconds={number}' is no bound") as refused:
+    with pytest.raises(InvalidInput, match=f"invalid bound 'seconds={number}'") as refused:
         bounds()
-    assert refused.value.findings[0].hint == "whole numbers above 0"
+    assert refused.value.findings[0].hint == "use a whole number above 0"
 
 
 def test_real_robots_are_far_from_the_bounds() -> None:

@@ -73,8 +73,8 @@ def inertia(**moments: str) -> str:
 
 BAD = {
     "link without name": (GOOD.replace('<link name="b">', "<link>"), "no attribute 'name'"),
-    "link twice": (GOOD.replace(LINK_B, LINK_B + LINK_B), "link 'b' is written twice"),
-    "joint twice": (GOOD.replace(JOINT, JOINT + JOINT), "joint 'j' is written twice"),
+    "link twice": (GOOD.replace(LINK_B, LINK_B + LINK_B), "duplicate link 'b'"),
+    "joint twice": (GOOD.replace(JOINT, JOINT + JOINT), "duplicate joint 'j'"),
     "no link": ('<robot name="r"/>', "has no link"),
     "joint without type": (GOOD.replace(' type="revolute"', ""), "no attribute 'type'"),
     "unknown type": (joint(ENDS + LIMIT, "revolut"), "unknown type 'revolut'"),
@@ -120,11 +120,11 @@ BAD = {
     "no moments": (link_b('<inertial><mass value="2"/></inertial>'), "no <inertia>"),
     "negative moment": (inertia(ixx="-0.02"), "not positive definite"),
     "not definite": (inertia(ixy="0.5"), "not positive definite"),
-    "triangle": (inertia(izz="0.06"), "no body has the principal moments"),
+    "triangle": (inertia(izz="0.06"), "impossible principal moments"),
     "moved point mass": (inertia(ixx="0", iyy="0", izz="0"), "no moments of inertia"),
     "unknown shape": (link_b("<collision><geometry><boxx/></geometry></collision>"), "unknown shape <boxx>"),
-    "no shape": (link_b("<collision><geometry/></collision>"), "with one shape"),
-    "cone": (link_b("<collision><geometry><cone/></geometry></collision>"), "no shape of URDF"),
+    "no shape": (link_b("<collision><geometry/></collision>"), "has no shape"),
+    "cone": (link_b("<collision><geometry><cone/></geometry></collision>"), "<cone> is not a URDF shape"),
     "negative size": (
         link_b('<collision><geometry><box size="1 -1 1"/></geometry></collision>'),
         "expected positive lengths",
@@ -144,7 +144,7 @@ BAD = {
             JOINT + '<transmission name="t"><type>S</type><joint name="j"/><actuator name="m">'
             "<mechanicalReduction>0</mechanicalReduction></actuator></transmission>",
         ),
-        "reduction of 0",
+        "reduction is 0",
     ),
 }
 
@@ -257,9 +257,9 @@ def test_links_of_the_smaller_tree_are_named_and_no_others(
     links = "".join(f'<link name="{name}"/>' for name in order)
     (found,) = errors(tmp_path, f'<robot name="r">{links}{"".join(joints)}</robot>')
     assert found.code == "URDF007"
-    named = found.message.split("not reached from 'a': ")[1]
+    named = found.message.split("not connected to 'a': ")[1]
     assert sorted(re.findall(r"\b[a-g]\b", named)) == ["e", "f", "g"]
-    assert found.hint == "join 'e' to 'a' with a fixed joint, or delete it"
+    assert found.hint == "connect 'e' to 'a' with a fixed joint, or delete it"
 
 
 @pytest.mark.parametrize("order", ["abcd", "dcba", "cadb"])
@@ -341,7 +341,7 @@ def test_colours_come_from_materials_by_name_and_in_place(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("there", "begins"), [("none.stl", "put the file"), ("elbw.stl", "did you mean 'elbw.stl'? Else: ")]
+    ("there", "begins"), [("none.stl", "add the file"), ("elbw.stl", "did you mean 'elbw.stl'? Otherwise ")]
 )
 def test_what_to_do_without_a_collision_mesh_is_told(tmp_path: Path, there: str, begins: str) -> None:
     (tmp_path / there).touch()
@@ -349,7 +349,7 @@ def test_what_to_do_without_a_collision_mesh_is_told(tmp_path: Path, there: str,
     (finding,) = errors(tmp_path, link_b(INERTIAL + shape))
     assert finding.code == "URDF013"
     assert (finding.hint or "").startswith(begins)
-    assert "take the <collision> out" in (finding.hint or "")
+    assert "delete the <collision>" in (finding.hint or "")
 
 
 def test_a_mesh_is_named_without_the_machine_it_lies_on(tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_other_built_in_names_do_not_exist(name: str) -> None:
 def test_many_small_operations_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MANIPCLI_BOUNDS", "operations=1000")
     evaluate = Evaluator()
-    with pytest.raises(Refused, match="too much"):
+    with pytest.raises(Refused, match="too many operations"):
         for _ in range(100):
             evaluate("sum([i for i in range(50)])", NAMES)
 

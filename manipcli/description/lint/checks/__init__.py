@@ -1,6 +1,6 @@
-"""What can be wrong with a description, in the order of tiers and codes.
+"""The registry of checks of descriptions, in the order of tiers and codes.
 
-A file per subject; what reading finds anyway is in the `reading_` files.
+One file per subject; the `reading_` files hold the checks whose findings the reader reports.
 """
 
 from typing import get_args

@@ -1,4 +1,4 @@
-"""Collision shapes that are missing, or that meet each other."""
+"""Checks of collision shapes: missing or overlapping."""
 
 from collections.abc import Iterator
 
@@ -13,11 +13,11 @@ from manipcli.description.lint.zero_overlap import overlaps_at_zero
     "URDF300", "no-collision", "readiness", "warning", bad=one_joint(tip=INERTIAL + CUBE.replace("collision", "visual"))
 )
 def _no_collision(subject: Subject) -> Iterator[Diagnostic]:
-    """A link that moves can be seen but has no collision shape.
+    """A moving link has a visual but no collision shape.
 
-    It passes through everything, in planning and in simulation.
+    The link passes through everything, in planning and in simulation.
     """
-    # Of the links that a joint moves as one: those with visuals only, and where none has any shape, one with mass.
+    # Of each rigid group: the links with visuals only; in a group without shapes, the joint's child if it has mass.
     links = elements_by_name(subject.description.root, "link")
     for joint, body in moved_bodies(subject.parts):
         elements = [(name, links[name]) for name in body if name in links]
@@ -26,8 +26,8 @@ def _no_collision(subject: Subject) -> Iterator[Diagnostic]:
         if not seen and not solid and joint.child in links and links[joint.child].first("inertial") is not None:
             seen = [joint.child]
         for name in seen:
-            message = f"link '{name}' is moved by joint '{joint.name}' and has no <collision>"
-            yield Diagnostic("URDF300", message, links[name].place, "a box or cylinder is enough", "warning")
+            message = f"link '{name}' has no <collision> and is moved by joint '{joint.name}'"
+            yield Diagnostic("URDF300", message, links[name].place, "add a box or a cylinder", "warning")
 
 
 @check(
@@ -44,8 +44,8 @@ def _no_collision(subject: Subject) -> Iterator[Diagnostic]:
 def _self_collision(subject: Subject) -> Iterator[Diagnostic]:
     """Links that are not neighbours overlap with all joints at zero.
 
-    Often a misplaced or oversized shape; planning then allows the pair everywhere, as the robot seems to be made
-    like that.
+    The cause is often a misplaced or oversized shape. Planning then ignores collisions of the pair in every
+    configuration.
     """
     links = elements_by_name(subject.description.root, "link")
     for a, b, depth in overlaps_at_zero(subject.parts):

@@ -1,4 +1,4 @@
-"""Components of <ros2_control> that its controller manager would refuse."""
+"""Checks of <ros2_control> components that the controller manager would reject."""
 
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -24,7 +24,7 @@ OTHER_INTERFACES: Final = (
 )
 ELEMENTS: Final = ("hardware", "joint", "sensor", "gpio", "transmission")
 PARTS: Final = ("command_interface", "state_interface", "param", "limits")
-"""Of a joint, a sensor or a gpio."""
+"""Child elements of a joint, a sensor or a gpio."""
 
 
 @check(
@@ -34,9 +34,9 @@ PARTS: Final = ("command_interface", "state_interface", "param", "limits")
     bad=one_joint(more=controlled('<joint name="k"><command_interface name="position"/></joint>')),
 )
 def _joint(subject: Subject) -> Iterator[Diagnostic]:
-    """A <ros2_control> names a joint that is unknown or fixed, or its transmission one that it does not have.
+    """A <ros2_control> names an unknown or fixed joint, or its transmission names a joint it does not contain.
 
-    The controller manager refuses the whole description at start-up.
+    The controller manager rejects the whole description at start-up.
     """
     written = elements_by_name(subject.description.root, "joint")
     for joint in controlled_joints(subject):
@@ -45,7 +45,7 @@ def _joint(subject: Subject) -> Iterator[Diagnostic]:
             yield Diagnostic("URDF320", message, joint.element.place, did_you_mean(joint.name, list(written)))
         elif written[joint.name].attributes.get("type") == "fixed":
             message = f"ros2_control '{joint.component}': joint '{joint.name}' is fixed"
-            yield Diagnostic("URDF320", message, joint.element.place, "take it out, or make the joint move")
+            yield Diagnostic("URDF320", message, joint.element.place, "remove it, or change the type of the joint")
     for component in subject.description.root.all("ros2_control"):
         own = [joint.name for joint in component.all("joint")]
         for transmission in component.all("transmission"):
@@ -66,29 +66,29 @@ def _joint(subject: Subject) -> Iterator[Diagnostic]:
     ),
 )
 def _mimic(subject: Subject) -> Iterator[Diagnostic]:
-    """A mimic joint has a command interface of its own, or nothing to follow.
+    """A mimic joint has its own command interface, or no joint to follow.
 
-    It has no position of its own: two commands for one degree of freedom. ros2_control refuses it.
+    It would be a second command for one degree of freedom. ros2_control rejects it.
     """
     # `mimic="false"` at the joint of the component makes it independent there.
     written = elements_by_name(subject.description.root, "joint")
     together = [(joint.component, joint.name) for joint in controlled_joints(subject)]
     for joint in controlled_joints(subject):
         mimic = written[joint.name].first("mimic") if joint.name in written else None
-        said = joint.element.attributes.get("mimic", "").strip()
+        stated = joint.element.attributes.get("mimic", "").strip()
         what = f"ros2_control '{joint.component}': joint '{joint.name}'"
-        if mimic is None and said == "true" and joint.name in written:
-            message = f"{what} shall follow another (mimic), but the description has no <mimic> for it"
+        if mimic is None and stated == "true" and joint.name in written:
+            message = f'{what} has mimic="true", but its <joint> has no <mimic>'
             yield Diagnostic("URDF321", message, joint.element.place, None)
-        if mimic is None or said == "false":
+        if mimic is None or stated == "false":
             continue
         target = mimic.attributes.get("joint", "").strip()
         if joint.commands:
-            message = f"{what} follows '{target}' and has a command interface"
-            yield Diagnostic("URDF321", message, joint.commands[0].place, "keep its state interfaces only")
+            message = f"{what} mimics '{target}' and has a command interface"
+            yield Diagnostic("URDF321", message, joint.commands[0].place, "keep only its state interfaces")
         if target in written and (joint.component, target) not in together:
-            message = f"{what} follows '{target}', which is not one of this ros2_control"
-            yield Diagnostic("URDF321", message, joint.element.place, f"put '{target}' there too, or take it out")
+            message = f"{what} mimics '{target}', which is not in this ros2_control"
+            yield Diagnostic("URDF321", message, joint.element.place, f"add '{target}' there, or remove '{joint.name}'")
 
 
 @check(
@@ -101,7 +101,7 @@ def _mimic(subject: Subject) -> Iterator[Diagnostic]:
     ),
 )
 def _plugin(subject: Subject) -> Iterator[Diagnostic]:
-    """A <ros2_control> states no plugin, no name, or no known type.
+    """A <ros2_control> has no plugin, no name, or an unknown type.
 
     The controller manager does not start with it.
     """
@@ -112,7 +112,7 @@ def _plugin(subject: Subject) -> Iterator[Diagnostic]:
             yield Diagnostic("URDF322", "a <ros2_control> has no name", component.place, 'name="..."')
         if component.attributes.get("type", "").strip() not in TYPES:
             kind = component.attributes.get("type", "")
-            message = f"ros2_control '{name}' is of type '{kind}'; expected {', '.join(TYPES)}"
+            message = f"ros2_control '{name}' has type '{kind}'; expected {', '.join(TYPES)}"
             yield Diagnostic("URDF322", message, component.place, 'type="system"')
         if plugin is None or not plugin.text.strip():
             message = f"ros2_control '{name}' has no <hardware> with a <plugin>"
@@ -128,77 +128,77 @@ def _plugin(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint(more=controlled('<joint name="j"><command_interface name="postion"/></joint>')),
 )
 def _interface(subject: Subject) -> Iterator[Diagnostic]:
-    """An interface of ros2_control has a name that no controller asks for, or none.
+    """An interface of ros2_control has no name, or a name close to a standard one.
 
-    Controllers ask for position, velocity, effort or acceleration by exactly these names.
+    Controllers claim interfaces by exact names such as position, velocity, effort or acceleration.
     """
-    # A name far from all that are known is somebody's own, which is allowed.
+    # A name far from all standard names is custom, which is allowed.
     for joint in controlled_joints(subject):
         for interface in (*joint.commands, *joint.element.all("state_interface")):
             name = interface.name
             near = get_close_matches(name, INTERFACES, n=1, cutoff=0.8) if name else ["position"]
             if name in INTERFACES or name in OTHER_INTERFACES or not near:
                 continue
-            what = f"'{name}'" if name else "no name"
-            message = f"ros2_control '{joint.component}': an interface of joint '{joint.name}' has {what}"
+            what = f"the unknown name '{name}'" if name else "no name"
+            message = f"ros2_control '{joint.component}': joint '{joint.name}' has an interface with {what}"
             yield Diagnostic("URDF323", message, interface.place, f"did you mean '{near[0]}'?", "warning")
 
 
 @check("URDF325", "control-element", "readiness", bad=one_joint(more=controlled('<joint name="j"/><joint name="j"/>')))
 def _element(subject: Subject) -> Iterator[Diagnostic]:
-    """A <ros2_control> has an element, joint, interface or parameter that may not be there as it is.
+    """A <ros2_control> has an unknown, duplicate or unnamed element.
 
-    Its parser knows hardware, joint, sensor, gpio and transmission, and throws at any other; what it does not know
-    below a joint it leaves out. A joint and an interface stand there once, an actuator has one joint, a sensor
-    commands nothing, and a parameter has a name.
+    Its parser accepts hardware, joint, sensor, gpio and transmission, throws on any other element, and ignores
+    unknown elements below a joint. Joints and interfaces must be unique, an actuator has one joint, a sensor has no
+    command interface, and a parameter needs a name.
     """
     names: set[str] = set()
     for component in subject.description.root.all("ros2_control"):
         name = component.attributes.get("name", "")
         if name.strip() and name.strip() in names:
-            yield Diagnostic("URDF325", f"ros2_control '{name}' is there twice", component.place, "name them apart")
+            yield Diagnostic("URDF325", f"duplicate ros2_control '{name}'", component.place, "rename one of them")
         names.add(name.strip())
         seen: set[str] = set()
         for child in component.children:
             if child.tag not in ELEMENTS:
-                message = f"ros2_control '{name}' has an element <{child.tag}>; expected {', '.join(ELEMENTS)}"
+                message = f"ros2_control '{name}' has the unknown element <{child.tag}>; expected {', '.join(ELEMENTS)}"
                 yield Diagnostic("URDF325", message, child.place, None)
             own = child.name
             if child.tag == "joint" and own in seen:
-                yield Diagnostic("URDF325", f"ros2_control '{name}' has joint '{own}' twice", child.place, None)
+                yield Diagnostic("URDF325", f"ros2_control '{name}' has duplicate joint '{own}'", child.place, None)
             if child.tag in ("sensor", "gpio") and not own:
                 yield Diagnostic(
                     "URDF325", f"ros2_control '{name}': a <{child.tag}> has no name", child.place, 'name="..."'
                 )
             seen |= {own} if child.tag == "joint" else set()
-            yield from _within(child, name)
+            yield from _children(child, name)
         if component.attributes.get("type", "").strip() == "actuator" and len(component.all("joint")) > 1:
-            message = f"ros2_control '{name}' is an actuator and has {len(component.all('joint'))} joints; expected one"
-            yield Diagnostic("URDF325", message, component.all("joint")[1].place, 'type="system" may have several')
+            message = f"ros2_control '{name}' is an actuator with {len(component.all('joint'))} joints; expected 1"
+            yield Diagnostic("URDF325", message, component.all("joint")[1].place, 'use type="system"')
         for parameter in _parameters(component):
             if not parameter.name:
                 yield Diagnostic("URDF325", f"ros2_control '{name}': a <param> has no name", parameter.place, None)
     yield from _commanded_twice(subject)
 
 
-def _within(element: Element, component: str) -> Iterator[Diagnostic]:
-    """What a joint, a sensor or a gpio holds: elements that nobody reads, and interfaces that are there twice."""
+def _children(element: Element, component: str) -> Iterator[Diagnostic]:
+    """Unknown elements and duplicate interfaces of a joint, a sensor or a gpio."""
     if element.tag not in ("joint", "sensor", "gpio"):
         return
     what = f"ros2_control '{component}': {element.tag} '{element.attributes.get('name', '')}'"
     seen: set[tuple[str, str]] = set()
     for child in element.children:
         if child.tag not in PARTS and ":" not in child.tag:
-            message = f"{what} has an element <{child.tag}>, which is ignored"
+            message = f"{what} has the unknown element <{child.tag}>; it is ignored"
             yield Diagnostic("URDF325", message, child.place, did_you_mean(child.tag, PARTS, kind="known"), "warning")
         interface = child.tag, child.name
         if child.tag.endswith("_interface") and interface[1] and interface in seen:
-            yield Diagnostic("URDF325", f"{what} has <{child.tag}> '{interface[1]}' twice", child.place, None)
+            yield Diagnostic("URDF325", f"{what} has duplicate <{child.tag}> '{interface[1]}'", child.place, None)
         seen.add(interface)
 
 
 def _commanded_twice(subject: Subject) -> Iterator[Diagnostic]:
-    """Command interfaces of one joint in two components, and any in one that is a sensor."""
+    """A command interface of one joint in two components, or in a component of type sensor."""
     sensors = {
         component.attributes.get("name", "")
         for component in subject.description.root.all("ros2_control")
@@ -210,12 +210,12 @@ def _commanded_twice(subject: Subject) -> Iterator[Diagnostic]:
             name = interface.name
             what = f"ros2_control '{joint.component}': command interface '{name}' of joint '{joint.name}'"
             if joint.component in sensors:
-                hint = 'a sensor has state interfaces only; type="system" may have both'
-                yield Diagnostic("URDF325", f"{what}, but it is a sensor", interface.place, hint)
+                hint = 'use type="system", or keep only state interfaces'
+                yield Diagnostic("URDF325", f"{what} is not allowed in a sensor", interface.place, hint)
             owner = owners.setdefault((joint.name, name), joint)
             if name and owner.component != joint.component:
-                message = f"{what} belongs to ros2_control '{owner.component}' already"
-                yield Diagnostic("URDF325", message, interface.place, "one hardware commands a joint")
+                message = f"{what} is already in ros2_control '{owner.component}'"
+                yield Diagnostic("URDF325", message, interface.place, "keep it in one component")
 
 
 def _parameters(element: Element) -> Iterator[Element]:

@@ -1,4 +1,4 @@
-"""Numbers and switches of <ros2_control> that are none."""
+"""Checks of numbers and booleans in <ros2_control>."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -12,7 +12,7 @@ from manipcli.description.lint.samples import controlled, one_joint
 from manipcli.description.located_xml import Element
 from manipcli.description.urdf.numbers import finite
 
-SWITCH: Final = ("true", "false", "True", "False")
+BOOLEANS: Final = ("true", "false", "True", "False")
 TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", "uint16", "uint32")
 
 
@@ -28,10 +28,10 @@ TYPES: Final = ("double", "float32", "bool", "int8", "int16", "int32", "uint8", 
     ),
 )
 def _find(subject: Subject) -> Iterator[Diagnostic]:
-    """A number or switch in <ros2_control> cannot be read, or contradicts the limits.
+    """A number or boolean in <ros2_control> is invalid or contradicts the limits.
 
-    ros2_control takes its default instead, without a word; an initial position outside of the limits starts the
-    robot where it cannot be.
+    ros2_control silently uses its default instead. An initial position outside the limits starts the robot in an
+    impossible configuration.
     """
     for component in subject.description.root.all("ros2_control"):
         rate = component.attributes.get("rw_rate", "1").strip()
@@ -40,11 +40,11 @@ def _find(subject: Subject) -> Iterator[Diagnostic]:
                 f"ros2_control '{component.attributes.get('name', '')}': rw_rate is '{rate}'; expected a whole number"
             )
             yield Diagnostic("URDF324", message, component.place, None)
-        yield from _switch(component, "is_async")
+        yield from _boolean(component, "is_async")
     limits = {joint.name: joint.limits for joint in subject.parts.joints}
     for joint in controlled_joints(subject):
-        for each in joint.element.all("limits"):
-            yield from _switch(each, "enable")
+        for element in joint.element.all("limits"):
+            yield from _boolean(element, "enable")
         yield from _legacy(joint.element)
         for interface in (*joint.commands, *joint.element.all("state_interface")):
             yield from _interface(f"joint '{joint.name}'", interface, limits.get(joint.name, JointLimits()))
@@ -53,13 +53,13 @@ def _find(subject: Subject) -> Iterator[Diagnostic]:
 def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[Diagnostic]:
     kind = interface.attributes.get("data_type", "double").strip()
     if kind not in TYPES:
-        message = f"{joint}: an interface is of data_type '{kind}'; known are {', '.join(TYPES)}"
+        message = f"{joint}: unknown data_type '{kind}' of an interface; known: {', '.join(TYPES)}"
         yield Diagnostic("URDF324", message, interface.place, None, "warning")
-    for each in interface.all("limits"):
-        yield from _switch(each, "enable")
+    for element in interface.all("limits"):
+        yield from _boolean(element, "enable")
     size = interface.attributes.get("size", "1").strip()
     if not _whole(size):
-        message = f"{joint}: the size of an interface is '{size}'; expected a whole number"
+        message = f"{joint}: interface size is '{size}'; expected a whole number"
         yield Diagnostic("URDF324", message, interface.place, None)
     values, wrong = _parameters(joint, interface)
     yield from wrong
@@ -71,19 +71,19 @@ def _interface(joint: str, interface: Element, limits: JointLimits) -> Iterator[
     lower, upper = limits.range
     for key, beyond in (("min", values.get("min", lower) > upper), ("max", values.get("max", upper) < lower)):
         if beyond and interface.tag == "command_interface":
-            message = f"{joint}: {key} {values[key]:g} leaves nothing of its limits {lower:g} to {upper:g}"
-            yield Diagnostic("URDF324", message, interface.place, "it narrows those of <limit>, in rad or m")
+            message = f"{joint}: {key} {values[key]:g} is outside its limits {lower:g} to {upper:g}"
+            yield Diagnostic("URDF324", message, interface.place, "choose a value inside <limit>, in rad or m")
     start = values.get("initial_value")
     if start is None:
         return
     if not lower - 1e-9 <= start <= upper + 1e-9:
-        message = f"{joint}: the initial position {start:g} is outside of its limits"
+        message = f"{joint}: initial position {start:g} is outside its limits"
         hint = f"limits: {lower:g} to {upper:g}" if None not in (limits.lower, limits.upper) else None
         yield Diagnostic("URDF324", message, interface.place, hint, "warning")
 
 
 def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[Diagnostic]]:
-    """The numbers that an interface states, and what is wrong with the others."""
+    """The valid numbers of an interface, and findings about the others."""
     values: dict[str, float] = {}
     wrong = []
     for parameter in interface.all("param"):
@@ -94,31 +94,30 @@ def _parameters(joint: str, interface: Element) -> tuple[dict[str, float], list[
         if value is not None:
             values[key] = value
         elif text:
-            message = f"{joint}: '{shorten(text)}' is no finite number for {key}"
+            message = f"{joint}: {key} is '{shorten(text)}'; expected a finite number"
             wrong.append(Diagnostic("URDF324", message, parameter.place, None))
-        elif key != "initial_value":  # an empty one is common, and counts as none
+        elif key != "initial_value":  # an empty initial_value is common and has no effect
             message = f'{joint}: <param name="{key}"> is empty; expected a number'
-            wrong.append(Diagnostic("URDF324", message, parameter.place, "state it, or take it out"))
+            wrong.append(Diagnostic("URDF324", message, parameter.place, "give a value, or delete the <param>"))
     return values, wrong
 
 
-def _switch(element: Element, attribute: str) -> Iterator[Diagnostic]:
-    said = element.attributes.get(attribute, "true").strip()
-    if said not in SWITCH:
-        message = f"<{element.tag}>: {attribute} is '{shorten(said)}'; expected true or false"
+def _boolean(element: Element, attribute: str) -> Iterator[Diagnostic]:
+    text = element.attributes.get(attribute, "true").strip()
+    if text not in BOOLEANS:
+        message = f"<{element.tag}>: {attribute} is '{shorten(text)}'; expected true or false"
         yield Diagnostic("URDF324", message, element.place, None)
 
 
 def _legacy(joint: Element) -> Iterator[Diagnostic]:
-    """<param name="multiplier"> and "offset" of a joint that follows another by <param name="mimic">."""
+    """<param name="multiplier"> and "offset" of a joint with <param name="mimic">."""
     for parameter in joint.all("param"):
-        key, said = parameter.name, parameter.text.strip()
-        if key in ("multiplier", "offset") and finite(said) is None:
-            name = joint.name
-            message = f"joint '{name}': '{shorten(said)}' is no finite number for {key}"
+        key, text = parameter.name, parameter.text.strip()
+        if key in ("multiplier", "offset") and finite(text) is None:
+            message = f"joint '{joint.name}': {key} is '{shorten(text)}'; expected a finite number"
             yield Diagnostic("URDF324", message, parameter.place, None)
 
 
 def _whole(text: str) -> bool:
-    """Of digits alone and above 0, whatever the locale."""
+    """Whether a text is a positive integer in ASCII digits."""
     return text.isascii() and text.isdigit() and int(text) > 0

@@ -1,4 +1,4 @@
-"""What is written where nobody reads it, or reads something else: elements, attributes, text, numbers."""
+"""Checks of elements, attributes, text and numbers that are unknown, misplaced or ignored."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -18,7 +18,7 @@ _COUNTS: Final[dict[str, dict[str, int]]] = {
     "mimic": dict.fromkeys(("multiplier", "offset"), 1),
     "axis": {"xyz": 3},
 }
-_TOLD_ELSEWHERE: Final = frozenset({"gazebo", "ros2_control"})
+_REPORTED_ELSEWHERE: Final = frozenset({"gazebo", "ros2_control"})
 
 
 @check(
@@ -29,14 +29,14 @@ _TOLD_ELSEWHERE: Final = frozenset({"gazebo", "ros2_control"})
     bad=robot('<link name="base"><colision><geometry><box size="1 1 1"/></geometry></colision></link>'),
 )
 def _unknown_element(subject: Subject) -> Iterator[Diagnostic]:
-    """An element is none of URDF.
+    """An element is not part of URDF.
 
-    Programs skip what they do not know: a misspelt <colision> is a link that nothing touches. Elements that are
-    known to speak to another program (gazebo, ros2_control, anything with a prefix) are left alone.
+    Programs skip unknown elements: a misspelt <colision> leaves a link without collisions. Elements of other programs
+    (gazebo, ros2_control, anything with a prefix) are not reported.
     """
     for element, rule in known_elements(subject.description.root):
         if element.tag == "geometry":
-            continue  # what is no shape is told where shapes are read
+            continue  # the reader reports unknown shapes
         for child in element.children:
             if child.tag in RULES or child.tag == "transmission" or is_foreign(child.tag):
                 continue
@@ -49,9 +49,9 @@ def _unknown_element(subject: Subject) -> Iterator[Diagnostic]:
 
 @check("URDF054", "misplaced-element", "schema", "warning", bad=robot('<link name="base"><mass value="1"/></link>'))
 def _misplaced_element(subject: Subject) -> Iterator[Diagnostic]:
-    """An element of URDF stands where it does not belong.
+    """A URDF element is in the wrong parent.
 
-    Programs read it only in its place: an <inertial> below <robot> says nothing to anybody.
+    Programs read it only in its proper place: an <inertial> below <robot> has no effect.
     """
     for element, rule in known_elements(subject.description.root):
         if element.tag == "geometry":
@@ -60,32 +60,32 @@ def _misplaced_element(subject: Subject) -> Iterator[Diagnostic]:
             if child.tag not in RULES or child.tag in rule.children:
                 continue
             message = f"<{child.tag}> does not belong in <{element.tag}>; it is ignored"
-            hint = f"it belongs in {any_of(PARENTS.get(child.tag, ()))}" if child.tag in PARENTS else None
-            # Exporters write a colour for the collision shape; nobody misses it.
+            hint = f"move it into {any_of(PARENTS.get(child.tag, ()))}" if child.tag in PARENTS else None
+            # Exporters write a colour for the collision shape; dropping it is harmless.
             harmless = (element.tag, child.tag) == ("collision", "material")
             yield Diagnostic("URDF054", message, child.place, hint, "note" if harmless else "warning")
 
 
 @check("URDF055", "unknown-attribute", "schema", "warning", bad=bare_joint('<origin xzy="0 0 1"/>'))
 def _unknown_attribute(subject: Subject) -> Iterator[Diagnostic]:
-    """An attribute is none of its element.
+    """An element has an attribute that URDF does not define.
 
-    Programs skip what they do not know: what was meant by it is not there, and a default is.
+    Programs skip unknown attributes and use the default of the intended one.
     """
     for element, rule in known_elements(subject.description.root):
         for name in element.attributes:
             if name in rule.attributes or ":" in name:
                 continue
-            message = f"<{element.tag}> has no attribute '{shorten(name)}' in URDF; it is ignored"
+            message = f"unknown attribute '{shorten(name)}' of <{element.tag}>; it is ignored"
             hint = did_you_mean(name, sorted(rule.attributes), kind="attributes") if len(name) < 40 else None
             yield Diagnostic("URDF055", message, element.place, hint, "warning")
 
 
 @check("URDF056", "repeated-element", "schema", "warning", bad=bare_joint('<origin xyz="0 0 1"/><origin xyz="0 0 2"/>'))
 def _repeated_element(subject: Subject) -> Iterator[Diagnostic]:
-    """An element is there twice where one is read.
+    """An element is repeated where URDF allows one.
 
-    Programs read the first, some the last: the same file then is two robots.
+    Some programs read the first, some the last: the same file then gives different robots.
     """
     for element, rule in known_elements(subject.description.root):
         seen: set[str] = set()
@@ -107,32 +107,32 @@ def _repeated_element(subject: Subject) -> Iterator[Diagnostic]:
     ),
 )
 def _stray_text(subject: Subject) -> Iterator[Diagnostic]:
-    """There is text where URDF has none.
+    """An element contains text, which URDF does not use.
 
-    A value written between tags is read by nobody; a comment without its marks may hide what stood there.
+    A value between tags has no effect; text may also be a comment without its marks.
     """
     for element, _ in known_elements(subject.description.root):
         if element.text:
-            message = f"text in <{element.tag}>, which is ignored: '{shorten(' '.join(element.text[:200].split()))}'"
-            hint = "URDF says everything with attributes; a remark is written <!-- like this -->"
+            message = f"text in <{element.tag}> is ignored: '{shorten(' '.join(element.text[:200].split()))}'"
+            hint = "write values as attributes, and comments as <!-- comment -->"
             yield Diagnostic("URDF057", message, element.text_place or element.place, hint, "warning")
 
 
 @check("URDF067", "unread-number", "schema", "warning", bad=bare_joint('<calibration rising="soon"/>'))
 def _unread_number(subject: Subject) -> Iterator[Diagnostic]:
-    """A number that only other programs read is none.
+    """A number that only other programs read is invalid.
 
-    Safety controllers, calibrations and the axis of a fixed joint mean nothing to a simulation, but other programs
-    refuse the joint, or the file, for a bad number in them.
+    manipcli does not use calibrations or the axis of a fixed joint, but other programs reject the joint or the file
+    for an invalid number in them.
     """
-    told = {(finding.message, finding.place) for finding in subject.parts.findings}
+    reported = {(finding.message, finding.place) for finding in subject.parts.findings}
     for joint in subject.description.root.all("joint"):
         reader = Reader()
         for element in joint.children:
             _read(reader, element)
         for finding in reader.findings:
-            if (finding.message, finding.place) not in told:
-                message = f"{finding.message} (manipcli does not read it here)"
+            if (finding.message, finding.place) not in reported:
+                message = f"{finding.message} (manipcli does not use this number)"
                 yield Diagnostic("URDF067", message, finding.place, severity="warning")
 
 
@@ -151,39 +151,39 @@ def _read(reader: Reader, element: Element) -> None:
 def _foreign_tags(subject: Subject) -> Iterator[Diagnostic]:
     """Elements for another program are ignored.
 
-    Settings for MuJoCo, Drake and others ride along in many descriptions. What they change there (contact,
-    actuators, loops) is not changed here.
+    Many descriptions contain settings for MuJoCo, Drake and others. What they change there (contact, actuators,
+    loops) has no effect in manipcli.
     """
-    # One finding for each tag: the first of them, and how many there are.
+    # One finding per tag, at the first element, with the count.
     found: dict[str, list[Element]] = {}
     for element, _ in known_elements(subject.description.root):
         for child in element.children:
-            if is_foreign(child.tag) and child.tag not in _TOLD_ELSEWHERE:
+            if is_foreign(child.tag) and child.tag not in _REPORTED_ELSEWHERE:
                 found.setdefault(child.tag, []).append(child)
     for tag, elements in found.items():
         many = f"{len(elements)} <{shorten(tag)}> elements are" if len(elements) > 1 else f"<{shorten(tag)}> is"
-        yield Diagnostic("URDF069", f"{many} for another program, and ignored", elements[0].place, severity="note")
+        message = f"{many} for another program and {'are' if len(elements) > 1 else 'is'} ignored"
+        yield Diagnostic("URDF069", message, elements[0].place, severity="note")
 
 
 @check("URDF330", "gazebo-tags", "readiness", "note", bad=one_joint(more='<gazebo reference="tip"/>'))
 def _gazebo_tags(subject: Subject) -> Iterator[Diagnostic]:
     """<gazebo> elements are ignored.
 
-    What they say (friction, colours, sensors, plugins) is for Gazebo alone; the robot file says what manipcli
-    needs.
+    Their settings (friction, colours, sensors, plugins) apply to Gazebo only; manipcli reads the robot file.
     """
-    # One finding for all of them, and one for each that refers to nothing.
+    # One finding for all of them, and one for each with an unknown reference.
     tags = subject.description.root.all("gazebo")
     if tags:
         many = f"{len(tags)} <gazebo> elements are" if len(tags) > 1 else "a <gazebo> element is"
         yield Diagnostic(
-            "URDF330", f"{many} ignored", tags[0].place, "friction: see `friction` of the robot file", "note"
+            "URDF330", f"{many} ignored", tags[0].place, "set friction with `friction` in the robot file", "note"
         )
     root = subject.description.root
-    known = [each.name for tag in ("link", "joint") for each in root.all(tag)]
+    known = [element.name for tag in ("link", "joint") for element in root.all(tag)]
     for tag in tags:
         name = tag.attributes.get("reference", "").strip()
         if name and name not in known:
-            message = f"<gazebo> refers to '{shorten(name)}', which is no link and no joint"
+            message = f"<gazebo> refers to '{shorten(name)}', which is neither a link nor a joint"
             near = did_you_mean(name, known) if len(known) < 1000 else None
             yield Diagnostic("URDF330", message, tag.place, near, "note")

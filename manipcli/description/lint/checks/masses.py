@@ -1,4 +1,4 @@
-"""Masses and moments of inertia that no part of a robot has, or that are missing."""
+"""Checks of masses, centres of mass and moments of inertia: missing or implausible."""
 
 from collections.abc import Iterator
 from math import hypot, sqrt
@@ -15,37 +15,37 @@ from manipcli.description.located_xml import Element
 from manipcli.description.urdf.numbers import finite
 
 FARTHEST: Final = 2.0
-"""How many times the distance of the farthest point of the shape the largest radius of gyration may be."""
+"""Largest ratio of the radius of gyration to the distance of the shape's farthest point."""
 NEAREST: Final = 30.0
-"""How many times smaller than that distance it may be."""
+"""Largest ratio of that distance to the radius of gyration."""
 OUTSIDE: Final = 0.5
-"""Of the diagonal of the box about the shapes: how far outside of that box it may lie."""
+"""Distance of the centre of mass outside the box about the shapes, as a share of the box's diagonal."""
 LEAST_OUTSIDE: Final = 0.01
-"""[m]: nor is less than this far, for links that are small."""
+"""[m]: smaller distances are accepted, for small links."""
 HEAVIEST: Final = 10_000.0
 """[kg]"""
 DENSEST: Final = 30_000.0
-"""[kg/m3]: osmium, the densest there is, has 22590; shapes may be somewhat smaller than what they stand for."""
+"""[kg/m3]: osmium has 22590; collision shapes may be somewhat smaller than the part."""
 
 
 @check("URDF100", "massless-joint", "physics", "warning", bad=one_joint(tip=CUBE))
 def _massless_joint(subject: Subject) -> Iterator[Diagnostic]:
     """A joint moves a link that has no mass.
 
-    PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques mean nothing; here an engine
-    with physics refuses such a joint.
+    PyBullet gives a link without an inertial a mass of 1 kg, so gravity and torques are wrong; in manipcli an engine
+    with physics rejects such a joint.
     """
     links = elements_by_name(subject.description.root, "link")
     massive = {name for name, link in links.items() if _states_mass(link)}
     for joint, body in moved_bodies(subject.parts):
-        if joint.child in links and not massive.intersection(body):  # of a link that is not there enough is said
-            message = f"link '{joint.child}', which joint '{joint.name}' moves, has no mass"
-            hint = "state the mass and moments of inertia of the link"
+        if joint.child in links and not massive.intersection(body):  # the reader reports missing links
+            message = f"link '{joint.child}' has no mass and is moved by joint '{joint.name}'"
+            hint = "add the mass and moments of inertia of the link"
             yield Diagnostic("URDF100", message, links[joint.child].place, hint, "warning")
 
 
 def _states_mass(link: Element) -> bool:
-    """Also a mass that is refused for another reason, which reading tells."""
+    """Whether a link states a mass, valid or not; the reader reports invalid ones."""
     inertial, mass = link.first("inertial"), link.first("inertial", "mass")
     return inertial is not None and (mass is None or finite(mass.attributes.get("value", "").strip()) != 0.0)
 
@@ -54,31 +54,31 @@ def _states_mass(link: Element) -> bool:
     "URDF101", "inertia-size", "physics", "warning", bad=one_joint(tip=INERTIAL.replace("0.02", "0.00000002") + CUBE)
 )
 def _inertia_size(subject: Subject) -> Iterator[Diagnostic]:
-    """The moments of inertia do not fit the size of the link.
+    """The moments of inertia do not match the size of the link.
 
-    A unit that was mixed up (g mm2 for kg m2, or a density) looks plausible as a number; the arm then shakes or
-    crawls.
+    A wrong unit (g mm2 for kg m2, or a density) looks plausible as a number; the arm then oscillates or barely moves.
     """
-    # sqrt(I / m) is how far from the centre of mass the mass lies on average: never farther than all of the shape. A
-    # solid ball has 0.63 of its radius, a solid cube 0.47 of the distance of its corners.
+    # The radius of gyration sqrt(I / m) is at most the distance of the farthest point: 0.63 of the radius for a solid
+    # ball, 0.47 of the distance of the corners for a solid cube.
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         box = extent(link, links[link.name])
         if link.inertial is None or box is None or not link.inertial.inertia.any():
             continue
         low, high = box
-        centre = np.clip(link.inertial.X_LI.p, low, high)  # one far outside is told as URDF102
+        centre = np.clip(link.inertial.X_LI.p, low, high)  # URDF102 reports one far outside
         reach = hypot(*np.maximum(centre - low, high - centre))
         gyration = sqrt(float(np.linalg.eigvalsh(link.inertial.inertia)[2]) / link.inertial.mass)
         if reach / NEAREST <= gyration <= reach * FARTHEST:
             continue
-        times = gyration / reach if gyration > reach else reach / gyration
+        large = gyration > reach
+        times = gyration / reach if large else reach / gyration
         message = (
-            f"link '{link.name}': its inertia puts the mass {gyration:.2g} m from its centre, {times:.3g} times "
-            f"{'farther' if gyration > reach else 'nearer'} than its shape reaches ({reach:.2g} m)"
+            f"link '{link.name}': radius of gyration {gyration:.2g} m is {times:.3g} times "
+            f"{'larger' if large else 'smaller'} than the extent of its shape ({reach:.2g} m)"
         )
         element = links[link.name].first("inertial") or links[link.name]
-        hint = "compute it from the shape and the mass of the link, in kg m2"
+        hint = "compute <inertia> from the shape and the mass of the link, in kg m2"
         yield Diagnostic("URDF101", message, (element.first("inertia") or element).place, hint, "warning")
 
 
@@ -90,9 +90,9 @@ def _inertia_size(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint(tip=INERTIAL.replace("<mass", '<origin xyz="0 0 2"/><mass') + CUBE),
 )
 def _centre_of_mass(subject: Subject) -> Iterator[Diagnostic]:
-    """The centre of mass lies far outside of the shape of the link.
+    """The centre of mass is far outside the shape of the link.
 
-    Gravity then turns the joint with an arm that is not there; mostly a unit, a sign, or another frame.
+    Gravity then acts on the joint with a wrong lever arm. The usual cause is a wrong unit, sign or frame.
     """
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
@@ -105,12 +105,12 @@ def _centre_of_mass(subject: Subject) -> Iterator[Diagnostic]:
         if outside <= max(LEAST_OUTSIDE, OUTSIDE * across):
             continue
         message = (
-            f"link '{link.name}': the centre of mass lies {outside:.2g} m outside of its shape, "
+            f"link '{link.name}': the centre of mass is {outside:.2g} m outside its shape, "
             f"which is {across:.2g} m across"
         )
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("origin") or element).place
-        yield Diagnostic("URDF102", message, place, "check the <origin> of <inertial>: its unit, its frame", "warning")
+        yield Diagnostic("URDF102", message, place, "check unit and frame of the <origin> of <inertial>", "warning")
 
 
 @check(
@@ -123,7 +123,7 @@ def _centre_of_mass(subject: Subject) -> Iterator[Diagnostic]:
 def _inertia_without_mass(subject: Subject) -> Iterator[Diagnostic]:
     """A link has moments of inertia and mass 0.
 
-    No body is like that; the inertia is left out, and the joint that moves the link may move nothing at all.
+    This is physically impossible. The inertia is ignored, and the joint that moves the link may move no mass at all.
     """
     for link in subject.description.root.all("link"):
         mass, inertia = link.first("inertial", "mass"), link.first("inertial", "inertia")
@@ -131,7 +131,7 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Diagnostic]:
             continue
         if any(finite(inertia.attributes.get(key, "0").strip()) for key in ("ixx", "iyy", "izz")):
             message = f"link '{link.attributes.get('name', '')}' has moments of inertia and mass 0"
-            yield Diagnostic("URDF108", message, inertia.place, "state its mass, or leave the inertial out", "warning")
+            yield Diagnostic("URDF108", message, inertia.place, "set its mass, or delete the <inertial>", "warning")
 
 
 @check(
@@ -142,16 +142,16 @@ def _inertia_without_mass(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint().replace('<link name="base"/>', f'<link name="base">{INERTIAL}</link>'),
 )
 def _root_inertia(subject: Subject) -> Iterator[Diagnostic]:
-    """The root link has an inertial, which is ignored.
+    """The inertial of the root link is ignored.
 
-    The robot stands on its root link, so that its mass moves nothing; KDL warns of it. On a mobile base it would
-    matter.
+    The root link is fixed to the world, so its mass has no effect; KDL warns about it. It would matter for a mobile
+    base.
     """
     root = elements_by_name(subject.description.root, "link").get(subject.parts.root)
     inertial = root.first("inertial") if root is not None else None
     if inertial is not None and subject.parts.joints:
-        message = f"the inertial of root link '{subject.parts.root}' is ignored: the robot stands on it"
-        yield Diagnostic("URDF110", message, inertial.place, "put an empty root link before it for KDL", "note")
+        message = f"the inertial of root link '{subject.parts.root}' is ignored: the link is fixed to the world"
+        yield Diagnostic("URDF110", message, inertial.place, "for KDL, add an empty root link above it", "note")
 
 
 @check(
@@ -162,28 +162,27 @@ def _root_inertia(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint().replace('<link name="base"/>', f'<link name="base">{CUBE}</link>'),
 )
 def _no_inertial(subject: Subject) -> Iterator[Diagnostic]:
-    """A link that has a shape has no inertial; it counts as having no mass.
+    """A link with a shape has no inertial; its mass is 0.
 
-    Fine for a base that stands still; fixed to a moving link it makes the arm lighter than it is. PyBullet would
-    give it 1 kg.
+    This is fine for a fixed base; a link fixed to a moving link makes the arm too light. PyBullet would use 1 kg.
     """
-    # But for links that a joint moves by themselves: URDF100 tells those.
+    # URDF100 reports the child links of moving joints.
     moved = {joint.child for joint, _ in moved_bodies(subject.parts)}
     for name, link in elements_by_name(subject.description.root, "link").items():
         shaped = link.first("visual") is not None or link.first("collision") is not None
         if shaped and link.first("inertial") is None and name not in moved:
-            message = f"link '{name}' has no inertial: it counts as having no mass"
+            message = f"link '{name}' has no inertial: its mass is 0"
             yield Diagnostic("URDF111", message, link.place, None, "note")
 
 
 @check("URDF112", "heavy-link", "physics", "warning", bad=one_joint(tip=INERTIAL.replace('value="1"', 'value="20000"')))
 def _heavy_link(subject: Subject) -> Iterator[Diagnostic]:
-    """A link is heavier than anything of its size can be, or than 10 t.
+    """A link is too heavy for its size, or heavier than 10 t.
 
-    A mass in grams or a mesh in millimetres taken for metres gives it; no motor moves such a link, and beside light
-    ones it makes the simulation stiff or unstable.
+    The usual cause is a mass in grams, or a mesh in the wrong unit. No motor moves such a link, and next to light
+    links it makes the simulation stiff or unstable.
     """
-    # The box about all shapes is larger than they are, so that the density is at least what is told.
+    # The box about all shapes is larger than the shapes, so the density is at least the reported one.
     links = elements_by_name(subject.description.root, "link")
     for link in subject.parts.links:
         if link.inertial is None:
@@ -192,7 +191,7 @@ def _heavy_link(subject: Subject) -> Iterator[Diagnostic]:
         box = extent(link, links[link.name])
         volume = float(np.prod(box[1] - box[0])) if box is not None else 0.0
         if volume > 0.0 and mass > DENSEST * volume:
-            why = f"at least {digits(mass / volume)} kg/m3 in the box about its shapes; steel has 7850"
+            why = f"a density of at least {digits(mass / volume)} kg/m3 in the box about its shapes; steel has 7850"
         elif mass > HEAVIEST:
             why = f"more than {HEAVIEST:g} kg"
         else:
@@ -200,4 +199,4 @@ def _heavy_link(subject: Subject) -> Iterator[Diagnostic]:
         element = links[link.name].first("inertial") or links[link.name]
         place = (element.first("mass") or element).place
         message = f"link '{link.name}' has mass {digits(mass)} kg: {why}"
-        yield Diagnostic("URDF112", message, place, "URDF counts in kg and m", "warning")
+        yield Diagnostic("URDF112", message, place, "use kg and m", "warning")

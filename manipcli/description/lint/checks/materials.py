@@ -1,4 +1,4 @@
-"""Materials and their colours."""
+"""Checks of materials and their colours."""
 
 from collections.abc import Iterator
 
@@ -21,21 +21,21 @@ from manipcli.description.urdf.schema_table import known_elements
     ),
 )
 def _undefined_material(subject: Subject) -> Iterator[Diagnostic]:
-    """A material is used and nowhere defined, or has no name.
+    """A material is used but not defined, or has no name.
 
-    The shape gets a colour that the program likes; some parsers refuse the file.
+    The shape gets a default colour that depends on the program; some parsers reject the file.
     """
     materials = [element for element, _ in known_elements(subject.description.root) if element.tag == "material"]
-    defined = {each.attributes.get("name", "") for each in materials if each.children}
+    defined = {material.attributes.get("name", "") for material in materials if material.children}
     for material in materials:
         name = material.attributes.get("name", "")
-        if material.children and "name" not in material.attributes:  # an empty one is common, and read
+        if material.children and "name" not in material.attributes:  # an empty name is common and accepted
             yield Diagnostic("URDF063", "a material has no name", material.place, 'name="..."', "warning")
         if material.children or name in defined:
             continue
-        what = f"material '{name}' has no colour anywhere" if name else "a material has neither a name nor a colour"
+        what = f"material '{name}' is not defined" if name else "a material has neither a name nor a colour"
         near = did_you_mean(name, sorted(defined), kind="materials") if len(defined) < 100 else None
-        yield Diagnostic("URDF063", what, material.place, near or "give it a <color rgba=.../>", "warning")
+        yield Diagnostic("URDF063", what, material.place, near or 'add <color rgba="..."/>', "warning")
 
 
 @check(
@@ -49,9 +49,9 @@ def _undefined_material(subject: Subject) -> Iterator[Diagnostic]:
     ),
 )
 def _colour_range(subject: Subject) -> Iterator[Diagnostic]:
-    """A colour is not within 0 and 1.
+    """A colour value is outside 0 to 1.
 
-    Colours are shares of 1, not of 255: what is larger is drawn white, or as nothing.
+    Colour values range from 0 to 1, not to 255: larger values are drawn white or not at all.
     """
     for element, _ in known_elements(subject.description.root):
         if element.tag != "color":
@@ -59,7 +59,7 @@ def _colour_range(subject: Subject) -> Iterator[Diagnostic]:
         text = element.attributes.get("rgba", "")
         values = [finite(word) for word in text.split()[:4]]
         if any(value is not None and not 0.0 <= value <= 1.0 for value in values):
-            message = f'<color rgba="{shorten(text)}">: expected red, green, blue and opacity from 0 to 1'
+            message = f'<color rgba="{shorten(text)}">: values outside 0 to 1'
             hint = "divide by 255" if any(value is not None and value > 1.0 for value in values) else None
             yield Diagnostic("URDF064", message, element.place, hint, "warning")
 
@@ -77,7 +77,7 @@ def _colour_range(subject: Subject) -> Iterator[Diagnostic]:
 def _redefined_material(subject: Subject) -> Iterator[Diagnostic]:
     """A material is defined twice, with different colours.
 
-    Programs keep one of the two for all shapes; PyBullet the first.
+    Programs use one of the two for all shapes; PyBullet uses the first.
     """
     first: dict[str, Element] = {}
     for element, _ in known_elements(subject.description.root):
@@ -86,8 +86,8 @@ def _redefined_material(subject: Subject) -> Iterator[Diagnostic]:
             continue
         other = first.setdefault(name, element)
         if _colour(other) != _colour(element):
-            message = f"material '{name}' has another colour than at {other.place}"
-            yield Diagnostic("URDF066", message, element.place, "give each colour a name of its own", "warning")
+            message = f"material '{name}' is defined with a different colour at {other.place}"
+            yield Diagnostic("URDF066", message, element.place, "use one name per colour", "warning")
 
 
 def _colour(material: Element) -> tuple[float | None, ...] | None:

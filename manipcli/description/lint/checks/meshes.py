@@ -1,4 +1,4 @@
-"""Mesh files that are not what they seem, or that other programs read in another way."""
+"""Checks of mesh files: missing, mislabelled, oversized, or read differently by other programs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from manipcli.shapes.mesh_formats import UnusableMesh, binary_stl
 
 LARGEST: Final = 10.0
 SMALLEST: Final = 0.001
-"""[m]: the longest edge of the box about a mesh lies between these."""
+"""[m]: bounds of the longest edge of a mesh's bounding box."""
 MANY_TRIANGLES: Final = 200_000
 
 
 @dataclass(frozen=True, slots=True)
 class _NamedMesh:
-    """A <mesh> of a description: `path` is None where its file is not found."""
+    """A <mesh> of a description: `path` is None if its file is not found."""
 
     role: Literal["visual", "collision"]
     element: Element
@@ -35,7 +35,7 @@ class _NamedMesh:
 
     @property
     def facts(self) -> MeshFacts | None:
-        """None where the file is not found or cannot be used."""
+        """None if the file is not found or unusable."""
         if self.path is None:
             return None
         try:
@@ -62,7 +62,7 @@ def _named_meshes(subject: Subject) -> Iterator[_NamedMesh]:
 
 
 def _scale(element: Element) -> tuple[float, float, float]:
-    """As written; 1 where that is not three numbers, which reading tells."""
+    """The scale as written; 1 for invalid numbers, which the reader reports."""
     values = [finite(word) for word in element.attributes.get("scale", "").split()[:4]]
     x, y, z = values if len(values) == 3 else (1.0, 1.0, 1.0)
     return (1.0 if x is None else x, 1.0 if y is None else y, 1.0 if z is None else z)
@@ -72,7 +72,7 @@ def _scale(element: Element) -> tuple[float, float, float]:
 def _missing_visual(subject: Subject) -> Iterator[Diagnostic]:
     """A visual mesh or a texture is not found.
 
-    The link is not drawn; PyBullet refuses the whole robot for it, so engines are given none.
+    The link is not drawn. PyBullet rejects the whole robot for it, so manipcli passes no visuals to an engine.
     """
     yield from found_while_reading("URDF033")(subject)
     for element, _ in known_elements(subject.description.root):
@@ -93,9 +93,9 @@ def _missing_visual(subject: Subject) -> Iterator[Diagnostic]:
     files=lambda: {"a.obj": binary_stl(TETRAHEDRON)},
 )
 def _mesh_suffix(subject: Subject) -> Iterator[Diagnostic]:
-    """The name of a mesh file says another format than the file has.
+    """The suffix of a mesh file does not match its format.
 
-    Most programs go by the name and fail, or draw nothing; here the content decides.
+    Most programs choose the format by the suffix and fail or draw nothing; manipcli detects it from the content.
     """
     for mesh in _named_meshes(subject):
         facts = mesh.facts
@@ -104,23 +104,24 @@ def _mesh_suffix(subject: Subject) -> Iterator[Diagnostic]:
         suffix, kind = mesh.path.suffix, facts.format.partition("-")[0]
         if SUFFIXES.get(suffix.lower()) != kind:
             message = (
-                f"mesh '{mesh.uri}' ends in '{suffix}' and holds {kind.upper() if kind != 'collada' else 'Collada'}"
+                f"mesh '{mesh.uri}' has suffix '{suffix}' but contains "
+                f"{kind.upper() if kind != 'collada' else 'Collada'}"
             )
             ending = next(ending for ending, known in SUFFIXES.items() if known == kind)
-            yield Diagnostic("URDF203", message, mesh.element.place, f"name it *{ending}", "warning")
+            yield Diagnostic("URDF203", message, mesh.element.place, f"rename it to *{ending}", "warning")
 
 
 @check("URDF204", "absolute-mesh", "assets", "warning", bad=one_link('filename="file:///home/somebody/robot/base.stl"'))
 def _absolute_mesh(subject: Subject) -> Iterator[Diagnostic]:
     """A mesh is named by an absolute path.
 
-    The description works on the machine it was written on and on no other.
+    The description works only on the machine it was written on.
     """
     for mesh in _named_meshes(subject):
         uri = mesh.uri
         windows = bool(PureWindowsPath(uri).drive)
         if uri.startswith("file:") or PurePosixPath(uri).is_absolute() or windows:
-            message = f"mesh '{uri}' is named by an absolute path, which no other machine has"
+            message = f"mesh '{uri}' has an absolute path, which works only on this machine"
             yield Diagnostic(
                 "URDF204", message, mesh.element.place, "use package://NAME/path or a relative path", "warning"
             )
@@ -135,9 +136,9 @@ def _absolute_mesh(subject: Subject) -> Iterator[Diagnostic]:
     files=lambda: {"a.stl": binary_stl(TETRAHEDRON * 300.0)},
 )
 def _mesh_unit(subject: Subject) -> Iterator[Diagnostic]:
-    """A mesh is longer than 10 m or shorter than 1 mm: another unit?
+    """A mesh is longer than 10 m or shorter than 1 mm: wrong unit?
 
-    STL and OBJ state no unit and URDF counts in metres; an arm of 300 m is one drawn in millimetres.
+    STL and OBJ files have no unit and URDF uses metres; an arm of 300 m is one modelled in millimetres.
     """
     for mesh in _named_meshes(subject):
         facts = mesh.facts
@@ -149,7 +150,7 @@ def _mesh_unit(subject: Subject) -> Iterator[Diagnostic]:
             continue
         large = size > LARGEST
         message = f"mesh '{mesh.uri}' is {size:.3g} m long: " + ("is it in millimetres?" if large else "scaled twice?")
-        hint = 'scale="0.001 0.001 0.001"' if large else "leave the scale out"
+        hint = 'scale="0.001 0.001 0.001"' if large else "delete the scale"
         yield Diagnostic("URDF206", message, mesh.element.place, hint, "warning")
 
 
@@ -164,12 +165,13 @@ def _mesh_unit(subject: Subject) -> Iterator[Diagnostic]:
 def _mesh_triangles(subject: Subject) -> Iterator[Diagnostic]:
     """A collision mesh has more than 200 000 triangles.
 
-    Every load reads it all (seconds for a million), for a hull that needs a hundred. 2 000 000 are refused.
+    Loading takes seconds per million triangles, and the convex hull needs about a hundred. Meshes with more than
+    2 000 000 are rejected.
     """
     for mesh in _named_meshes(subject):
         facts = mesh.facts
         if mesh.role == "collision" and facts is not None and facts.triangles > MANY_TRIANGLES:
-            message = f"collision mesh '{mesh.uri}' has {facts.triangles} triangles; {MANY_TRIANGLES} are many"
+            message = f"collision mesh '{mesh.uri}' has {facts.triangles} triangles, more than {MANY_TRIANGLES}"
             yield Diagnostic(
                 "URDF207", message, mesh.element.place, "use a simplified mesh, or a box or cylinder", "warning"
             )
@@ -184,14 +186,14 @@ def _mesh_triangles(subject: Subject) -> Iterator[Diagnostic]:
     files=lambda: {"a.stl": ascii_tetrahedron()},
 )
 def _ascii_stl(subject: Subject) -> Iterator[Diagnostic]:
-    """An STL file is written as text.
+    """An STL file is ASCII.
 
-    PyBullet, among others, takes it for empty without a word; engines get a binary one here.
+    Some programs, PyBullet among them, silently read it as empty; manipcli converts it to binary for its engines.
     """
     for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.format == "stl-ascii":
-            message = f"mesh '{mesh.uri}' is an STL file of text, which some programs cannot read; here it is converted"
+            message = f"mesh '{mesh.uri}' is an ASCII STL file, which some programs cannot read; manipcli converts it"
             yield Diagnostic("URDF208", message, mesh.element.place, "save it as binary STL", "note")
 
 
@@ -206,7 +208,7 @@ def _ascii_stl(subject: Subject) -> Iterator[Diagnostic]:
 def _mirrored_mesh(subject: Subject) -> Iterator[Diagnostic]:
     """A mesh is mirrored by a negative scale.
 
-    Legal and common for left and right parts; some programs draw such a mesh inside out.
+    This is valid and common for left and right parts, but some programs draw such a mesh inside out.
     """
     for mesh in _named_meshes(subject):
         if min(mesh.scale) < 0.0:
@@ -224,17 +226,17 @@ def _mirrored_mesh(subject: Subject) -> Iterator[Diagnostic]:
     files=lambda: {"a.dae": collada_tetrahedron(up_axis="Y_UP")},
 )
 def _collada_up_axis(subject: Subject) -> Iterator[Diagnostic]:
-    """A Collada file states an up axis other than z, or none.
+    """A Collada file has an up axis other than z, or none.
 
-    RViz, MoveIt and Pinocchio take the numbers of the file as they are, and so does manipcli; PyBullet and three.js
-    turn the mesh. Only a file with z up looks the same everywhere.
+    RViz, MoveIt, Pinocchio and manipcli ignore the up axis; PyBullet and three.js rotate the mesh. Only a file with z
+    up looks the same in all programs.
     """
     for mesh in _named_meshes(subject):
         facts = mesh.facts
         if facts is not None and facts.up_axis != "Z_UP":
-            said = f"the up axis {facts.up_axis}" if facts.up_axis else "no up axis, which stands for Y_UP"
-            message = f"mesh '{mesh.uri}' states {said}; it changes nothing here, as in RViz"
-            yield Diagnostic("URDF211", message, mesh.element.place, "export it with z up: programs differ", "note")
+            stated = f"up axis {facts.up_axis}" if facts.up_axis else "no up axis, which means Y_UP"
+            message = f"mesh '{mesh.uri}' has {stated}; it is ignored, as in RViz"
+            yield Diagnostic("URDF211", message, mesh.element.place, "export it with z up", "note")
 
 
 @check(
@@ -246,9 +248,9 @@ def _collada_up_axis(subject: Subject) -> Iterator[Diagnostic]:
     files=lambda: {"text.stl": b"<!DOCTYPE html><html>404 not found</html>"},
 )
 def _unusable_visual(subject: Subject) -> Iterator[Diagnostic]:
-    """A visual mesh is damaged, empty, too large, or of a format that is not read.
+    """A visual mesh is damaged, empty, too large, or in an unsupported format.
 
-    The link is not drawn. An engine that reads it may crash, so it is given none.
+    The link is not drawn. An engine may crash on it, so manipcli does not pass it on.
     """
     for mesh in _named_meshes(subject):
         if mesh.role == "collision" or mesh.path is None:

@@ -1,4 +1,4 @@
-"""Names that programs trip over."""
+"""Checks of names that other programs reject or confuse."""
 
 import re
 from collections.abc import Iterator
@@ -16,17 +16,17 @@ ALLOWED: Final = re.compile(r"[A-Za-z0-9_.\-]+")
 
 @check("URDF050", "robot-name", "schema", "warning", bad='<robot><link name="base"/></robot>')
 def _robot_name(subject: Subject) -> Iterator[Diagnostic]:
-    """<robot> has no name, or a version that URDF does not have.
+    """<robot> has no name, or an unknown version of URDF.
 
-    The specification asks for a name, and most parsers refuse a description without one (PyBullet and Drake do);
-    manipcli takes the name of the file. urdfdom refuses a version that it does not know.
+    The specification requires a name, and most parsers (PyBullet, Drake) reject a description without one; manipcli
+    uses the name of the file. urdfdom rejects an unknown version.
     """
     yield from found_while_reading("URDF050")(subject)
     root = subject.description.root
     version = root.attributes.get("version", "1.0").strip()
     if version not in VERSIONS:
-        message = f"<robot> is of version '{shorten(version)}'; URDF has {', '.join(VERSIONS)}"
-        yield Diagnostic("URDF050", message, root.place, "leave it out", "warning")
+        message = f"<robot> has the unknown version '{shorten(version)}'; known: {', '.join(VERSIONS)}"
+        yield Diagnostic("URDF050", message, root.place, "delete the attribute", "warning")
 
 
 @check(
@@ -42,7 +42,7 @@ def _robot_name(subject: Subject) -> Iterator[Diagnostic]:
 def _shared_name(subject: Subject) -> Iterator[Diagnostic]:
     """Two visuals or two collisions of a link have the same name.
 
-    Programs that find shapes by name (Drake, MoveIt) rename or lose the second.
+    Programs that look up shapes by name (Drake, MoveIt) rename or drop the second.
     """
     for link in subject.description.root.all("link"):
         for tag in ("visual", "collision"):
@@ -50,21 +50,21 @@ def _shared_name(subject: Subject) -> Iterator[Diagnostic]:
             for element in link.all(tag):
                 name = element.name
                 if name and name in seen:
-                    message = f"two <{tag}> of link '{link.attributes.get('name', '')}' are named '{name}'"
+                    message = f"link '{link.attributes.get('name', '')}' has two <{tag}> named '{name}'"
                     yield Diagnostic("URDF068", message, element.place, severity="note")
                 seen.add(name)
 
 
 @check("URDF331", "ros-names", "readiness", "warning", bad=one_joint().replace('"tip"', '"the tip"'))
 def _ros_names(subject: Subject) -> Iterator[Diagnostic]:
-    """The name of a link or joint has characters that ROS 2 refuses in names.
+    """The name of a link or joint has characters that ROS 2 rejects.
 
-    Joints become parameters and interfaces there, links become frames: letters, digits and _ work, a space or /
-    does not.
+    Joints become parameters and interfaces, links become frames: use letters, digits and _; a space or / fails.
     """
-    # `-` and `.` are common in descriptions and do no harm.
+    # `-` and `.` are common in descriptions and harmless.
     for tag in ("link", "joint"):
         for name, element in elements_by_name(subject.description.root, tag).items():
             if name and not ALLOWED.fullmatch(name):
                 hint = f"'{re.sub(r'[^A-Za-z0-9_]+', '_', name).strip('_') or tag}'"
-                yield Diagnostic("URDF331", f"ROS 2 refuses the name of {tag} '{name}'", element.place, hint, "warning")
+                message = f"ROS 2 rejects the name of {tag} '{name}'"
+                yield Diagnostic("URDF331", message, element.place, f"rename it to {hint}", "warning")

@@ -1,4 +1,4 @@
-"""What is found while collision meshes are read."""
+"""Checks whose findings come from reading collision meshes."""
 
 from functools import partial
 
@@ -14,39 +14,39 @@ READING_MESHES: tuple[Check, ...] = (
         "URDF013",
         "missing-mesh",
         "A collision mesh is not found",
-        "A link without its collision shape passes through what it should hit. Many descriptions are published "
-        f"without their meshes: {WITHOUT_IT}. A missing visual is a warning, URDF033.",
+        "A link without its collision shape passes through obstacles. Many descriptions are published without their "
+        f"meshes: {WITHOUT_IT}. A missing visual is a warning (URDF033).",
         one_link('filename="package://missing_package/a.stl"', role="collision"),
     ),
     assets_check(
         "URDF200",
         "unusable-mesh",
-        "A collision mesh is damaged, empty, too large, or of a format that is not read",
-        "An engine answers with a crash (an index out of range), with a shape somewhere else (a negative one), or "
-        "with none at all, so that an arm passes through what it should hit.",
+        "A collision mesh is damaged, empty, too large, or in an unsupported format",
+        "An engine crashes (index out of range), misplaces the shape (negative index), or drops it, so that the arm "
+        "passes through obstacles.",
         one_link('filename="cut.stl"', role="collision"),
         files=lambda: {"cut.stl": b"cut off".ljust(80) + (12).to_bytes(4, "little") + bytes(50 * 11)},
     ),
     assets_check(
         "URDF201",
         "remote-mesh",
-        "A mesh is named by http, ftp, data: or another address that is not read",
-        "A description is data: nothing is fetched for it, and what it means may not change with a server.",
+        "A mesh is named by http, ftp, data: or another unsupported URI scheme",
+        "manipcli downloads nothing: a description must not depend on a server.",
         one_link('filename="https://example.org/a.stl"'),
     ),
     assets_check(
         "URDF202",
         "outside-mesh",
-        "A mesh lies outside of the description's folder and packages",
-        "A description from somewhere else could name any file of this machine; links are followed before that is "
-        "judged. `--allow-outside` permits it.",
+        "A mesh is outside the description's folder and packages",
+        "A description from an untrusted source could name any file of this machine. Symbolic links are resolved "
+        "first. `--allow-outside` permits it.",
         one_link('filename="/etc/passwd"'),
     ),
     assets_check(
         "URDF210",
         "flat-mesh",
         "A collision mesh is flat",
-        "A collision shape is the hull of its points; a hull without a volume catches nothing.",
+        "A collision shape is the convex hull of its vertices; a hull without volume cannot collide.",
         one_link('filename="a.stl"', role="collision"),
         files=lambda: {"a.stl": binary_stl(TETRAHEDRON * (1.0, 1.0, 0.0))},
     ),

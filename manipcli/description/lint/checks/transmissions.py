@@ -1,4 +1,4 @@
-"""Transmissions that ros_control or ros2_control would not load, or would load as something else."""
+"""Checks of transmissions that ros_control or ros2_control would not load, or would load differently."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -31,14 +31,14 @@ _UNREAD = (
     "URDF310", "transmission-type", "readiness", "warning", bad=one_joint(more=transmission(kind="Simpletransmission"))
 )
 def _type(subject: Subject) -> Iterator[Diagnostic]:
-    """A transmission is of a type that is not known.
+    """A transmission has an unknown type.
 
-    It is left out: commands go to the joint as if there were no gear.
+    It is ignored: commands go to the joint as if there were no gear.
     """
     for found in transmissions(subject):
         if found.type not in SIZES:
             kind = found.element.first("type") or found.element.first("plugin") or found.element
-            message = f"transmission '{found.name}' is of the unknown type '{found.type}'"
+            message = f"transmission '{found.name}' has the unknown type '{found.type}'"
             hint = did_you_mean(found.type, list(SIZES)) or "known: " + ", ".join(SIZES)
             yield Diagnostic("URDF310", message, kind.place, hint, "warning")
 
@@ -50,12 +50,12 @@ def _type(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint(more=transmission() + transmission().replace('"t"', '"u"')),
 )
 def _shared(subject: Subject) -> Iterator[Diagnostic]:
-    """A joint or actuator belongs to two transmissions, or to two unlike ones of ROS 1 and ros2_control.
+    """A joint or actuator belongs to two transmissions, or ROS 1 and ros2_control describe it differently.
 
-    Each of them would set its position; which one wins depends on the order of loading.
+    Each transmission would set its position; which one takes effect depends on the order of loading.
     """
-    # ROS 1 and ros2_control may describe the same gear, each in its own place: they are two lists. Two joints with an
-    # actuator of one name are two motors with a name copied, which does no harm in joint space.
+    # ROS 1 and ros2_control may both describe the same gear, so each has its own list. Two joints whose actuators have
+    # the same name are two motors with a copied name, which is harmless in joint space.
     owners: dict[tuple[bool, str, str], WrittenTransmission] = {}
     for found in transmissions(subject):
         shared_joint = False
@@ -67,13 +67,13 @@ def _shared(subject: Subject) -> Iterator[Diagnostic]:
                     continue
                 shared_joint = tag == "joint"
                 severity: Severity = "error" if shared_joint else "warning"
-                message = f"transmission '{found.name}': {tag} '{name}' belongs to transmission '{owner.name}' already"
-                yield Diagnostic("URDF311", message, element.place, f"each {tag} has one transmission", severity)
-    yield from _unlike(subject)
+                message = f"transmission '{found.name}': {tag} '{name}' already belongs to transmission '{owner.name}'"
+                yield Diagnostic("URDF311", message, element.place, f"use one transmission per {tag}", severity)
+    yield from _contradictions(subject)
 
 
-def _unlike(subject: Subject) -> Iterator[Diagnostic]:
-    """Gears of ros2_control that are others than those that ROS 1 has of the same joints, which are read first."""
+def _contradictions(subject: Subject) -> Iterator[Diagnostic]:
+    """Gears of ros2_control that differ from the ROS 1 gears of the same joints, which take precedence."""
     first: dict[str, TransmissionTag] = {}
     for found, tag in zip(transmissions(subject), subject.parts.transmissions, strict=True):
         for joint in tag.joints:
@@ -81,15 +81,15 @@ def _unlike(subject: Subject) -> Iterator[Diagnostic]:
                 first.setdefault(joint, tag)
             elif joint in first and _gear(first[joint]) != _gear(tag):
                 message = (
-                    f"transmission '{found.name}' of ros2_control is another gear for joint '{joint}' than "
-                    f"'{first[joint].name}' of ROS 1, which counts"
+                    f"transmission '{found.name}' of ros2_control differs at joint '{joint}' from "
+                    f"'{first[joint].name}' of ROS 1, which is used"
                 )
-                yield Diagnostic("URDF311", message, found.element.place, "make them alike, or take one out", "warning")
+                yield Diagnostic("URDF311", message, found.element.place, "make them equal, or remove one", "warning")
                 break
 
 
 def _gear(tag: TransmissionTag) -> tuple[object, ...]:
-    """All but its names."""
+    """Everything but the names."""
     return tag.type, tag.joints, tag.joint_reductions, tag.joint_offsets, tag.actuator_reductions
 
 
@@ -109,28 +109,28 @@ def _gear(tag: TransmissionTag) -> tuple[object, ...]:
     ),
 )
 def _roles(subject: Subject) -> Iterator[Diagnostic]:
-    """A transmission does not say by roles which joint and actuator is which.
+    """The roles of joints and actuators of a transmission are missing or wrong.
 
-    A differential or a four-bar linkage maps its two joints in different ways; ros2_control sorts them by name and
-    swaps them without a word.
+    A differential or a four-bar linkage maps its two joints differently; ros2_control sorts them by name and may
+    silently swap them.
     """
-    # ros2_control wants a role everywhere; ROS 1 only where there are two.
+    # ros2_control requires a role everywhere; ROS 1 only for two joints.
     for found in transmissions(subject):
         pairs = SIZES.get(found.type) == 2
         for tag, elements in (("joint", found.joints), ("actuator", found.actuators)):
             roles = [role(element) for element in elements]
             how = "<role>{}1</role>" if found.ros1 else 'role="{}1"'
             if pairs and len(elements) == 2 and sorted(roles) != [f"{tag}1", f"{tag}2"]:
-                shown = " and ".join(f"'{each}'" if each else "none" for each in roles)
+                shown = " and ".join(f"'{word}'" if word else "none" for word in roles)
                 expected = f"{tag}1 and {tag}2"
-                message = f"transmission '{found.name}': its {tag}s have the roles {shown}; expected {expected}"
+                message = f"transmission '{found.name}': roles of its {tag}s are {shown}; expected {expected}"
                 yield Diagnostic("URDF312", message, elements[0].place, how.format(tag))
             elif not pairs and not found.ros1 and "" in roles:
                 message = f"transmission '{found.name}': {'an' if tag == 'actuator' else 'a'} {tag} has no role"
                 yield Diagnostic("URDF312", message, elements[roles.index("")].place, how.format(tag))
             names = [element.name for element in elements]
             if pairs and len(names) == 2 and names[0] and names[0] == names[1]:
-                message = f"transmission '{found.name}': {tag} '{names[0]}' has both roles; expected two {tag}s"
+                message = f"transmission '{found.name}': {tag} '{names[0]}' has both roles; expected 2 {tag}s"
                 yield Diagnostic("URDF312", message, elements[1].place, None)
 
 
@@ -141,11 +141,12 @@ def _roles(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint(more=transmission(GEARED + MOTOR + MOTOR.replace('"m"', '"n"'))),
 )
 def _count(subject: Subject) -> Iterator[Diagnostic]:
-    """A transmission does not have as many joints and actuators as its type takes.
+    """A transmission has the wrong number of joints or actuators for its type.
 
-    A simple one has one of each, a differential and a four-bar linkage two; ros_control does not load another.
+    A simple transmission has one of each, a differential and a four-bar linkage two; ros_control rejects other
+    numbers.
     """
-    # In ros2_control the actuator may be left out of a simple one.
+    # In ros2_control the actuator of a simple transmission is optional.
     for found in transmissions(subject):
         count = SIZES.get(found.type)
         joints, actuators = len(found.joints), len(found.actuators)
@@ -167,37 +168,37 @@ def _count(subject: Subject) -> Iterator[Diagnostic]:
 def _hardware_interface(subject: Subject) -> Iterator[Diagnostic]:
     """A joint of a ROS 1 transmission has no hardware interface, or an unknown one.
 
-    ros_control then leaves the joint out without an error; no controller finds it.
+    ros_control then silently skips the joint; no controller finds it.
     """
-    # The name may carry the prefix `hardware_interface/`; without it, it is old but read.
+    # The prefix `hardware_interface/` is optional: old descriptions have none.
     for found in transmissions(subject):
         for joint in found.joints if found.ros1 else ():
             name = joint.attributes.get("name", "")
             interfaces = joint.all("hardwareInterface")
             if not interfaces:
                 message = f"transmission '{found.name}': joint '{name}' has no <hardwareInterface>"
-                hint = f"<hardwareInterface>hardware_interface/{_meant(found)}</hardwareInterface>"
+                hint = f"<hardwareInterface>hardware_interface/{_likely_interface(found)}</hardwareInterface>"
                 yield Diagnostic("URDF314", message, joint.place, hint, "warning")
             for interface in interfaces:
                 word = interface.text.strip()
                 if word.rpartition("/")[2] not in INTERFACES:
-                    message = f"transmission '{found.name}': joint '{name}' has the unknown hardware interface '{word}'"
+                    message = f"transmission '{found.name}': unknown hardware interface '{word}' of joint '{name}'"
                     near = did_you_mean(word.rpartition("/")[2], list(INTERFACES))
                     yield Diagnostic("URDF314", message, interface.place, near, "warning")
 
 
-def _meant(found: WrittenTransmission) -> str:
-    """What an actuator of it says, as old descriptions do; else position."""
-    said = (word.text.strip().rpartition("/")[2] for one in found.actuators for word in one.all("hardwareInterface"))
-    return next((word for word in said if word in INTERFACES), "PositionJointInterface")
+def _likely_interface(found: WrittenTransmission) -> str:
+    """The interface at an actuator, where old descriptions have it; else position."""
+    tags = (tag for actuator in found.actuators for tag in actuator.all("hardwareInterface"))
+    words = (tag.text.strip().rpartition("/")[2] for tag in tags)
+    return next((word for word in words if word in INTERFACES), "PositionJointInterface")
 
 
 @check("URDF315", "transmission-joint", "readiness", bad=one_joint(kind="fixed", inside="", more=transmission()))
 def _joint(subject: Subject) -> Iterator[Diagnostic]:
-    """A transmission drives a fixed joint or one that follows another.
+    """A transmission drives a fixed joint or a mimic joint.
 
-    A fixed joint does not move, and a mimic joint has no actuator of its own: its position is that of the joint it
-    follows.
+    A fixed joint does not move, and a mimic joint has no actuator: the joint it follows determines its position.
     """
     joints = {joint.name: joint for joint in subject.parts.joints}
     for found in transmissions(subject):
@@ -206,9 +207,9 @@ def _joint(subject: Subject) -> Iterator[Diagnostic]:
             if joint is None or joint.independent:
                 continue
             severity: Severity = "warning" if joint.moves else "error"
-            what = f"follows '{joint.mimic.joint}' (mimic)" if joint.mimic is not None else "is fixed"
+            what = f"mimics '{joint.mimic.joint}'" if joint.mimic is not None else "is fixed"
             message = f"transmission '{found.name}' drives joint '{joint.name}', which {what}"
-            yield Diagnostic("URDF315", message, element.place, "take the transmission out", severity)
+            yield Diagnostic("URDF315", message, element.place, "remove the transmission", severity)
 
 
 @check(
@@ -219,10 +220,9 @@ def _joint(subject: Subject) -> Iterator[Diagnostic]:
     bad=one_joint(more=transmission(GEARED + '<actuator name="m"/>')),
 )
 def _reduction(subject: Subject) -> Iterator[Diagnostic]:
-    """A ROS 1 transmission states no reduction at its actuator.
+    """A ROS 1 transmission has no reduction at its actuator.
 
-    ros_control wants <mechanicalReduction> there and does not load the transmission without it; here it counts as
-    1.
+    ros_control does not load a transmission without <mechanicalReduction> there; manipcli uses 1.
     """
     for found in transmissions(subject):
         for actuator in found.actuators if found.ros1 else ():
@@ -236,9 +236,9 @@ def _reduction(subject: Subject) -> Iterator[Diagnostic]:
 
 @check("URDF317", "transmission-name", "readiness", bad=one_joint(more=transmission().replace(' name="t"', "")))
 def _name(subject: Subject) -> Iterator[Diagnostic]:
-    """A transmission has no name, or one that another has.
+    """A transmission has no name or a duplicate name.
 
-    ros_control and ros2_control find transmissions by name, and load no other.
+    ros_control and ros2_control look up transmissions by name and do not load such a transmission.
     """
     seen: set[tuple[bool, str]] = set()
     for found in transmissions(subject):
@@ -246,16 +246,16 @@ def _name(subject: Subject) -> Iterator[Diagnostic]:
         if not name:
             yield Diagnostic("URDF317", f"a {found.type} has no name", found.element.place, 'name="..."')
         elif (found.ros1, name) in seen:
-            yield Diagnostic("URDF317", f"transmission '{name}' is written twice", found.element.place, None)
+            yield Diagnostic("URDF317", f"duplicate transmission '{name}'", found.element.place, None)
         seen.add((found.ros1, name))
 
 
 @check("URDF318", "transmission-unread", "readiness", "warning", bad=one_joint(more=transmission(_UNREAD + MOTOR)))
 def _unread(subject: Subject) -> Iterator[Diagnostic]:
-    """A simple transmission states a reduction where nobody reads it.
+    """The reduction of a simple transmission is at the wrong element.
 
-    ros_control reads the reduction of the actuator, ros2_control that of the joint; each leaves the other out
-    without a word, and so is done here.
+    ros_control reads the reduction of the actuator, ros2_control that of the joint; each silently ignores the other,
+    and so does manipcli.
     """
     for found in transmissions(subject):
         if found.type != "SimpleTransmission":
@@ -265,5 +265,5 @@ def _unread(subject: Subject) -> Iterator[Diagnostic]:
             child = element.first("mechanicalReduction") or element.first("mechanical_reduction")
             if child is None or finite(child.text) in (None, 1.0):
                 continue
-            message = f"transmission '{found.name}': the reduction {child.text} of its {element.tag} is not read"
-            yield Diagnostic("URDF318", message, child.place, f"write it at the {read}", "warning")
+            message = f"transmission '{found.name}': reduction {child.text} of its {element.tag} is ignored"
+            yield Diagnostic("URDF318", message, child.place, f"move it to the {read}", "warning")
