@@ -244,7 +244,7 @@ def test_an_object_that_comes_into_the_way_is_seen_before_the_step_or_stops_it(
         return
     told = re.search(r"stopped: 'watch_never_collision' is broken at t = ([\d.]+) s by [\d.]+ m?N: (.*)", text)
     assert told is not None, text
-    assert re.match(r"'post' and 'robot/\w+' press with", told[2])
+    assert re.match(r"'post' and 'robot/\w+' touch with", told[2])
     (watched,) = verdict.expectations
     assert (watched.name, watched.outcome) == ("watch_never_collision", "failed")
     assert verdict.simulated_time < float(told[1]) + 1.5
