@@ -20,9 +20,9 @@ INTRODUCTION = """\
 
 <!-- Written by docs/write_conditions.py: change that, or the docstrings of manipcli/conditions/members/. -->
 
-A condition measures something in a run and gives a signed margin with a unit: 0 or more where it holds, negative where it
-fails. Steps wait for conditions (`until`), `watch` stops the run at a broken one, and `expect` judges the recording. All
-three use the same functions on the same ticks, so they cannot disagree.
+A condition measures a run and gives a signed margin with a unit: 0 or more where it holds, negative where it fails.
+Steps wait for conditions (`until`), `watch` stops the run at a broken one, and `expect` judges the recording. All three
+use the same functions on the same ticks, so they cannot disagree.
 
 ```yaml
 steps:
@@ -51,7 +51,7 @@ expect:
 | `during: STEP`, `during: [STEP, STEP]` | every tick of these steps | at every tick |
 | `always: {...}` | every tick of the run, or of the steps of `during` | at every tick |
 | `never: {...}` | the same ticks | at no tick |
-| `eventually: {...}` | the same ticks; with `within: TIME` up to that time from the start of run or step | at least at one tick |
+| `eventually: {...}` | the same ticks; with `within: TIME` up to this time after the start | at least at one tick |
 
 Conditions that measure from a start (`moved`, `unmoved`, `slip`, `energy`, `duration`) start at the first evaluated
 tick: at the start of the step with `at: STEP` and `during`, else at the start of the run.
@@ -63,7 +63,7 @@ of signal temporal logic: the least for `all` and over time, the greatest for `a
 margin for `not` and with `never`. A margin of exactly 0 holds and its opposite fails: at each tick exactly one of a
 condition and its `not` holds. Over several ticks both can fail, if the condition holds at some of them and fails at
 others; to require that it fails at least once, write `eventually: {not: {...}}`. A failed condition has a margin of at
-most -1e-9 (N, m, rad, ...), also where the measured margin is 0, for example `not: {no_collision: ...}` without contact.
+most -1e-9 (N, m, rad, ...), also where the measured margin is 0, as for `not: {no_collision: ...}` without contact.
 Reports show the margin of the deciding condition at the deciding tick, in its own unit, with its measurement.
 
 Margins in one unit are compared directly. In a combination of different units each margin is first divided by its own

@@ -270,7 +270,7 @@ def test_labels_are_the_words_numbered_or_the_ids() -> None:
         ),
         (
             {"all": [NEAR, {"unmoved": {"object": "cube", "within": 1}}]},
-            ("all",), "`near` is expected at the end, `unmoved` all the time", "say `at: end`",
+            ("all",), "`near` defaults to the end, `unmoved` to the whole run", "add `at: end`",
         ),
     ],
 )  # fmt: skip
@@ -340,4 +340,4 @@ def test_a_watch_that_ended_the_run_is_not_passed_by_a_log_that_lacks_its_tick()
     verdict = judge(replace(made, events=(*made.events, broken)), expect=watch, robot=ROBOT, scene=SCENE)
     (known,) = verdict.expectations
     assert (verdict.verdict, known.outcome) == ("failed", "not_evaluated")
-    assert known.text == "it was broken at t = 0.401 s by 3 mm: 'cube' is far; the log does not hold that tick"
+    assert known.text == "broken at t = 0.401 s by 3 mm: 'cube' is far; the log does not contain this tick"

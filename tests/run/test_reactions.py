@@ -108,7 +108,7 @@ def test_a_failure_that_is_tolerated_does_not_count_and_the_next_step_begins_whe
     late = "  - move: {to: {pitch: 1.0}}\n    timeout: 0.1 s\n"
     verdict = run(f"steps:\n{late}    on_fail: {on_fail}\n  - move: {{to: up}}\n")
     assert verdict.verdict == "passed"
-    assert "1 of 2 steps done, the task tolerates that move_1 failed" in verdict.text
+    assert "1 of 2 steps done, failure of move_1 tolerated" in verdict.text
     assert [(step.outcome, step.tolerated) for step in verdict.steps] == [("timeout", True), ("done", False)]
     (replanned,) = verdict.steps[1].replanned
     assert replanned.startswith("joint 'pitch' is at ")

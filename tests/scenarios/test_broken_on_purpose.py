@@ -196,7 +196,7 @@ def test_a_controller_with_too_much_damping_is_named_with_its_joint(run: Run) ->
     text = verdict.steps[0].text
     assert "controller 'arm_controller': joint 'joint_6' is outside its" in text
     assert re.search(r"velocity error [+-][\d.]+ rad/s, limit 0\.05 rad/s", text)
-    assert re.search(r"cut at its limits: joint 'joint_6' \(effort.*?\) in \d{4} of \d{4} ticks", text)
+    assert re.search(r"saturated: joint 'joint_6' \(effort.*?\) in \d{4} of \d{4} ticks", text)
 
 
 def test_a_controller_that_is_too_weak_is_named_with_its_joint_and_error(run: Run) -> None:
