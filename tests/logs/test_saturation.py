@@ -46,7 +46,7 @@ def test_a_joint_too_weak_for_gravity_is_doubted_counted_and_named(tmp_path: Pat
         progress=listener,
     )
     (doubt,) = listener.doubts
-    assert "joint_2: holding against gravity takes up to" in doubt.message
+    assert "joint_2: gravity needs up to" in doubt.message
     assert report.verdict.verdict == "failed"
     assert report.verdict.cuts == judge_log(log).cuts
     assert report.verdict.cuts.joints["joint_2"] > 0
