@@ -94,7 +94,7 @@ def test_latency_counts_in_whole_ticks_of_the_controller(found: Found) -> None:
     """1 ms of latency delays by a whole tick of 4 ms: v' = v - (h / I) d v_before is stable below d = I / h."""
     controller = "command_interface: effort, update_rate: 250, gravity_compensation: true"
     (late,) = found(f"{controller}, gains: {{hinge: {{p: 1, d: 25}}}}", more="latency: 1")
-    told = re.match(r"hinge: d 25 is unstable, the limit is ([\d.]+) at 4 ms and 1 ticks of latency", late.message)
+    told = re.match(r"hinge: d 25 is unstable, the limit is ([\d.]+) at 4 ms and 1 tick of latency", late.message)
     assert told is not None, late.message
     assert float(told[1]) == pytest.approx((0.02 + 0.25**2) / 4e-3, rel=0.02)
     assert found(f"{controller}, gains: {{hinge: {{p: 1, d: 19}}}}") == ()

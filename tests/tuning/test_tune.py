@@ -96,7 +96,7 @@ def test_the_joint_of_a_hand_presses_with_its_effort_over_its_travel_at_least(
     )
     found = tune(robot, controllers, Wish(bandwidth, 1.0, 1e-3))
     (one,) = found.joints
-    raised = [note for note in found.notes if "presses" in note and "hinge" in note]
+    raised = [note for note in found.notes if "full effort" in note and "hinge" in note]
     assert bool(raised) == (one.frequency > bandwidth)
     assert one.p == pytest.approx(p, rel=5e-3)
     assert one.d == pytest.approx(2.0 * math.sqrt(p * INERTIA), rel=5e-3)

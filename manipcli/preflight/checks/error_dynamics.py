@@ -9,7 +9,7 @@ from typing import Final
 from manipcli.control.control_loop import InverseDynamicsLoop, error_gains
 from manipcli.control.stability import Loop, boundary, is_stable
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import digits
+from manipcli.core.text import digits, number_of
 from manipcli.preflight.preflight import Check, ControlledJoint, Subject
 from manipcli.spec.controllers import GainsSpec
 from manipcli.task.task import Task
@@ -49,7 +49,7 @@ def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, l
         return None
     slowest = SLOWEST / (math.tau * period)
     most = slowest * boundary(lambda factor: loop(error_gains(factor * slowest, law.damping_ratio)))
-    at = f"at {1e3 * period:.3g} ms" + (f" and {late} ticks of latency" if late else "")
+    at = f"at {1e3 * period:.3g} ms" + (f" and {number_of(late, 'tick')} of latency" if late else "")
     if own is None:
         place = task.controllers_file.place("controllers", joint.controller, "bandwidth")
         message = f"{joint.controller}: bandwidth {digits(law.bandwidth)} Hz is unstable, "

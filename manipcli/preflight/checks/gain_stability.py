@@ -20,7 +20,7 @@ from manipcli.control.stability import (
     unstable_share,
 )
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import digits
+from manipcli.core.text import digits, number_of
 from manipcli.preflight.preflight import Check, ControlledJoint, Shift, Subject, once
 from manipcli.spec.controllers import GainsSpec
 
@@ -77,7 +77,7 @@ def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | Non
     kp, kd, ki = f"p {digits(p)}", f"d {digits(d)}", f"i {digits(i)}"
     at = f"at {1e3 * loop.period:.3g} ms"
     if loop.delay is not None and loop.delay[0]:
-        at += f" and {int(loop.delay[0])} ticks of latency"
+        at += f" and {number_of(int(loop.delay[0]), 'tick')} of latency"
     if is_stable(loop):
         worst = next((z for z in poles(loop) if z.real < 0.0 and abs(z.imag) < 1e-9), 0.0)
         if abs(worst) <= RINGING:
