@@ -1,4 +1,4 @@
-"""Where bodies are, over many moments: what several conditions measure."""
+"""Positions of bodies over time: bounding box centre, lowest and highest point."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ def highest(scene: Scene, states: WorldState, name: str) -> Array:
 
 
 def _half_height(scene: Scene, states: WorldState, name: str) -> Array:
-    """Half the height of the turned box: sum_i |z . e_i| size_i / 2, with the directions e_i of its edges."""
+    """Half the height of the rotated box: sum_i |z . e_i| size_i / 2, with the directions e_i of its edges."""
     R_WO = matrix_from_quat(body_pose(scene, states, name).quat_xyzw)
     return np.asarray(np.abs(R_WO[..., 2, :]) @ scene.body(name).size / 2.0)
 
 
 def point_text(points: Array, k: int) -> str:
-    """`[0.75, 0.002, 0.4] m`: of tick `k`, or of all where there is one for all."""
+    """The point of tick `k` as `[0.75, 0.002, 0.4] m`; points: (T, 3), or (3,) for all ticks."""
     return vector_text(points if points.ndim == 1 else points[k])
 
 
 def vector_text(point: Sequence[float] | Array) -> str:
-    """To the millimetre."""
+    """A vector [m] as text, rounded to the millimetre."""
     return f"[{', '.join(f'{round(float(x), 3) + 0.0:g}' for x in point)}] m"

@@ -1,7 +1,7 @@
-"""The contract of conditions: pure functions of what happened, with a signed margin in a stated unit.
+"""The contract of conditions: pure functions of the run, with a signed margin in a stated unit.
 
-One family, used live (`until`, `watch`) and judged (`expect`): both open the same member and hand it the same moments,
-so that a condition that ended a step and the same condition in a verdict cannot disagree.
+Conditions are evaluated live (`until`, `watch`) and on the recording (`expect`). Both use the same member with the same
+state windows, so a condition that ended a step and the same condition in a verdict cannot disagree.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ if TYPE_CHECKING:
 S = TypeVar("S", bound=Model)
 
 Scope = Literal["end", "always"]
-"""Where a condition is expected to hold when nobody says where: up to the end of the run, or all the time."""
+"""Default time of an expectation: up to the end of the run, or all the time."""
 
 Seen = Literal["bodies", "contacts", "references"]
-"""What a log may have been told to leave out."""
+"""What `record:` can leave out of a log."""
 
 Gauge = Callable[[StateWindow], Robustness]
-"""Answers for successive moments, each call going on where the last one ended. The first tick that it is shown is where
-it starts to count: from there something moved, slipped, took time or energy."""
+"""Robustness on successive state windows; each call continues where the last one ended. Motion, slip, time and energy
+count from the first tick of the first window."""
 
 
 @dataclass(frozen=True)
 class World:
-    """What a condition is asked in: everything that does not change during a run.
+    """Everything that conditions use and that is constant during a run.
 
     Attributes:
-        robot: whose joints the state's joint vectors follow.
-        scene: whose bodies the state's body arrays follow.
+        robot: joint vectors of the state have its joint order.
+        scene: body arrays of the state have its body order.
         start: the state at time 0 (no leading axes), for words such as `to: start`.
-        physics: False where no body moves and nothing touches.
-        unrecorded: why nothing is known of the motion of bodies, of contacts or of references.
-        referenced: joints of which it is known what they should follow.
+        physics: False for an engine without motion of bodies and without contacts.
+        unrecorded: reason why motions of bodies, contacts or references are not in the log.
+        referenced: joints with a recorded reference.
         steps: ids of the steps.
-        period: [s] from one tick to the next that is shown.
+        period: [s] between two ticks in a state window.
     """
 
     robot: RobotModel
@@ -62,7 +62,7 @@ class World:
 
     @cached_property
     def kinematics(self) -> Kinematics:
-        """Of the robot; made when it is first asked for."""
+        """Kinematics of the robot, built at its first use."""
         from manipcli.model.kinematics import Kinematics
 
         return Kinematics(self.robot)
@@ -70,12 +70,12 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What a spec may speak of, before anything runs.
+    """The names that a spec can refer to, before the run.
 
     Attributes:
         robot, scene: of the task.
-        steps: the ids of its steps; None: not known.
-        in_order: whether these are all, as they follow each other; else any that the file could mean, in no order.
+        steps: the ids of its steps; None: unknown.
+        in_order: True if `steps` is complete and in order; else it holds every possible id, unordered.
     """
 
     robot: RobotModel
@@ -86,9 +86,13 @@ class CheckContext:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something in a spec that cannot be meant: `loc` inside the spec, what is wrong, a hint (the nearest name).
+    """An error in a spec.
 
-    `code`: where the family of problems has codes of its own.
+    Attributes:
+        loc: inside the spec.
+        message: what is wrong.
+        hint: what to write instead, for example the nearest name.
+        code: only for problems with a code of their own.
     """
 
     loc: Loc
@@ -104,15 +108,15 @@ class Condition(Generic[S]):
     Attributes:
         name: the word in YAML.
         spec: what the user writes under that word.
-        units: that its margin can have, SI: "m", "rad", ...
-        open: (spec, world) -> its gauge, from the next moments on. Only to be asked where `check` finds nothing and
+        units: SI units of its margin: "m", "rad", ...
+        open: (spec, world) -> its monitor, from the next state window on. Requires that `check` finds nothing and that
             `absent` is None.
-        check: (spec, setting) -> everything in the spec that the setting does not know.
-        absent: (spec, world) -> why it can never be evaluated in this world, or None.
-        scope: where it is expected to hold when the task does not say.
-        example: how it is written, in YAML.
-        stateless: it looks at contacts and steps alone, which are known at every tick, also in a log that holds fewer
-            states than there were ticks.
+        check: (spec, context) -> every unknown name in the spec.
+        absent: (spec, world) -> why it cannot be evaluated in this world, or None.
+        scope: the default time of an expectation.
+        example: in YAML.
+        stateless: True if it uses only contacts and steps, which are known at every tick, also in a log with fewer
+            states than ticks.
     """
 
     name: str
@@ -127,7 +131,7 @@ class Condition(Generic[S]):
 
 
 def unmoving(world: World, bodies: Sequence[str]) -> str | None:
-    """Why nothing can be said of the motion of bodies: nothing moves those that could move, or it is not recorded."""
+    """Why the motion of bodies is unknown: the engine moves no body, or it is not recorded; None if it is known."""
     movable = [f"'{body.name}'" for body in world.scene.movable if body.name in bodies]
     if not movable:
         return None
@@ -137,19 +141,19 @@ def unmoving(world: World, bodies: Sequence[str]) -> str | None:
 
 
 def untouchable(world: World) -> str | None:
-    """Why nothing can be said of contacts."""
+    """Why contacts are unknown; None if they are known."""
     if not world.physics:
-        return "the engine has no physics, so nothing can touch"
+        return "the engine has no physics, so there are no contacts"
     return world.unrecorded.get("contacts")
 
 
 def effortless(world: World) -> str | None:
-    """Why nothing can be said of efforts."""
-    return None if world.physics else "the engine has no physics, so no joint needs any effort"
+    """Why efforts are unknown; None if they are known."""
+    return None if world.physics else "the engine has no physics, so joints have no efforts"
 
 
 def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) -> tuple[Problem, ...]:
-    """Empty if the scene has a (movable) body of this name."""
+    """A problem if the scene has no (movable) body of this name."""
     known = tuple(body.name for body in (scene.movable if movable else scene.bodies))
     if name in known:
         return ()
@@ -158,7 +162,7 @@ def unknown_body(scene: Scene, name: str, loc: Loc, *, movable: bool = False) ->
 
 
 def unknown_group(robot: RobotModel, name: str | None, loc: Loc) -> tuple[Problem, ...]:
-    """Empty if the robot has a group of this name, or none is named."""
+    """A problem if the robot has no group of this name; `name` None: no problem."""
     groups = [group.name for group in robot.groups]
     if name is None or name in groups:
         return ()

@@ -1,4 +1,4 @@
-"""Conditions as they are written, with `all`, `any` and `not` around them, made ready to be asked.
+"""Combinations of conditions: monitors, checks and scopes of formulas with `all`, `any` and `not`.
 
 all: [{upright: {...}}, {any: [{near: {...}}, {not: {inside: {...}}}]}]
 """
@@ -15,17 +15,17 @@ from manipcli.core.errors import Loc
 from manipcli.core.registry import Seam
 from manipcli.spec.condition import ConditionSpec
 
-# Any: a seam holds members of different specs; each is only ever called with its own.
+# Any: the members of a seam have different specs; each is called with its own.
 Seams = Seam[Condition[Any]]
 
 
 def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
-    """The gauge of a condition or combination, from the next moments on."""
+    """The monitor of a condition or combination, from the next state window on."""
     if not spec.combines:
         member = seam[spec.name]
         monitor: Gauge = member.open(spec.body, world)
         return monitor
-    members = [_told(one, opened(one, world, seam)) for one in spec.members]
+    members = [_named(member, opened(member, world, seam)) for member in spec.members]
 
     def look(window: StateWindow) -> Robustness:
         readings = [member(window) for member in members]
@@ -36,43 +36,43 @@ def opened(spec: ConditionSpec, world: World, seam: Seams) -> Gauge:
     return look
 
 
-def _told(spec: ConditionSpec, monitor: Gauge) -> Gauge:
-    """As a member of a combination it says which condition it is."""
+def _named(spec: ConditionSpec, monitor: Gauge) -> Gauge:
+    """In a combination the texts of a member begin with the name of its condition."""
     return monitor if spec.combines else lambda window: named(monitor(window), spec.name)
 
 
 def absent(spec: ConditionSpec, world: World, seam: Seams) -> str | None:
-    """Why it cannot be evaluated in this world, of the first of its conditions that cannot; None where all can."""
-    for one in leaves(spec):
-        reason: str | None = seam[one.name].absent(one.body, world)
+    """Why the first of its conditions that cannot be evaluated in this world cannot; None if all can."""
+    for leaf in leaves(spec):
+        reason: str | None = seam[leaf.name].absent(leaf.body, world)
         if reason is not None:
             return reason
     return None
 
 
 def problems(spec: ConditionSpec, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
-    """Everything in it that the setting does not know; `loc` begins with the word."""
+    """Every unknown name in it; `loc` begins with the name of the condition."""
     found: list[Problem] = []
     if spec.combines:
-        for k, one in enumerate(spec.members):
+        for k, member in enumerate(spec.members):
             loc: Loc = (spec.name,) if spec.name == "not" else (spec.name, k)
-            found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(one, context, seam)]
+            found += [Problem((*loc, *p.loc), p.message, p.hint, p.code) for p in problems(member, context, seam)]
         return tuple(found)
-    told = seam[spec.name].check(spec.body, context)
-    return tuple(Problem((spec.name, *p.loc), p.message, p.hint, p.code) for p in told)
+    own = seam[spec.name].check(spec.body, context)
+    return tuple(Problem((spec.name, *p.loc), p.message, p.hint, p.code) for p in own)
 
 
 def scopes(spec: ConditionSpec, seam: Seams) -> dict[Scope, str]:
-    """Where its conditions are expected to hold when nobody says where, each with the first word that wants it."""
+    """The default scopes of its conditions, each with the name of the first condition that has it."""
     found: dict[Scope, str] = {}
-    for one in leaves(spec):
-        found.setdefault(seam[one.name].scope, one.name)
+    for leaf in leaves(spec):
+        found.setdefault(seam[leaf.name].scope, leaf.name)
     return found
 
 
 def leaves(spec: ConditionSpec) -> Iterator[ConditionSpec]:
-    """The conditions that it combines."""
+    """The conditions in it, without combinations."""
     if not spec.combines:
         yield spec
-    for one in spec.members:
-        yield from leaves(one)
+    for member in spec.members:
+        yield from leaves(member)

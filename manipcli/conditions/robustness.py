@@ -1,14 +1,14 @@
-"""Margins over successive ticks, and how they combine: the robust semantics of signal temporal logic.
+"""Margins over successive ticks and their combination: the robust semantics of signal temporal logic.
 
     all: the least of the members,  any: the greatest,  not: the opposite;  always: the least over time,
     eventually: the greatest over time          (Donze and Maler, Robust satisfaction of temporal logic, 2010)
 
-A margin of 0 is met; its opposite is not, so that of a condition and its `not` exactly one holds: what is met by less
-than `EDGE` counts there as met by that.
+A margin of 0 is met and its opposite is not, so exactly one of a condition and its `not` holds: for `not`, a margin of
+less than `EDGE` counts as `EDGE`.
 
-Margins in one unit compare as they are. Where units differ, as a tilt's and a distance's do, margins compare by
-themselves over the tolerance that each was compared to; signs come first in either order. What is told is the margin of
-the deciding member at the deciding moment, in its own unit.
+Margins in one unit are compared directly. Where units differ, for example rad and m, each margin is divided by its
+tolerance first; this keeps the signs. The reported margin is that of the deciding member at the deciding tick, in its
+own unit.
 """
 
 from __future__ import annotations
@@ -27,16 +27,23 @@ Mask = npt.NDArray[np.bool_]
 Pick = Literal["least", "greatest"]
 
 EDGE: Final = 1e-9
-"""Least amount, in the SI unit of a margin, by which a condition is missed: the opposite of 0 is minus this.
+"""The smallest amount by which a condition can fail, in the SI unit of its margin: the opposite of 0 is -EDGE.
 
-The numbers of `--format json` are rounded to as much, and keep their sign.
+The numbers of `--format json` are rounded to this and keep their sign.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What was found: the deciding `margin` (>= 0 passes) in `unit`, when [s], and about what; `relative`: the margin
-    over its tolerance, once it is that of a time."""
+    """The deciding measurement.
+
+    Attributes:
+        margin: 0 or more passes; in `unit`.
+        unit: SI.
+        at: when [s]; None if no time applies.
+        text: what was measured.
+        relative: the margin divided by its tolerance; None before a tick is chosen.
+    """
 
     margin: float
     unit: str
@@ -46,13 +53,13 @@ class Measured:
 
     @property
     def lacking(self) -> str:
-        """` by 3 mm`, how far it is from holding; "" where there is nothing to tell."""
+        """` by 3 mm`, the amount by which it fails; "" if it holds or has no unit."""
         return f" by {readable(-self.margin, self.unit)}" if self.unit and self.margin < -EDGE else ""
 
 
 @dataclass(frozen=True, slots=True)
 class NotEvaluated:
-    """Why something could not be judged; that is never a pass."""
+    """Why something could not be evaluated; this never counts as a pass."""
 
     reason: str
     unit: str = ""
@@ -63,12 +70,12 @@ class Robustness:
     """Margins on T successive ticks.
 
     Attributes:
-        margins: (T,) positive where the condition holds, each in the unit of the member that decides there.
-        relative: (T,) the same over the tolerances, without unit.
-        units: all that can occur, each once.
-        applies: (T,) where there is anything to say: of an object that no hand holds, there is no slip.
-        idle: why it does not apply, where it does not.
-        found: tick -> what to tell of it.
+        margins: (T,) 0 or more where the condition holds, each in the unit of the member that decides there.
+        relative: (T,) the same divided by the tolerances, without unit.
+        units: every unit that can occur, without duplicates.
+        applies: (T,) False where the condition is undefined, for example the slip of an object that is not held.
+        idle: why it does not apply where `applies` is False.
+        found: tick -> the measurement of that tick.
     """
 
     margins: Array
@@ -80,7 +87,7 @@ class Robustness:
 
     @property
     def order(self) -> Array:
-        """(T,) by which margins compare."""
+        """(T,) the values by which margins are compared."""
         return self.margins if len(self.units) == 1 else self.relative
 
 
@@ -90,7 +97,7 @@ def robustness(
     *,
     unit: str,
     scale: float,
-    say: Callable[[int], str],
+    describe: Callable[[int], str],
     at: Callable[[int], float | None] | None = None,
     applies: Mask | None = None,
     idle: str = "",
@@ -98,95 +105,95 @@ def robustness(
     """Margins in one unit.
 
     Args:
-        margins: (T,), or one for all ticks.
+        margins: (T,), or a scalar for all ticks.
         times: (T,) [s]
         unit: SI.
-        scale: the tolerance that they were compared to, above 0, in `unit`.
-        say: tick -> what was measured there.
-        at: tick -> the moment [s] to name; default: the tick's own.
-        applies, idle: see `Robustness`; default: everywhere.
+        scale: the tolerance of the condition, above 0, in `unit`.
+        describe: tick -> text of the measurement.
+        at: tick -> the reported time [s]; default: that of the tick.
+        applies, idle: see `Robustness`; default: every tick.
     """
     every = np.broadcast_to(margins, np.shape(times))
 
     def found(k: int) -> Measured:
         margin = float(every[k]) + 0.0  # never -0
-        return Measured(margin, unit, float(times[k]) if at is None else at(k), say(k))
+        return Measured(margin, unit, float(times[k]) if at is None else at(k), describe(k))
 
     everywhere = np.ones(np.shape(times), dtype=bool) if applies is None else applies
     return Robustness(every, every / scale, (unit,), everywhere, idle, found)
 
 
 def least(readings: Sequence[Robustness]) -> Robustness:
-    """`all`: on each tick the least margin; it applies where every member does."""
+    """`all`: the least margin of each tick; it applies where every member applies."""
     return _picked(readings, np.argmin)
 
 
 def greatest(readings: Sequence[Robustness]) -> Robustness:
-    """`any`: on each tick the greatest margin; it applies where every member does."""
+    """`any`: the greatest margin of each tick; it applies where every member applies."""
     return _picked(readings, np.argmax)
 
 
 def opposite(of: Robustness, *, word: str = "not ") -> Robustness:
-    """`not`: the same margin with the other sign, and -`EDGE` at most where `of` holds; `word` is said before what was
-    found."""
+    """`not`: the negated margin, at most -`EDGE` where `of` holds; `word` is put before the text."""
 
     def found(k: int) -> Measured:
-        one = of.found(k)
-        return replace(one, margin=float(_negated(np.asarray(one.margin))), text=f"{word}{one.text}")
+        measured = of.found(k)
+        margin = float(_negated(np.asarray(measured.margin)))
+        return replace(measured, margin=margin, text=f"{word}{measured.text}")
 
     return replace(of, margins=_negated(of.margins), relative=_negated(of.relative), found=found)
 
 
 def _negated(margins: Array) -> Array:
-    # Never rising, so that `not` of `all` stays `any` of `not`s.
+    # Monotonically decreasing, so that `not` of `all` equals `any` of `not`s.
     return np.where(margins >= 0.0, -np.maximum(margins, EDGE), -margins)
 
 
 def never(of: Robustness) -> Robustness:
-    """`never`: the opposite, and what is asked is told as such: `'cup' moved by 38 mm; never at least 60 mm`.
+    """`never`: the opposite, with the limit in the text negated: `'cup' moved by 38 mm; never at least 60 mm`.
 
-    Never not is always.
+    `never: {not: X}` reads as `always: X`.
     """
     against = opposite(of, word="")
 
     def found(k: int) -> Measured:
-        one = against.found(k)
-        if one.text.startswith("not "):
-            return replace(one, text=one.text.removeprefix("not "))
-        measured, between, asked = one.text.rpartition("; ")
-        return replace(one, text=f"{measured}; never {asked}") if between else one
+        measured = against.found(k)
+        if measured.text.startswith("not "):
+            return replace(measured, text=measured.text.removeprefix("not "))
+        value, separator, limit = measured.text.rpartition("; ")
+        return replace(measured, text=f"{value}; never {limit}") if separator else measured
 
     return replace(against, found=found)
 
 
 def named(of: Robustness, word: str) -> Robustness:
-    """The same, telling which condition it is."""
+    """The same; its texts begin with `word`, the name of the condition."""
 
     def found(k: int) -> Measured:
-        one = of.found(k)
-        return replace(one, text=f"{word}: {one.text}")
+        measured = of.found(k)
+        return replace(measured, text=f"{word}: {measured.text}")
 
     return replace(of, found=found)
 
 
 def _picked(readings: Sequence[Robustness], pick: Callable[..., npt.NDArray[np.intp]]) -> Robustness:
-    # argmin and argmax both pick what is not a number, so that it is not lost.
+    # argmin and argmax both pick NaN, so it is not lost.
     if len(readings) == 1:
         return readings[0]
-    units = tuple(sorted({unit for one in readings for unit in one.units}))
-    margins = np.stack([one.margins for one in readings])
-    relative = np.stack([one.relative for one in readings])
+    units = tuple(sorted({unit for reading in readings for unit in reading.units}))
+    margins = np.stack([reading.margins for reading in readings])
+    relative = np.stack([reading.relative for reading in readings])
     member = pick(margins if len(units) == 1 else relative, axis=0)
     ticks = np.arange(margins.shape[1])
-    applies = np.logical_and.reduce([one.applies for one in readings])
-    idle = next((one.idle for one in readings if not one.applies.all()), "")
+    applies = np.logical_and.reduce([reading.applies for reading in readings])
+    idle = next((reading.idle for reading in readings if not reading.applies.all()), "")
     return Robustness(
         margins[member, ticks], relative[member, ticks], units, applies, idle, lambda k: readings[member[k]].found(k)
     )
 
 
 class Extreme:
-    """The least or the greatest of readings over time, the first of equal ones."""
+    """The least or the greatest margin over time; of equal margins the first."""
 
     def __init__(self, pick: Pick) -> None:
         self._pick = pick
@@ -195,12 +202,12 @@ class Extreme:
         self._fault: NotEvaluated | None = None
         self._idle = ""
         self.broken: float | None = None
-        """The first moment [s] that counts at which it did not hold."""
+        """The first time [s] at which it failed."""
         self.broken_ticks = 0
-        """At how many ticks it did not."""
+        """The number of ticks at which it failed."""
 
     def add(self, more: Robustness, times: Array, first: int = 0, last: int | None = None) -> None:
-        """The ticks from `first` up to and without `last` count, too."""
+        """Add the ticks from `first` up to, not including, `last`."""
         order, applies = more.order[first:last], more.applies[first:last]
         ticks = np.flatnonzero(applies)
         if len(ticks) < len(applies):
@@ -226,7 +233,7 @@ class Extreme:
 
     @property
     def found(self) -> Measured | NotEvaluated | None:
-        """What decides; None while nothing was looked at."""
+        """The deciding measurement; None if no tick was added."""
         if self._fault is not None:
             return self._fault
         if self._best is None and self._idle:

@@ -1,7 +1,7 @@
-"""What a condition may look at: successive control ticks of one run, live or recorded, in the same form.
+"""Successive control ticks of one run, live or recorded, in one form: the input of conditions.
 
-A live run hands on what was not yet seen, up to half a second, a recording half a second at a time: a condition gives
-the same answer either way.
+A live run passes on its new ticks, up to half a second at once; a recording passes on half a second at a time. A
+condition gives the same margins either way.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from manipcli.core.geometry import Array, rotation_between
 from manipcli.model.state import Contact, WorldState
 
 ROUNDING = 0.5e-9
-"""[s] Recorded times are whole nanoseconds: two that differ by no more are the same."""
+"""[s] Recorded times are whole nanoseconds: times that differ by less are equal."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What one controller follows: `position` (T, k) [rad or m] of its `joints`, NaN while it is not active."""
+    """The reference of a controller: `position` (T, k) [rad or m] of its `joints`, NaN while it is inactive."""
 
     joints: tuple[str, ...]
     position: Array
@@ -29,7 +29,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Touching:
-    """All contacts from `time` [s] on, until the next."""
+    """All contacts from `time` [s] until the next change."""
 
     time: float
     contacts: tuple[Contact, ...]
@@ -37,7 +37,7 @@ class Touching:
 
 @dataclass(frozen=True, slots=True)
 class StepTime:
-    """When a step ran [s], as far as is known; `outcome` is empty until it ended."""
+    """Start and end of a step [s], None while unknown; `outcome` is empty until the step ends."""
 
     id: str
     started: float | None
@@ -50,10 +50,10 @@ class StateWindow:
     """Successive control ticks.
 
     Attributes:
-        states: with a leading time axis T. Velocities of bodies in it are not to be used: see `body_velocity`.
+        states: with a leading time axis T. Do not use its body velocities: see `body_velocity`.
         before: the state one tick earlier, without time axis; None at the first tick of the run.
-        references: of every controller that is recorded.
-        contacts: changes of what touches, in order; the first may be older than the first tick, and holds on it.
+        references: of every recorded controller.
+        contacts: changes of the contacts, in order; the first may be older than the first tick and is valid there.
         steps: all steps of the task.
     """
 
@@ -69,38 +69,38 @@ class StateWindow:
         return self.states.time
 
     def part(self, first: int, last: int) -> StateWindow:
-        """The ticks from `first` up to and without `last`."""
+        """The ticks from `first` up to, not including, `last`."""
         if first == 0 and last == len(self.times):
             return self
-        valid = int(np.searchsorted([one.time for one in self.contacts], self.times[first], side="right")) - 1
+        valid = int(np.searchsorted([change.time for change in self.contacts], self.times[first], side="right")) - 1
         return replace(
             self,
             states=self.states.map(lambda a: a[first:last]),
             before=self.states.map(lambda a: a[first - 1]) if first > 0 else self.before,
-            references=tuple(Reference(one.joints, one.position[first:last]) for one in self.references),
+            references=tuple(Reference(r.joints, r.position[first:last]) for r in self.references),
             contacts=self.contacts[max(valid, 0) :],
         )
 
     def touching(self, k: int) -> tuple[Contact, ...]:
-        """What touches at tick `k`."""
-        found = [one.contacts for one in self.contacts if one.time <= self.times[k]]
+        """The contacts at tick `k`."""
+        found = [change.contacts for change in self.contacts if change.time <= self.times[k]]
         return found[-1] if found else ()
 
     def of_contacts(self, value: Callable[[Sequence[Contact]], float]) -> Array:
-        """(T,) `value` of what touches at each tick."""
-        values = np.array([value(()), *(value(one.contacts) for one in self.contacts)])
+        """(T,) `value` of the contacts at each tick."""
+        values = np.array([value(()), *(value(change.contacts) for change in self.contacts)])
         return values[self._which()]
 
     def _which(self) -> npt.NDArray[np.intp]:
-        """(T,) which of `contacts` holds at each tick, counted from 1; 0: none yet."""
-        return np.searchsorted(np.array([one.time for one in self.contacts]), self.times, side="right")
+        """(T,) the number of the change in `contacts` that is valid at each tick, from 1; 0: none yet."""
+        return np.searchsorted(np.array([change.time for change in self.contacts]), self.times, side="right")
 
     def body_velocity(self, k: int) -> tuple[Array, Array]:
         """Velocity of the frame O of movable body `k` over the last tick; zero at the first tick of the run.
 
             v_t = (p_t - p_{t-1}) / (time_t - time_{t-1}),  w_t = log(q_t q_{t-1}^-1) / (time_t - time_{t-1})
 
-        It needs nothing but poses and the past, so that it is the same live and recorded.
+        It uses only poses and past ticks, so it is the same live and recorded.
 
         Returns:
             Linear (T, 3) [m/s] and angular (T, 3) [rad/s] velocity in the world.

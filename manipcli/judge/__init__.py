@@ -1,1 +1,1 @@
-"""Judges a run from its recording alone."""
+"""The verdict on a run, computed from its recording alone."""

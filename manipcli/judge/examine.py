@@ -1,4 +1,4 @@
-"""All expectations asked in one pass over the spans of a recording."""
+"""Evaluation of all expectations in one pass over the spans of a recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manipcli.spec.condition import ExpectationSpec
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """One outcome an expectation, and the time [s] of the last recorded state."""
+    """The outcome of each expectation, and the time [s] of the last recorded state."""
 
     outcomes: tuple[ExpectationOutcome, ...]
     end: float
@@ -37,15 +37,15 @@ def examine(
     physics: bool,
     steps: tuple[StepOutcome, ...],
 ) -> Examined:
-    """The deciding answer to each of `expect`.
+    """The outcomes of `expect`.
 
-    Every span is read once, whatever is asked, so that damage anywhere in the file is noticed; no more than the last
-    half second of them is kept.
+    Every span is read, even without expectations, so damage anywhere in the file is detected. Only the last half second
+    is kept in memory.
     """
     order = Order.of(recording, robot, scene)
     successive: WindowsOfSpans | None = None
     asked: list[Expected] = []
-    stateless = [all(seam[leaf.name].stateless for leaf in leaves(one.condition)) for one in expect]
+    stateless = [all(seam[leaf.name].stateless for leaf in leaves(expectation.condition)) for expectation in expect]
     last: StateWindow | None = None
     end = 0.0
     for span in recording.spans:
@@ -66,18 +66,19 @@ def examine(
                 steps=tuple(step.id for step in steps),
                 period=_period(span.states.time, recording.period),
             )
-            asked = [Expected(one, world, steps, seam) for one in expect]
+            asked = [Expected(expectation, world, steps, seam) for expectation in expect]
         window = successive.next(span)
         last = every = at_every_tick(window, last, recording.period)
-        for one, of_no_state in zip(asked, stateless, strict=True):
-            one.look(every if of_no_state else window)
+        for expected, uses_no_state in zip(asked, stateless, strict=True):
+            expected.look(every if uses_no_state else window)
     names = labels(expect)
     if successive is None:
-        none = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording holds no state")
-        return Examined(tuple(outcome(name, none) for name in names), end)
-    return Examined(tuple(outcome(name, one.found(end)) for name, one in zip(names, asked, strict=True)), end)
+        missing = order if isinstance(order, NotEvaluated) else NotEvaluated("the recording has no states")
+        return Examined(tuple(outcome(name, missing) for name in names), end)
+    found = (outcome(name, expected.found(end)) for name, expected in zip(names, asked, strict=True))
+    return Examined(tuple(found), end)
 
 
 def _period(times: Array, control: float) -> float:
-    """[s] From one tick to the next that the log holds, which may hold fewer than there were, `control` [s] apart."""
+    """[s] between two recorded ticks, which can be more than the control period `control` [s]."""
     return float(times[1] - times[0]) if len(times) > 1 else control

@@ -1,7 +1,7 @@
-"""When an expectation is looked at, and what comes of it.
+"""Evaluation of an expectation: a condition, and the ticks at which it must hold.
 
-A condition with a time: the margins of its gauge on the ticks that count, the least of them, or with `eventually` the
-greatest. What counts is told before the first tick is read, but for the end of the run, which is known at the end.
+The result is the least margin on these ticks, with `eventually` the greatest. The ticks are known before the recording
+is read, except for the end of the run.
 """
 
 from __future__ import annotations
@@ -24,13 +24,19 @@ from manipcli.judge.verdict import ExpectationOutcome, StepOutcome
 from manipcli.spec.condition import END, ConditionSpec, ExpectationSpec, WatchSpec
 
 END_WINDOW = 0.5
-"""How long [s] a condition must hold up to the end of the recording: passing through is not being there."""
+"""[s] How long a condition must hold up to the end of the recording, so that passing through does not count."""
 
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """Which ticks count: those of `intervals` [s], each with its start and without its end; the first tick shown to a
-    gauge is the first of the first. With `last`, of each only its last tick; None: the end of the run, from time 0."""
+    """The ticks at which an expectation is evaluated.
+
+    Attributes:
+        intervals: [s] each including its start, excluding its end; the monitor starts at the first. None: the end of
+            the run, with the monitor started at time 0.
+        last: only the last tick of the intervals counts.
+        words: the ticks, in words; "" for the whole run.
+    """
 
     intervals: tuple[tuple[float, float], ...] | None
     last: bool = False
@@ -38,7 +44,7 @@ class When:
 
 
 def when(spec: ExpectationSpec, steps: Sequence[StepOutcome], seam: Seams) -> When | NotEvaluated:
-    """Which ticks count, or why there are none."""
+    """The evaluated ticks, or why there are none."""
     if spec.steps or spec.at not in (None, END):
         return _of_steps(spec, steps)
     if spec.quantifier == "eventually" and spec.within is not None:
@@ -55,8 +61,8 @@ def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | Not
     for name in spec.steps or (spec.at or "",):
         step = known.get(name)
         if step is None or step.started is None:
-            if isinstance(spec, WatchSpec) and any(one in ran for one in spec.steps):
-                continue  # it may be this that ended the run
+            if isinstance(spec, WatchSpec) and any(other in ran for other in spec.steps):
+                continue  # this watch may have ended the run before the step
             return NotEvaluated(f"step '{name}' never ran")
         if spec.at is not None and step.ended is None:
             return NotEvaluated(f"step '{name}' never ended")
@@ -73,7 +79,7 @@ def _of_steps(spec: ExpectationSpec, steps: Sequence[StepOutcome]) -> When | Not
 
 
 class Expected:
-    """One expectation on its way through a recording."""
+    """Evaluates one expectation, window by window."""
 
     def __init__(self, spec: ExpectationSpec, world: World, steps: Sequence[StepOutcome], seam: Seams) -> None:
         self._spec = spec
@@ -91,7 +97,7 @@ class Expected:
         self._monitor = opened(spec.condition, world, seam)
 
     def look(self, window: StateWindow) -> None:
-        """The next ticks."""
+        """Evaluate the next ticks."""
         if self._never is not None:
             return
         if not self._ticks:
@@ -121,14 +127,14 @@ class Expected:
         return never(answer) if self._spec.quantifier == "never" else answer
 
     def _keep(self, window: StateWindow) -> None:
-        """As many as it takes to hold the last `END_WINDOW` seconds."""
+        """Keep the windows of the last `END_WINDOW` seconds."""
         self._recent.append((window, self._answer(window)))
         start = float(window.times[-1]) - END_WINDOW - ROUNDING
         while len(self._recent) > 1 and self._recent[1][0].times[0] <= start:
             self._recent.popleft()
 
     def found(self, end: float) -> Measured | NotEvaluated:
-        """What came of it, once there are no more ticks after `end` [s]."""
+        """The result, after the last tick at `end` [s]."""
         if self._never is not None:
             return self._never
         for window, answer in self._recent:
@@ -137,7 +143,7 @@ class Expected:
         self._recent.clear()
         found = self._extreme.found
         if found is None:
-            return NotEvaluated(f"there was no tick {self._when.words or 'to look at'}")
+            return NotEvaluated(f"no recorded tick {self._when.words}".rstrip())
         if isinstance(found, NotEvaluated):
             return found
         best = ("at best",) if self._spec.quantifier == "eventually" else ()
@@ -146,7 +152,7 @@ class Expected:
         return replace(found, text=f"{words}: {text}" if words else text)
 
     def _broken(self, found: Measured) -> str:
-        """Of what was to hold for a time and did not: since when, and for how long, a knock or a press."""
+        """When and for how long an expectation over several ticks failed; "" if it passed."""
         first = self._extreme.broken
         if first is None or self._spec.quantifier == "eventually" or self._when.intervals is None or self._when.last:
             return ""
@@ -159,12 +165,12 @@ class Expected:
 
 
 def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:
-    """The name of each in reports: its id, else its word (see `ExpectationSpec.label`), numbered from the second on."""
-    taken = {one.id for one in expect}
+    """The names in reports: id, else label (see `ExpectationSpec.label`); duplicates are numbered from 2."""
+    taken = {expectation.id for expectation in expect}
     seen = Counter[str]()
-    for one in expect:
-        name = one.label
-        if one.id is None:
+    for expectation in expect:
+        name = expectation.label
+        if expectation.id is None:
             seen[name] += 1
             while (name if seen[name] == 1 else f"{name}_{seen[name]}") in taken:
                 seen[name] += 1
@@ -173,7 +179,7 @@ def labels(expect: Sequence[ExpectationSpec]) -> Iterator[str]:
 
 
 def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
-    """Everything in an expectation that robot, scene and steps do not know; `loc` is that inside the expectation."""
+    """Every unknown name in an expectation, and steps that end too late; `loc` is inside the expectation."""
     found = list(problems(spec.condition, context, seam))
     if spec.quantifier is not None:
         found = [Problem((spec.word, *p.loc), p.message, p.hint, p.code) for p in found]
@@ -191,51 +197,48 @@ def expectation_problems(spec: ExpectationSpec, context: CheckContext, seam: Sea
     if not found and spec.at is None and spec.during is None and spec.quantifier is None:
         wanted = scopes(spec.condition, seam)
         if len(wanted) > 1:
-            message = f"`{wanted['end']}` is expected at the end, `{wanted['always']}` all the time, and this has both"
-            found.append(Problem((spec.word,), message, "say `at: end`, `during: STEP`, or write `always: {...}`"))
+            message = f"time missing: `{wanted['end']}` defaults to the end, `{wanted['always']}` to the whole run"
+            found.append(Problem((spec.word,), message, "add `at: end` or `during: STEP`, or write `always: {...}`"))
     return tuple(found)
 
 
 def until_problems(spec: ConditionSpec, step: str | None, context: CheckContext, seam: Seams) -> tuple[Problem, ...]:
-    """Everything in the `until` of a step that robot, scene and steps do not know, or that cannot come true in it."""
+    """Every unknown name in the `until` of a step, and steps that are not done before it ends."""
     found = problems(spec, context, seam)
     if found or step is None or context.steps is None or not context.in_order:
         return found
-    return tuple(
-        Problem(
-            (spec.name,),
-            f"step '{late}' is not done before its end, and step '{step}' waits for it",
-            "name an earlier step",
-        )
-        for late in _undone(spec, step, context.steps)
-    )
+    problems_found = []
+    for late in _undone(spec, step, context.steps):
+        what = "its own end" if late == step else f"the end of step '{late}', which runs later"
+        problems_found.append(Problem((spec.name,), f"step '{step}' waits for {what}", "name an earlier step"))
+    return tuple(problems_found)
 
 
 def _too_early(
     spec: ExpectationSpec, named: Sequence[tuple[Loc, str]], steps: Sequence[str] | None
 ) -> Iterator[Problem]:
-    """A step that is to be done while it, or one before it, goes on."""
+    """A `step_done` that is evaluated before its step is done."""
     if spec.quantifier == "never" or (spec.quantifier == "eventually" and len(named) > 1):
-        return  # in a later one of them
-    told: set[str] = set()
+        return  # it may hold in a later step
+    reported: set[str] = set()
     for loc, name in reversed(named):
         for late in _undone(spec.condition, name, steps or (name,)):
-            if late in told:
+            if late in reported:
                 continue
-            told.add(late)
-            message = f"step '{late}' is not done before its end, and this is asked before"
-            yield Problem(loc, message, "say `at: end`, or name a later step")
+            reported.add(late)
+            message = f"step '{late}' is not done yet when this is evaluated"
+            yield Problem(loc, message, "use `at: end`, or name a later step")
 
 
 def _undone(condition: ConditionSpec, step: str, steps: Sequence[str]) -> tuple[str, ...]:
-    """The steps without which it does not hold and which are not done before the end of `step`."""
+    """The steps that the condition requires to be done and that end after the last tick of `step`."""
     needed = condition.members if condition.name == "all" else (condition,)
-    waited = {one.body.step for one in needed if not one.combines and isinstance(one.body, StepDoneSpec)}
-    return tuple(one for one in steps[steps.index(step) :] if one in waited)
+    waited = {leaf.body.step for leaf in needed if not leaf.combines and isinstance(leaf.body, StepDoneSpec)}
+    return tuple(later for later in steps[steps.index(step) :] if later in waited)
 
 
 def outcome(name: str, found: Measured | NotEvaluated) -> ExpectationOutcome:
-    """The outcome of an expectation called `name`: met from a margin of zero on, or missed by `EDGE` at least."""
+    """The outcome of expectation `name`: passed at a margin of 0 or more; a failed margin is at most -`EDGE`."""
     if isinstance(found, NotEvaluated):
         return ExpectationOutcome(
             name=name, outcome="not_evaluated", margin=None, unit=found.unit, at=None, text=found.reason

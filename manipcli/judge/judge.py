@@ -19,23 +19,22 @@ from manipcli.scene.scene import Scene
 from manipcli.spec.condition import ExpectationSpec
 
 STORED, UNTIL = "verdict", "until"
-"""Metadata of the log: the verdict when it was written, and the time [s] of the last tick that was judged."""
+"""Metadata of the log: the verdict at the end of the run, and the time [s] of its last judged tick."""
 RUN = "run"
 """Metadata of the log: task, seed, engine, physics (`full` | `none`), period, status, and the cause of a failure."""
 
 
 def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: RobotModel, scene: Scene) -> Verdict:
-    """Judge a recording by what its task expected.
+    """Judge a recording against the expectations of its task.
 
-    The order of importance: a run that was interrupted, did not end or has lost its end is an `error`, whatever else is
-    true of it; a step that is not done makes it `failed`, unless it was tolerated (`on_fail: continue`); so does an
-    expectation that is not met, or could not be evaluated. With no expectations the steps alone decide, and the text
-    says so.
+    In this order: a run that was interrupted or did not finish, or whose log is incomplete, is an `error`; a step that
+    is not done makes it `failed`, unless the task tolerates that (`on_fail: continue`); an expectation that fails or is
+    not evaluated makes it `failed`. Without expectations only the steps count, and the text says so.
 
     Args:
         recording: the log.
         expect: the expectations, in the order of the task in the log.
-        robot, scene: built from the log's own attachments.
+        robot, scene: built from the attachments of the log.
     """
     run = recording.metadata.get(RUN, {})
     status = run.get("status", "")
@@ -50,7 +49,7 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
         physics=run.get("physics", "") == "full",
         steps=steps,
     )
-    outcomes = tuple(_unless_broken(one, recording) for one in examined.outcomes)
+    outcomes = tuple(_unless_broken(expectation, recording) for expectation in examined.outcomes)
     errors = errors or _cut_short(recording, examined.end)
     cause = run.get("cause", "") if status == RunStatus.FAILED else _broken_after_all(recording)
     word, text = _verdict(errors, cause, steps, outcomes)
@@ -70,23 +69,25 @@ def judge(recording: Recording, *, expect: Sequence[ExpectationSpec], robot: Rob
 
 
 def _broken_after_all(recording: Recording) -> str:
-    """The watch that stopped the robot when no step was on any more; within a step, that says it itself."""
+    """The watch that stopped the robot after its last step; within a step, the step reports it."""
     broken = [event.text for event in recording.events if event.kind == "watch_broken" and not event.step]
     return f"stopped after the last step: {broken[0]}" if broken else ""
 
 
 def _unless_broken(outcome: ExpectationOutcome, recording: Recording) -> ExpectationOutcome:
-    """The same, but for a watch that ended the run between two ticks of a thinned log: on those it may seem to hold."""
-    told = broken_at(outcome.name)
-    broken = [event.text for event in recording.events if event.kind == "watch_broken" and event.text.startswith(told)]
+    """The outcome; not evaluated if a watch broke between two ticks of a thinned log, whose ticks do not show it."""
+    beginning = broken_at(outcome.name)
+    broken = [
+        event.text for event in recording.events if event.kind == "watch_broken" and event.text.startswith(beginning)
+    ]
     if not broken or outcome.outcome != "passed":
         return outcome
-    text = f"it was broken at {broken[0].removeprefix(told)}; the log does not hold that tick"
+    text = f"broken at {broken[0].removeprefix(beginning)}; the log does not contain this tick"
     return ExpectationOutcome(outcome.name, "not_evaluated", None, outcome.unit, None, text)
 
 
 def _drawn(recording: Recording) -> Drawn | None:
-    """Which sample this was; None also where the log says what no sample is."""
+    """The sample of the run; None also if its metadata is damaged."""
     try:
         return Drawn.from_metadata(recording.metadata[SAMPLE]) if SAMPLE in recording.metadata else None
     except ValueError:
@@ -94,13 +95,13 @@ def _drawn(recording: Recording) -> Drawn | None:
 
 
 def _errors(recording: Recording, status: str) -> tuple[Diagnostic, ...]:
-    """Why the recording is not that of a run which came to its end."""
+    """Why the recording is not that of a finished run."""
     errors = []
     if status == RunStatus.INTERRUPTED:
         errors.append(Diagnostic(INTERRUPTED, "the run was interrupted"))
     elif status not in ENDED:
         what = f"status '{status}'" if status else "no status"
-        errors.append(Diagnostic("RUN103", f"the run did not come to its end: the log has {what}"))
+        errors.append(Diagnostic("RUN103", f"the run did not finish: the log has {what}"))
     if recording.lost is not None:
         errors.append(Diagnostic("RUN104", f"the log is incomplete: {recording.lost}"))
     elif status == RunStatus.COMPLETE and left_out(recording):
@@ -109,13 +110,13 @@ def _errors(recording: Recording, status: str) -> tuple[Diagnostic, ...]:
 
 
 def _cut_short(recording: Recording, end: float) -> tuple[Diagnostic, ...]:
-    """A copy without the last of its messages, though what was stored behind them is there."""
+    """An error if the last messages are missing: the stored verdict covers a later tick."""
     try:
         until = float(recording.metadata.get(STORED, {}).get(UNTIL, ""))
     except ValueError:
         return ()
     if until - end > ROUNDING:
-        return (Diagnostic("RUN104", f"the log is incomplete: it ends at {end:.3f} s, and the run at {until:.3f} s"),)
+        return (Diagnostic("RUN104", f"the log is incomplete: it ends at {end:.3f} s, the run at {until:.3f} s"),)
     return ()
 
 
@@ -125,7 +126,7 @@ def _verdict(
     steps: tuple[StepOutcome, ...],
     expectations: tuple[ExpectationOutcome, ...],
 ) -> tuple[VerdictWord, str]:
-    """The word, and in one line why. `cause`: what ended the simulation, in a step, before the first or after all."""
+    """The verdict, and its reason in one line. `cause`: what ended the simulation early; "" if nothing did."""
     if errors:
         return "error", errors[0].message
     if cause and not any(step.went_wrong for step in steps):
@@ -135,19 +136,19 @@ def _verdict(
         why = f": {undone.text}" if undone.text else ""
         first = undone.attempts[0].text if undone.attempts else ""
         if first not in ("", undone.text):
-            why += f" (the first attempt: {first})"
+            why += f" (first attempt: {first})"
         return "failed", f"step '{undone.id}' {undone.outcome.replace('_', ' ')}{why}"
     if not steps:
-        return "failed", "the recording knows no steps"
-    unmet = next((one for one in expectations if one.outcome != "passed"), None)
+        return "failed", "the recording has no steps"
+    unmet = next((expectation for expectation in expectations if expectation.outcome != "passed"), None)
     if unmet is not None:
         why = f": {unmet.text}" if unmet.text else ""
         return "failed", f"expectation '{unmet.name}' {unmet.outcome.replace('_', ' ')}{why}"
-    done = f"all {len(steps)} steps done" if len(steps) > 1 else "its one step done"
+    done = f"all {len(steps)} steps done" if len(steps) > 1 else "1 step done"
     failed = [step.id for step in steps if step.tolerated]
     if failed:
-        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, the task tolerates that {listed(failed)} failed"
+        done = f"{len(steps) - len(failed)} of {len(steps)} steps done, failure of {listed(failed)} tolerated"
     if not expectations:
-        return "passed", f"{done}; the task states no expectations"
-    met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "its one expectation met"
+        return "passed", f"{done}; the task has no expectations"
+    met = f"all {len(expectations)} expectations met" if len(expectations) > 1 else "1 expectation met"
     return "passed", f"{done}, {met}"

@@ -1,4 +1,4 @@
-"""The spans of a recording as moments for conditions: in the order of robot and scene, with the contacts that hold."""
+"""State windows from the spans of a recording, in the joint and body order of robot and scene."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from manipcli.record.recording import Recording, Span
 from manipcli.scene.scene import Scene
 
 MOST_TICKS: Final = 1_000_000
-"""Of a span, half a second or so: a log that says it has more of them is not believed."""
+"""Most control ticks in a span of about half a second; a log with more is damaged and not expanded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Where the robot's joints and the scene's movable bodies stand in the recorded arrays."""
+    """Indices of the robot's joints and of the scene's movable bodies in the recorded arrays."""
 
     joints: list[int]
     bodies: list[int]
 
     @staticmethod
     def of(recording: Recording, robot: RobotModel, scene: Scene) -> Order | NotEvaluated:
-        """The order, or what is missing in the recording."""
+        """The indices, or what is missing in the recording."""
         bodies = tuple(body.name for body in scene.movable)
         for kind, wanted, there in (
             ("joint", robot.joint_names, recording.joint_names),
@@ -39,7 +39,7 @@ class Order:
         ):
             missing = [name for name in wanted if name not in there]
             if missing:
-                return NotEvaluated(f"the recording does not hold {kind} '{missing[0]}'")
+                return NotEvaluated(f"the recording has no {kind} '{missing[0]}'")
         return Order(
             [recording.joint_names.index(name) for name in robot.joint_names],
             [recording.body_names.index(name) for name in bodies],
@@ -61,30 +61,29 @@ class Order:
 
 
 def unrecorded(recording: Recording) -> dict[Seen, str]:
-    """Why nothing is known of what the task told not to record, or of what the log lost."""
+    """Why bodies, contacts or references are unknown: the task excludes them, or the log lost them."""
     words: dict[Seen, str] = {"bodies": TF, "contacts": CONTACTS, "references": "/controller_state"}
     absent = {
         seen: [topic for topic in recording.absent if topic == word or (seen == "references" and topic.endswith(word))]
         for seen, word in words.items()
     }
     found = {
-        seen: f"the log holds no {topics[0]}: `record:` of the task leaves it out"
+        seen: f"the log has no {topics[0]}: the task's `record:` excludes it"
         for seen, topics in absent.items()
         if topics
     }
     if CONTACTS in recording.silent:
-        found["contacts"] = f"{recording.unknown(CONTACTS)}, though every run records some"
+        found["contacts"] = f"{recording.unknown(CONTACTS)}, though every run records contacts"
     return found
 
 
 def at_every_tick(window: StateWindow, since: StateWindow | None, period: float) -> StateWindow:
-    """The moments of a thinned log at all control ticks, `period` [s] apart, up to the last of them; for conditions
-    that look at no state, of which it holds none there.
+    """The window of a thinned log at every control tick, with NaN states, for conditions that use no states.
 
     Args:
-        moments: those of a span.
-        since: what came of those before.
-        period: of control; 0 where the log does not say it.
+        window: of a span.
+        since: the result for the span before; None for the first.
+        period: control period [s]; 0: unknown, and the window is returned as it is.
     """
     if not period:
         return window
@@ -100,23 +99,23 @@ def at_every_tick(window: StateWindow, since: StateWindow | None, period: float)
 
 
 class WindowsOfSpans:
-    """Spans in, moments out, one after the other; keeps what the next ones need of the last."""
+    """Converts successive spans to state windows, with the last state and contacts of the span before."""
 
     def __init__(self, order: Order, steps: Sequence[StepOutcome]) -> None:
         self._order = order
         self._steps = tuple(
-            StepTime(one.id, one.started, one.ended, "" if one.ended is None else one.outcome) for one in steps
+            StepTime(step.id, step.started, step.ended, "" if step.ended is None else step.outcome) for step in steps
         )
         self._last: StateWindow | None = None
 
     def next(self, span: Span) -> StateWindow:
-        """The ticks of the span, of which there is one at least."""
+        """The window of a span with at least one tick."""
         held = self._last.contacts[-1:] if self._last is not None else ()
         self._last = StateWindow(
             states=self._order.applied(span.states),
             before=None if self._last is None else self._last.states.map(lambda a: a[-1]),
             references=tuple(Reference(trace.joints, trace.reference_position) for trace in span.controllers),
-            contacts=(*held, *(Touching(one.time, one.contacts) for one in span.contacts)),
+            contacts=(*held, *(Touching(change.time, change.contacts) for change in span.contacts)),
             steps=self._steps,
         )
         return self._last

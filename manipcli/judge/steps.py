@@ -1,4 +1,4 @@
-"""How each step of a recorded run went: what was planned, and what the events say became of it."""
+"""Outcomes of the steps of a recorded run, from its plan and its events."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from manipcli.record.recording import Recording, TaskEvent
 
 
 class RunStatus(StrEnum):
-    """How a run ended, in the metadata of its log: at its own end, whether its steps went well or not; because the
-    simulation could not go on; because somebody stopped it."""
+    """How a run ended, in the metadata of its log: finished (with or without failed steps), simulation failed, or
+    interrupted by the user."""
 
     COMPLETE = "complete"
     FAILED = "failed"
@@ -23,14 +23,14 @@ class RunStatus(StrEnum):
 
 
 ENDED = (RunStatus.COMPLETE, RunStatus.FAILED)
-"""Of a run that nobody stopped."""
+"""The statuses of a run that was not interrupted."""
 
 
 def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutcome, ...]:
-    """One outcome a step, in the order of the plan; without a plan in the log, in the order they started.
+    """The outcome of each step, in the order of the plan; without a plan in the log, in the order of their starts.
 
-    A step that started and never ended was `interrupted` when the run was, else `failed`; one that never started is
-    `not_run`. Of several attempts at one step the last counts.
+    A step without an end is `interrupted` if the run was, else `failed`; a step without a start is `not_run`. The last
+    attempt counts.
     """
     plan = PlanOutline.read(recording.attachments.get(PLAN_FILE))
     planned = [(step.id, step.verb, step.planned_duration) for step in plan.steps]
@@ -45,14 +45,15 @@ def step_outcomes(recording: Recording, *, interrupted: bool) -> tuple[StepOutco
 
 
 def left_out(recording: Recording) -> str:
-    """What of its events the log of a complete run lacks; "" where it lacks none.
+    """Which events are missing in the log of a complete run; "" if none are.
 
-    Such a run tells the beginning of a step at least, and the end of every step that it began.
+    A complete run has at least one start of a step, and an end for every start.
     """
     if EVENTS in recording.silent:
         return recording.unknown(EVENTS)
-    begun = next((one for one in step_outcomes(recording, interrupted=True) if one.outcome == "interrupted"), None)
-    return "" if begun is None else f"there is no end of step '{begun.id}', though the run came to its end"
+    outcomes = step_outcomes(recording, interrupted=True)
+    begun = next((step for step in outcomes if step.outcome == "interrupted"), None)
+    return "" if begun is None else f"the end of step '{begun.id}' is missing, though the run finished"
 
 
 def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEvent], interrupted: bool) -> StepOutcome:
@@ -74,7 +75,7 @@ def _outcome(step_id: str, verb: str, duration: float, events: Iterable[TaskEven
 
 
 def _attempts(events: Sequence[TaskEvent], interrupted: bool) -> Iterator[Attempt]:
-    """From each start to the last end before the next one; those of one step."""
+    """The attempts in the events of one step: each from its start to the last end before the next start."""
     starts = [k for k, event in enumerate(events) if event.kind == "step_started"]
     for start, stop in pairwise([*starts, len(events)]):
         begun = events[start].time

@@ -1,4 +1,4 @@
-"""What judging gives: one outcome a step, one an expectation, and the verdict over all."""
+"""The verdict on a run, with the outcomes of its steps and expectations."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ ExpectationWord = Literal["passed", "failed", "not_evaluated"]
 StepWord = Literal["done", "failed", "timeout", "interrupted", "not_run"]
 
 INTERRUPTED = "RUN101"
-"""The code of the error that says: somebody stopped the run, in the middle of a step or between two."""
+"""Code of the error of a run that was interrupted by the user."""
 
 
 def broken_at(watch: str) -> str:
-    """How a log begins to tell that the watch of this name ended the run."""
+    """How the text of an event begins whose watch ended the run."""
     return f"'{watch}' is broken at "
 
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """One attempt at a step: from when to when [s], and how it ended."""
+    """An attempt at a step: start and end [s], and outcome."""
 
     outcome: StepWord
     started: float
@@ -35,11 +35,16 @@ class Attempt:
 
 @dataclass(frozen=True, slots=True)
 class StepOutcome:
-    """How one step went; times in simulated seconds, None where it never started or ended.
+    """The outcome of a step.
 
-    `planned_duration`: None where it has no plan. `outcome` and `text` are those of the last of `attempts`.
-    `tolerated`: it failed, and the task says that it may.
-    `replanned`: each time that it was planned again while the task ran, why.
+    Attributes:
+        id, verb: of the step.
+        outcome, text: of its last attempt.
+        started, ended: simulated time [s]; None if it never started or ended.
+        planned_duration: [s]; None without a plan.
+        attempts: in order.
+        tolerated: it failed, and the task tolerates that (`on_fail: continue`).
+        replanned: the reason of each re-planning during the run.
     """
 
     id: str
@@ -55,19 +60,28 @@ class StepOutcome:
 
     @property
     def label(self) -> str:
-        """Its id, and its verb where that does not say it."""
+        """Its id, followed by its verb unless the id begins with it."""
         return self.id if self.id.startswith(self.verb) else f"{self.id} ({self.verb})"
 
     @property
     def went_wrong(self) -> bool:
-        """Whether it was not done though it was its turn, and the task does not say that it may fail."""
+        """Whether it ran and was not done, and the task does not tolerate that."""
         return self.outcome not in ("done", "not_run") and not self.tolerated
 
 
 @dataclass(frozen=True, slots=True)
 class ExpectationOutcome:
-    """How one expectation was met. `margin` in `unit` is below 0 when it is not; `at` [s] is its worst moment;
-    `relative`: the margin over its tolerance, by which those of other units compare."""
+    """The outcome of an expectation.
+
+    Attributes:
+        name: in reports.
+        outcome: `passed`, `failed` or `not_evaluated`.
+        margin: in `unit`, negative if it failed; None if not evaluated.
+        unit: SI.
+        at: [s] the time of the deciding tick.
+        text: the measurement.
+        relative: the margin divided by its tolerance, to compare margins of different units.
+    """
 
     name: str
     outcome: ExpectationWord
@@ -79,20 +93,21 @@ class ExpectationOutcome:
 
     @property
     def distance(self) -> float:
-        """How much in `unit` was to spare, or by how much it is missed; 0 where there is nothing to tell a reader.
-
-        So it is with what never touched, and with what has no unit.
-        """
+        """|margin| in `unit`; 0 if it is too small to show, or if there is no unit."""
         size = abs(self.margin or 0.0)
         return size if self.unit and size > EDGE else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The judgement of one recording. `errors`: why there is none, or why it is incomplete or was never made.
+    """The verdict on a recording.
 
-    `drawn`: which sample of the task's `vary:` it is of; None: the task as it is written.
-    `cuts`: what was asked for more than it can give.
+    Attributes:
+        verdict, text: the result, and its reason in one line.
+        simulated_time: [s] of the last tick.
+        errors: why the recording cannot be judged: no run, an interrupted run, or an incomplete log.
+        drawn: the sample of the task's `vary:`; None: the task as written.
+        cuts: saturation of joints and actuators.
     """
 
     task: str
@@ -109,8 +124,8 @@ class Verdict:
 
     @property
     def ended_between(self) -> bool:
-        """Whether the run ended before its first step or after its last: neither step nor expectation says why."""
+        """Whether the run ended before its first step or after its last, so that no step or expectation shows why."""
         if any(step.went_wrong for step in self.steps):
             return False
         undone = any(step.outcome == "not_run" for step in self.steps)
-        return undone or all(one.outcome == "passed" for one in self.expectations)
+        return undone or all(expectation.outcome == "passed" for expectation in self.expectations)

@@ -1,10 +1,11 @@
 """Definition of a grasp: pressing links, pinched objects and carried objects.
 
 - *pressing*: the links of the robot that touch an object with force.
-- *pinched*: at least two links press, each with at least `GRIP_FORCE`. The conditions `grasped` and `slip` and the end
-  of `release` ask this. It needs contacts only.
-- *carried*: a link presses, and the object has followed at least `FOLLOWS` of the motion of the hand.
-  Every step that ends with an object in the hand asks this, and so does planning again. It needs poses, too.
+- *pinched*: at least two links press, each with at least `GRIP_FORCE`. Used by the conditions `grasped` and
+  `slip` and by the end of `release`; needs contacts only.
+- *carried*: a link presses, and the object has followed at least `FOLLOWS` of the hand's motion, since
+  the hand closed and since the step began. Used by every step that ends with an object in the hand, and by re-planning;
+  needs contacts and poses.
 
 The condition `slip` and the grasp intervals of a report build on `pressing`: `slip` measures how far a pinched object
 moved in the hand, an interval is the time in which an object is pressed and has no other support.

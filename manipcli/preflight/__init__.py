@@ -1,1 +1,1 @@
-"""What is doubted of a task before it runs: gains, efforts, grips and timeouts, each a check of its own."""
+"""Checks of a task before its run: gains, efforts, grasps and timeouts, one check per file."""

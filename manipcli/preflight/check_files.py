@@ -1,4 +1,4 @@
-"""Files checked, and the words that files may use: what `check`, `list` and `schema` ask."""
+"""The findings of files, and the names and schemas of file formats, for `check`, `list` and `schema`."""
 
 from __future__ import annotations
 
@@ -35,12 +35,13 @@ def check_files(
     package_path: Sequence[Path] = (),
     allow_outside: bool = False,
 ) -> tuple[Diagnostic, ...]:
-    """Every finding of every file, once; a task is checked with the robot and controllers files that it names.
+    """The findings of all files, without duplicates; a task is checked with its robot and controllers files.
 
     Args:
         paths: task, robot and controllers files, URDF and xacro.
-        overrides, seed, sample: of the tasks among them, as of `load_task`.
-        package_path, allow_outside: where packages are, and whether a file may lie outside of them.
+        overrides, seed, sample: for the tasks, see `load_task`.
+        package_path: folders with packages.
+        allow_outside: whether a file may be outside of these folders.
     """
 
     def of_task(path: Path) -> Task:
@@ -72,7 +73,7 @@ def _findings(
 
 
 def kind_of(path: Path) -> load.FileKind | None:
-    """Which of the three files this is; None if it is none, or cannot be read."""
+    """The kind of a file: task, robot or controllers; None if it is another or cannot be read."""
     try:
         return load.kind_of(path, types=CONTROLLERS.names)
     except InvalidInput:
@@ -80,7 +81,7 @@ def kind_of(path: Path) -> load.FileKind | None:
 
 
 def words(kind: str) -> tuple[str, ...]:
-    """The words that files may use (`steps`, `expectations`, `conditions`, `shapes`, `engines`); codes (`checks`)."""
+    """The names in files (`steps`, `expectations`, `conditions`, `shapes`, `engines`), or the codes of `checks`."""
     known = {
         "steps": STEPS.names,
         "expectations": (*CONDITIONS.names, *COMBINATIONS, *QUANTIFIERS),

@@ -1,4 +1,4 @@
-"""All preflight checks asked about one task."""
+"""The findings of all preflight checks of a task."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from manipcli.task.task import Task
 def preflight_findings(
     task: Task, plan: Plan | None = None, *, checks: Seam[Check] = PREFLIGHT_CHECKS
 ) -> tuple[Diagnostic, ...]:
-    """Warnings about gains, efforts, grips and timeouts, with the number that would do, each at its place in its file.
+    """Warnings about gains, efforts, grasps and timeouts, with a value that works, each at its place in its file.
 
-    On an engine without physics gains, efforts and forces are not examined.
+    For an engine without physics, gains, efforts and forces are not checked.
 
     Args:
-        task: what is run.
-        plan: its plan; None: it is planned here; where that fails, the refusal is among the findings, and gains are
-            examined at the named poses.
+        task: the task to check.
+        plan: its plan; None: plan it here. If planning fails, the findings include the refusal, and gains are checked
+            at the named poses.
         checks: the registry.
     """
     found: list[Diagnostic] = []

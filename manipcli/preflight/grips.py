@@ -1,4 +1,4 @@
-"""Grasps of a plan, and the forces that fingers can press with: what several checks of grips ask."""
+"""The grasps of a plan and the grip forces of fingers, for several preflight checks."""
 
 from __future__ import annotations
 
@@ -19,15 +19,23 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 LIGHT: Final = 740.0
-"""[N/kg] A force so large for the mass may let an object creep. Measured in carries of 2 to 5 s: two fingers by 0.2 to
-0.4 mm up to 3500 N/kg, and by 1.5 mm at 7000; three by 0.4 mm at 400 N/kg, by 2 to 3 mm from 800 on."""
+"""[N/kg] Above this force per mass an object may creep in the hand. Measured over carries of 2 to 5 s: with two fingers
+0.2 to 0.4 mm up to 3500 N/kg and 1.5 mm at 7000; with three 0.4 mm at 400 N/kg and 2 to 3 mm from 800 on."""
 NUDGE: Final = 1e-4
-"""[rad or m] by which a finger is moved to see how its parts move."""
+"""[rad or m] Step of a finger joint for finite differences."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grasp:
-    """The hand is to close with `force` [N] in a step, number `index`, which ends in `end`; `target`: of its joints."""
+    """A grasp of a plan.
+
+    Attributes:
+        index, step: number and id of the step.
+        end: planned state at the end of the step.
+        force: [N] asked for.
+        joints: of the hand.
+        target: (n) [rad or m] where they are commanded to.
+    """
 
     index: int
     step: str
@@ -38,7 +46,7 @@ class Grasp:
 
 
 def grasps(plan: Plan) -> Iterator[Grasp]:
-    """Every one for which a force is known."""
+    """All grasps of a plan that have a force."""
     for k, step in enumerate(plan.steps):
         for grip in (motion.grip for motion in step.plan.motions):
             if grip is not None and grip.force is not None:
@@ -46,9 +54,9 @@ def grasps(plan: Plan) -> Iterator[Grasp]:
 
 
 def largest_force(subject: Subject, name: str) -> float:
-    """[N] with which a finger can press whose joint slides; infinite of one that turns.
+    """[N] The largest force of a finger with a prismatic joint; infinite for a revolute joint.
 
-    Fingers that mimic it take their part: the effort is that of all of them, f (1 + sum |multiplier|).
+    Fingers that mimic the joint share its effort: effort = f (1 + sum |multiplier|).
     """
     joint = subject.task.robot.joint(name)
     if joint.type != "prismatic":
@@ -59,32 +67,32 @@ def largest_force(subject: Subject, name: str) -> float:
 
 
 def effort_per_force(task: Task, name: str) -> float:
-    """The effort of a joint that slides for each newton with which its finger, and those that mimic it, press."""
-    mimics = [one.mimic for one in task.robot.joints if one.mimic is not None and one.mimic.joint == name]
+    """The effort of a prismatic joint per newton of its finger and of each finger that mimics it."""
+    mimics = [joint.mimic for joint in task.robot.joints if joint.mimic is not None and joint.mimic.joint == name]
     return 1.0 + sum(abs(mimic.multiplier) for mimic in mimics)
 
 
 def sensible_force(task: Task, end: PlanningState, force: float) -> float:
-    """[N] of a grasp, reduced to what a light object takes, so that all findings on a grasp agree."""
+    """[N] The force of a grasp, at most `LIGHT` times the mass of the object, so that all findings agree."""
     return force if end.carried is None else min(force, LIGHT * task.scene.body(end.carried.body).mass)
 
 
 def touched_parts(planner: Planner, end: PlanningState) -> set[str]:
-    """The parts that touch what is carried, and itself; empty where nothing is."""
+    """The carried object and the parts in contact with it; empty if nothing is carried."""
     if end.carried is None:
         return set()
     return {part for hit in planner.grasping(end, end.carried.body).every(end.position) for part in (hit.a, hit.b)}
 
 
-def closing_rate(planner: Planner, situation: PlanningState, name: str, touched: Collection[str]) -> float:
-    """How fast a joint, with those that mimic it, closes the gap between the parts that touch, at the tool's point.
+def closing_rate(planner: Planner, state: PlanningState, name: str, touched: Collection[str]) -> float:
+    """Closing speed of the gap between the parts in contact per joint velocity, at the tool point [m/rad or 1].
 
-    |dp_1/dq - dp_2/dq| of two sides, |dp/dq| of one that slides [m/rad or 1]; 0 where it is neither.
+    |dp_1/dq - dp_2/dq| for two moving sides, |dp/dq| for one prismatic side; 0 otherwise.
     """
     robot, kinematics = planner.robot, planner.kinematics
     mover = {joint.child: joint for joint in robot.joints}
-    p_WT = planner.tool_pose(situation).p
-    q = np.array(situation.position)
+    p_WT = planner.tool_pose(state).p
+    q = np.array(state.position)
     q[robot.joint_names.index(name)] += NUDGE
     nudged = with_mimics(robot, q)
     sides: dict[str, Array] = {}
@@ -97,7 +105,7 @@ def closing_rate(planner: Planner, situation: PlanningState, name: str, touched:
             if joint.name == name or (joint.mimic is not None and joint.mimic.joint == name):
                 side = above
             above = joint.parent
-        p_LT = kinematics.forward(situation.position, link).inverse().apply(p_WT)
+        p_LT = kinematics.forward(state.position, link).inverse().apply(p_WT)
         sides[side] = (kinematics.forward(nudged, link).apply(p_LT) - p_WT) / NUDGE
     rates = list(sides.values())
     if len(rates) == 1 and robot.joint(name).type == "prismatic":

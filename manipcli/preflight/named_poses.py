@@ -17,9 +17,9 @@ from manipcli.spec.robot import RobotSpec
 
 
 def pose_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagnostic]:
-    """A warning for every pair of links that overlap in a named pose; other joints are as at `home`, if there is one.
+    """A warning for every pair of links that overlap in a named pose; other joints are as in `home`, if it exists.
 
-    Left out: neighbours, pairs that overlap with all joints at zero, and those of `collision_ignore`.
+    Ignored: adjacent links, pairs that overlap with all joints at zero, and pairs of `collision_ignore`.
     """
     nothing = Scene(bodies=(), frames=(), gravity=np.zeros(3))
     query = CollisionChecker(Kinematics(robot), nothing, ignore=robot.collision_ignore).at()
@@ -31,6 +31,6 @@ def pose_findings(file: Located[RobotSpec], robot: RobotModel) -> Iterator[Diagn
                 code="ROBOT347",
                 message=f"pose '{pose.name}': links '{a}' and '{b}' overlap by {hit.amount}",
                 place=file.place("poses", pose.name),
-                hint="change the pose; or list the pair under `collision_ignore` if the links may touch",
+                hint="change the pose, or list the pair under `collision_ignore` if the links may touch",
                 severity="warning",
             )

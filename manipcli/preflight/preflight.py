@@ -1,6 +1,6 @@
-"""The contract of preflight checks: a task, and its plan where there is one, in; warnings out.
+"""The contract of preflight checks: warnings about a task and its plan, before the run.
 
-A check that concerns a controller asks its member of the seam (`loop`, `hand`), never its class.
+A check of a controller uses the `loop` and `hand` of its member of the seam, never its class.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from manipcli.task.switches import active_in
 from manipcli.task.task import Task
 
 PER_MOTION: Final = 12
-"""Configurations that are examined of each planned motion."""
+"""Number of checked configurations per planned motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +34,12 @@ class ControlledJoint:
     """A joint that a controller commands.
 
     Attributes:
-        controller, name: of both.
-        interfaces: that the controller commands.
-        loop: its control law.
+        controller: name of the controller.
+        name: of the joint.
+        interfaces: command interfaces of the controller.
+        loop: control law of the joint.
         ticks: control ticks between two updates.
-        place: where its gains are written, or the joints of the controller.
+        place: of its gains in the file, or of the joints of the controller.
     """
 
     controller: str
@@ -50,18 +51,18 @@ class ControlledJoint:
 
     @property
     def gains(self) -> GainsSpec | None:
-        """Of its PID; None where it has no PID loop."""
+        """Gains of its PID loop; None if it has another loop."""
         return self.loop.gains.get(self.name, GainsSpec()) if isinstance(self.loop, PidLoop) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shift:
-    """A part of a task in which the same controllers are active, and the configurations of the robot in it.
+    """The parts of a task with the same active controllers, and the configurations of the robot in them.
 
     Attributes:
-        joints: those that are commanded, in the order of the controllers file.
-        configurations: of the planned motions; of the named poses where there is no plan.
-        load: (joints) -> what they meet over the configurations when no other is driven.
+        joints: commanded joints, in the order of the controllers file.
+        configurations: of the planned motions; without a plan, of the named poses.
+        load: (joints) -> their joint-space load over the configurations, with all other joints free.
     """
 
     joints: tuple[ControlledJoint, ...]
@@ -70,23 +71,23 @@ class Shift:
 
     @property
     def pid_efforts(self) -> tuple[ControlledJoint, ...]:
-        """Those with a PID loop on efforts."""
-        return tuple(one for one in self.joints if one.interfaces == ("effort",) and one.gains is not None)
+        """The joints with a PID loop on effort."""
+        return tuple(joint for joint in self.joints if joint.interfaces == ("effort",) and joint.gains is not None)
 
     @property
     def servos(self) -> tuple[ControlledJoint, ...]:
-        """Those that the engine's own motors move, by positions or velocities."""
-        return tuple(one for one in self.joints if "effort" not in one.interfaces)
+        """The joints commanded by position or velocity, which the motors of the engine follow."""
+        return tuple(joint for joint in self.joints if "effort" not in joint.interfaces)
 
     @property
     def other_efforts(self) -> tuple[ControlledJoint, ...]:
-        """Those on efforts without a PID loop."""
-        return tuple(one for one in self.joints if "effort" in one.interfaces and one.gains is None)
+        """The joints commanded by effort without a PID loop."""
+        return tuple(joint for joint in self.joints if "effort" in joint.interfaces and joint.gains is None)
 
 
 @dataclass(frozen=True, slots=True)
 class HandJoint:
-    """A joint of a hand: its controller, what limits that, and its gains (zero where it has no PID loop)."""
+    """A joint of a hand: its controller, the settings of the hand, and its gains (zero without a PID loop)."""
 
     controller: str
     settings: HandSettings
@@ -95,7 +96,7 @@ class HandJoint:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is examined: a task, and its plan."""
+    """The checked task and its plan; `made` None: it could not be planned."""
 
     task: Task
     made: Plan | None
@@ -107,18 +108,18 @@ class Subject:
 
     @property
     def plan(self) -> Plan:
-        """For checks that need one; they are not asked without."""
+        """The plan, for checks with `needs_plan`."""
         assert self.made is not None
         return self.made
 
     @property
     def kind(self) -> str:
-        """What the configurations of its shifts are, in words."""
-        return f"{'planned' if self.planned else 'named'} postures"
+        """`planned configurations` or `named configurations`, those of its shifts."""
+        return f"{'planned' if self.planned else 'named'} configurations"
 
     @cached_property
     def hand_joints(self) -> Mapping[str, HandJoint]:
-        """By joint, those of controllers of the role `hand`."""
+        """The joints of all hand controllers, by name."""
         found: dict[str, HandJoint] = {}
         for name, spec in self.task.controllers.controllers.items():
             member = CONTROLLERS[spec.type]
@@ -131,7 +132,7 @@ class Subject:
 
     @cached_property
     def shifts(self) -> tuple[Shift, ...]:
-        """One for each set of active controllers."""
+        """A shift for each set of active controllers."""
         robot = self.task.robot
         in_steps = tuple(active_in(self.task.spec.steps, Claims.of(self.task.controllers), robot))
         kinematics = Kinematics(robot, gravity=self.task.scene.gravity)
@@ -169,11 +170,11 @@ class Check:
     """A member of the seam.
 
     Attributes:
-        name: of the check, as its file.
+        name: that of its file.
         codes: of its findings.
         findings: (subject) -> warnings, each at its place in its file.
-        needs_plan: it is not asked where the task could not be planned.
-        needs_physics: it is not asked where the engine has no physics, so that references are met whatever the effort.
+        needs_plan: skipped for a task that could not be planned.
+        needs_physics: skipped for an engine without physics, where tracking is ideal.
     """
 
     name: str
@@ -183,13 +184,14 @@ class Check:
     needs_physics: bool = True
 
 
-def once(doubts: Iterable[tuple[str, Diagnostic]]) -> Iterator[Diagnostic]:
-    """The first finding of each code, place and joint: a controller that stays active is examined in each shift.
+def once(findings: Iterable[tuple[str, Diagnostic]]) -> Iterator[Diagnostic]:
+    """The first finding of each code, place and joint: a controller can be active in several shifts.
 
-    `doubts`: (joint, finding); "" as the joint where a finding is about several.
+    Args:
+        findings: (joint, finding); the joint is "" for a finding about several joints.
     """
     reported = set()
-    for joint, finding in doubts:
+    for joint, finding in findings:
         key = (finding.code, finding.place, joint)
         if key not in reported:
             reported.add(key)
@@ -198,7 +200,7 @@ def once(doubts: Iterable[tuple[str, Diagnostic]]) -> Iterator[Diagnostic]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sample:
-    """All joints (n) in a motion of a step: 1 + its index, or 0 before the first of them."""
+    """All joints (n) in a motion of step number `step`, from 1; 0: before the first step."""
 
     step: int
     position: Array
@@ -207,7 +209,7 @@ class _Sample:
 
 
 def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
-    """Samples of all motions, the other joints as they are then."""
+    """Samples of all motions; joints outside of a motion keep their position."""
     robot = task.robot
     here, still = np.array(plan.start.position), np.zeros(len(robot.joint_names))
     samples = [_Sample(0, here, still, still)]
@@ -228,7 +230,7 @@ def _planned(task: Task, plan: Plan) -> tuple[_Sample, ...]:
 
 
 def _while(samples: tuple[_Sample, ...], there: list[bool]) -> Configurations:
-    """Those of the steps in which they are `there`; as in the samples, the first is the time before all steps."""
+    """The samples of the steps whose entry in `there` is True; entry 0 is the time before the first step."""
     chosen = [sample for sample in samples if there[sample.step]]
     return Configurations(
         np.array([sample.position for sample in chosen]),

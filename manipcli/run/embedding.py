@@ -1,4 +1,4 @@
-"""The mesh files that a log carries: what they are called in it, and which other files they need."""
+"""Mesh files embedded in a log: attachment names, and the material files that meshes need."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9._-]+")
 
 @dataclass(frozen=True, slots=True)
 class EmbeddedFile:
-    """A file, the URI that stands for it, and the name of its attachment."""
+    """A file, its URI in the description, and the name of its attachment."""
 
     uri: str
     path: Path
@@ -21,9 +21,9 @@ class EmbeddedFile:
 
 
 def embeddable(meshes: Mapping[str, Path]) -> tuple[EmbeddedFile, ...]:
-    """The meshes (URI -> file) and the material libraries of OBJ files beside them, each with a name of its own.
+    """The meshes (URI -> file) and the material libraries of OBJ files in the same folders, with unique names.
 
-    A name is a number and what is safe of the last part of the URI: two packages may both have a `base.stl`.
+    A name is a number and the last part of the URI without special characters: two packages can have a `base.stl`.
     """
     files = dict(meshes)
     for uri, path in meshes.items():

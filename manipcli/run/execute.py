@@ -1,4 +1,4 @@
-"""The plan carried out in an engine: the world is opened, comes to rest, and the steps are run in it."""
+"""Execution of a plan in an engine: open the world, let it settle, run the steps."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from manipcli.task.task import Task
 SETTLED_SPEED: Final = 0.02
 """Bodies slower than this [m/s] have settled."""
 SETTLED_SHIFT: Final = 0.01
-"""A body that moves further than this [m] while settling was put where it cannot stay."""
+"""Largest displacement [m] of a body while settling."""
 
 
 def build_manager(task: Task, kinematics: Kinematics | None = None) -> ControllerManager:
     """The task's controllers, for its robot, gravity and control period.
 
     Args:
-        task: whose files say what the controllers know of the robot and of gravity; what was drawn acts on neither.
-        kinematics: of the robot under that gravity, if they are at hand.
+        task: its files define the robot and the gravity that controllers assume; a drawn sample changes neither.
+        kinematics: of the robot under that gravity; None: build them here.
     """
     file = task.true.controllers
     period = task.spec.simulation.control_period
@@ -50,7 +50,7 @@ def build_manager(task: Task, kinematics: Kinematics | None = None) -> Controlle
 
 @dataclass(frozen=True, slots=True)
 class SimulationEnd:
-    """How a simulation ended; `replanning`: wall time [s] spent planning steps again."""
+    """How a simulation ended, and its cause; `replanning`: wall time [s] of re-planning."""
 
     status: RunStatus
     cause: str
@@ -60,9 +60,9 @@ class SimulationEnd:
 def simulate(
     task: Task, plan: Plan, manager: ControllerManager, recorder: Recorder, progress: Progress
 ) -> SimulationEnd:
-    """Run the plan in the task's engine, up to its end, a failure of the physics or an interruption.
+    """Run the plan in the task's engine until its end, a failure of the simulation or an interruption.
 
-    Everything that happened is in the recorder afterwards.
+    The recorder then holds the whole run.
     """
     replanning = Stopwatch()
     status, cause = RunStatus.COMPLETE, ""
@@ -109,7 +109,7 @@ def _run_steps(
             live = Live(_world(task, plan, session), manager.controllers, simulation.control_period)
             observer = Observer(recorder, live, progress, simulation.control_period)
             session.restart_clock(observer)
-            run = StepLoop(task, plan, session, recorder, live, progress, told=observer.goal, replanning=replanning)
+            run = StepLoop(task, plan, session, recorder, live, progress, on_goal=observer.goal, replanning=replanning)
             try:
                 run.steps()
             finally:
@@ -120,20 +120,20 @@ def _run_steps(
 
 
 def _world(task: Task, plan: Plan, session: Session) -> World:
-    """What live conditions are asked in, which is what the log will tell the judge; now is time 0."""
+    """The world of live conditions, equal to the one that judging builds from the log; now is time 0."""
     return World(
         task.robot,
         task.true.scene,
         start=session.engine.read().map(np.copy),
         physics=ENGINES[task.spec.simulation.engine].physics == "full",
-        referenced=frozenset(name for one in session.manager.controllers if one.interfaces for name in one.joints),
+        referenced=frozenset(name for c in session.manager.controllers if c.interfaces for name in c.joints),
         steps=tuple(step.id for step in plan.steps),
         period=task.spec.simulation.control_period,
     )
 
 
 def _settle(task: Task, session: Session) -> None:
-    """Let everything come to rest, and refuse a start from which something slides, falls or is thrown.
+    """Let all bodies settle, and refuse a start from which a body slides, falls or is thrown.
 
     Raises:
         SimulationFailed: names the body, and how far or how fast it moved.
@@ -145,9 +145,12 @@ def _settle(task: Task, session: Session) -> None:
         speed = float(np.linalg.norm(state.body_linear[k]))
         if not shift < SETTLED_SHIFT:
             raise SimulationFailed(
-                f"'{body.name}' moved by {1000 * shift:.1f} mm while the world came to rest: it overlaps something, "
-                "stands on nothing, or something ran into it",
+                f"'{body.name}' moved {1000 * shift:.1f} mm while settling, the limit is {1000 * SETTLED_SHIFT:g} mm: "
+                "it overlaps another body, has no support, or was hit",
                 time=0.0,
             )
         if not speed < SETTLED_SPEED:
-            raise SimulationFailed(f"'{body.name}' does not come to rest ({speed:.3g} m/s before the start)", time=0.0)
+            raise SimulationFailed(
+                f"'{body.name}' still moves at {speed:.3g} m/s after settling, the limit is {SETTLED_SPEED:g} m/s",
+                time=0.0,
+            )

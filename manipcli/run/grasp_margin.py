@@ -1,4 +1,4 @@
-"""What the hand holds things with: how hard it pressed, and what friction can carry at that."""
+"""Grasp margin: the grip force at a grasp, and the load that friction can carry with it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from manipcli.model.state import Contact
 from manipcli.scene.scene import Scene
 
 AMPLE = 3.0
-"""Friction that carries this many times the weight is not what a held thing was lost for."""
+"""Ratio of friction to weight above which the grip force is not the cause of a lost object."""
 
 
 class GraspMargin:
-    """Remembers each grasp, to say why what was taken is no longer there.
+    """Stores the contact forces of each grasp, to explain a lost object.
 
     Args:
-        robot, scene: the world as it is.
+        robot, scene: the true world.
     """
 
     def __init__(self, robot: RobotModel, scene: Scene) -> None:
@@ -29,14 +29,14 @@ class GraspMargin:
         self._pressed: dict[str, list[tuple[float, str]]] = {}
 
     def taken(self, body: str, contacts: Sequence[Contact]) -> None:
-        """The hand has closed on a body, and touches this."""
+        """Store the contacts at the end of a grasp of a body."""
         self._pressed[body] = pressing(contacts, body)
 
-    def told(self, name: str) -> str:
-        """The force N of the hand on a body at the grasp, the mu N that friction can carry, its weight m g, and the
-        acceleration mu N / m - g that is left; where that is ample, the links that pressed.
+    def summary(self, name: str) -> str:
+        """The grip force N at the grasp, its friction limit mu N, the weight m g, and the acceleration mu N / m - g.
 
-        The friction of a contact is the product of the two surfaces', as in Bullet.
+        If friction is ample, the links in contact instead of the acceleration. The friction coefficient mu of a contact
+        is the product of those of the two surfaces, as in Bullet. "" for a body that was not grasped.
         """
         taken = self._pressed.get(name)
         if taken is None:
@@ -45,11 +45,11 @@ class GraspMargin:
         body = self._scene.body(name)
         friction = body.friction * self._robot.friction
         weight = body.mass * float(np.linalg.norm(self._scene.gravity))
-        grasp = f"the hand took it with {readable(pressed, 'N')}, of which friction {friction:.3g}"
+        grasp = f"grip force {readable(pressed, 'N')}: friction {friction:.3g}"
         shares = f"({body.friction:.3g} x {self._robot.friction:.3g} of the hand)"
-        told = f"{grasp} {shares} carries {readable(friction * pressed, 'N')}; it alone weighs {readable(weight, 'N')}"
+        text = f"{grasp} {shares} carries {readable(friction * pressed, 'N')}, its weight is {readable(weight, 'N')}"
         if friction * pressed > AMPLE * weight:
             by = ", ".join(f"{link.partition('/')[2]} ({readable(force, 'N')})" for force, link in taken)
-            return f"{told}: enough force, so look at where it was held, by {by}"
+            return f"{text}; the force is sufficient, check the contact points: {by}"
         left = (friction * pressed - weight) / body.mass
-        return told if left <= 0.0 else f"{told}, which leaves {left:.2g} m/s2 to accelerate it with"
+        return text if left <= 0.0 else f"{text}; maximum lift acceleration before slip: {left:.2g} m/s2"

@@ -1,4 +1,4 @@
-"""Heavy libraries, imported before the stages that use them."""
+"""Import of heavy libraries before the stages that use them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manipcli.task.task import Task
 
 
 def load_libraries(task: Task) -> None:
-    """Import what later stages import at their first use, so that import time counts as loading."""
+    """Import the libraries that later stages import lazily, so that import time counts as loading."""
     for name in ("coal", "pinocchio", "ruckig", "mcap.records", "mcap.opcode", "zstandard"):
         import_module(name)
     retimer.library()

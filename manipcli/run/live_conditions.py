@@ -1,8 +1,7 @@
-"""A run as conditions see it while it goes on: the same moments that its recording will hold, some ticks at a time.
+"""Evaluation of conditions during a run, on the same state windows that its recording gives.
 
-Contacts are those that are recorded and times are rounded as in the log, so that what a probe answers live is what
-judging the log gives for the same ticks. Who listens to every answer is told at every tenth tick; the others are looked
-at when they are asked, or when there is no more room for what they have not seen.
+Contacts are the recorded ones and times are rounded as in the log, so a probe gives the same result as judging the log.
+Probes with a callback are evaluated every tenth tick; others when they are read, or when the buffer of ticks is full.
 """
 
 from __future__ import annotations
@@ -24,19 +23,18 @@ from manipcli.run.run_log import recorded
 from manipcli.simulate.session import SLOW
 from manipcli.spec.condition import ConditionSpec
 
-Told = Callable[[StateWindow, Robustness], None]
-"""Sees every answer of a probe: some ticks, and the margins on them. Neither is valid afterwards."""
-
+Callback = Callable[[StateWindow, Robustness], None]
+"""Receives each evaluation of a probe; both arguments are valid only during the call."""
 
 ROOM: Final = 500
-"""Ticks that are kept for probes that nobody asks."""
+"""Number of ticks in the buffer."""
 
 
 class Probe:
-    """A condition that is asked while the run goes on, from the tick at which it was opened."""
+    """A condition evaluated during the run, from the tick at which it was opened."""
 
     def __init__(
-        self, spec: ConditionSpec, world: World, first: int, told: Told | None, catch_up: Callable[[], None]
+        self, spec: ConditionSpec, world: World, first: int, callback: Callback | None, catch_up: Callable[[], None]
     ) -> None:
         self._monitor = opened(spec, world, CONDITIONS)
         self._word = "" if spec.combines else f"{spec.name}: "
@@ -44,19 +42,19 @@ class Probe:
         self._catch_up = catch_up
         self._held = False
         self._last: Robustness | None = None
-        self.told = told
+        self.callback = callback
 
     @property
     def holds(self) -> bool:
-        """Whether it held at the last tick."""
+        """Whether it holds at the last tick."""
         self._catch_up()
         return self._held
 
     @property
     def missing(self) -> str:
-        """`it fails by 3 mm: near: 'cup' is at ...`: how far it was from holding at the last tick.
+        """Why it fails at the last tick: `it fails by 3 mm: near: 'cup' is ...`.
 
-        Only to be asked before the next tick, while the arrays of this one stand.
+        Read it before the next tick, which overwrites the arrays.
         """
         self._catch_up()
         if self._last is None:
@@ -67,24 +65,24 @@ class Probe:
         return f"it fails{found.lacking}: {self._word}{found.text}"
 
     def look(self, window: StateWindow, start: int) -> None:
-        """The ticks of `moments`, of which the first has the number `start`; those before the opening are left out."""
+        """Evaluate a window whose first tick has the number `start`, without ticks before the opening."""
         skipped = max(self._first - start, 0)
         if skipped >= len(window.times):
             return
         shown = window.part(skipped, len(window.times))
         answer = self._last = self._monitor(shown)
         self._held = bool(answer.applies[-1] and answer.margins[-1] >= 0.0)
-        if self.told is not None:
-            self.told(shown, answer)
+        if self.callback is not None:
+            self.callback(shown, answer)
 
 
 class Live:
-    """Gathers ticks and asks the open probes; an observer beside the recorder.
+    """Collects ticks and evaluates the open probes.
 
     Args:
         world: of the run.
         controllers: in the order of the outputs given to `tick`.
-        period: [s] of a tick.
+        period: [s] control period.
     """
 
     def __init__(self, world: World, controllers: Sequence[Controller], period: float) -> None:
@@ -109,7 +107,7 @@ class Live:
         self._next = 0
 
     def tick(self, tick: int, state: WorldState, outputs: Sequence[ControllerOutput | None]) -> None:
-        """The next tick; the arrays may be reused afterwards."""
+        """Add the next tick; the arrays are copied."""
         k = self._count
         self._numbers[k + 1] = state.numbers
         if self._probes:
@@ -121,47 +119,47 @@ class Live:
             self._ask()
 
     def contacts(self, tick: int, contacts: Sequence[Contact]) -> None:
-        """Everything that touches, as it is recorded; told before the tick."""
-        self._contacts.append(Touching(self._moment(tick), tuple(contacts)))
+        """Add a change of the recorded contacts, before its tick."""
+        self._contacts.append(Touching(self._time(tick), tuple(contacts)))
 
     def step_started(self, step: str) -> None:
         """The next tick is the first of a step."""
         if self._steps[step].started is None:
-            self._steps[step] = StepTime(step, self._moment(self._next), None, "")
+            self._steps[step] = StepTime(step, self._time(self._next), None, "")
 
     def step_ended(self, step: str, outcome: str) -> None:
         """The last tick was the last of a step."""
-        self._steps[step] = StepTime(step, self._steps[step].started, self._moment(self._next), outcome)
+        self._steps[step] = StepTime(step, self._steps[step].started, self._time(self._next), outcome)
 
     def absent(self, spec: ConditionSpec) -> str | None:
-        """Why a condition cannot be asked in this run, or None."""
+        """Why a condition cannot be evaluated in this run, or None."""
         return absent(spec, self._world, CONDITIONS)
 
-    def open(self, spec: ConditionSpec, *, told: Told | None = None) -> Probe:
-        """Ask a condition from the next tick on, until it is closed.
+    def open(self, spec: ConditionSpec, *, callback: Callback | None = None) -> Probe:
+        """Evaluate a condition from the next tick until it is closed.
 
         Args:
-            spec: one that is not `absent`.
-            told: called with every answer.
+            spec: a condition that is not `absent`.
+            callback: called with every evaluation.
         """
         self._ask()
-        probe = Probe(spec, self._world, self._next, told, self._ask)
+        probe = Probe(spec, self._world, self._next, callback, self._ask)
         self._probes.append(probe)
-        self._listens = self._listens or told is not None
+        self._listens = self._listens or callback is not None
         return probe
 
     def close(self, probe: Probe) -> None:
-        """Ask it about the ticks since it was asked last, and no more."""
+        """Evaluate the remaining ticks, then stop."""
         self._ask()
         self._probes.remove(probe)
-        self._listens = any(probe.told is not None for probe in self._probes)
+        self._listens = any(probe.callback is not None for probe in self._probes)
 
     def _ask(self) -> None:
-        """All probes, about the ticks that they have not seen."""
+        """Evaluate all probes on the buffered ticks."""
         if not self._count:
             return
         if self._probes:
-            window = self._moments()
+            window = self._window()
             start = self._next - self._count
             for probe in self._probes:
                 probe.look(window, start)
@@ -169,18 +167,20 @@ class Live:
         del self._contacts[:-1]
         self._count, self._first = 0, False
 
-    def _moments(self) -> StateWindow:
+    def _window(self) -> StateWindow:
         count = self._count
         first = self._next - count
-        self._rows.time[: count + 1] = [self._moment(tick) for tick in range(first - 1, self._next)]
+        self._rows.time[: count + 1] = [self._time(tick) for tick in range(first - 1, self._next)]
         return StateWindow(
             states=self._rows.map(lambda a: a[1 : count + 1]),
             before=None if self._first else self._before,
-            references=tuple(Reference(one.joints, one.position[:count]) for _, one in self._references),
+            references=tuple(
+                Reference(reference.joints, reference.position[:count]) for _, reference in self._references
+            ),
             contacts=tuple(self._contacts),
             steps=tuple(self._steps.values()),
         )
 
-    def _moment(self, tick: int) -> float:
-        """The time of a tick as the log has it: whole nanoseconds."""
+    def _time(self, tick: int) -> float:
+        """The time [s] of a tick as in the log, in whole nanoseconds."""
         return round(tick * self._period * 1e9) / 1e9

@@ -1,4 +1,4 @@
-"""What a task watches while it runs: the first moment at which a `never` holds, or an `always` does not."""
+"""Monitors of a task's `watch:` during a run: the first tick at which a `never` holds or an `always` fails."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from manipcli.spec.condition import ExpectationSpec, WatchSpec
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """Watch number `index` was broken; `text` says which, when, by how much and what was measured."""
+    """A broken watch; `index`: in the task; `text`: its name, the time, the amount and the measurement."""
 
     index: int
     text: str
 
 
 class Monitors:
-    """The watches of a run, each asked from the beginning of the first of its steps to the end of the last.
+    """The watches of a run, each active from the start of its first step to the end of its last step.
 
     Args:
         watches: of the task.
-        expect: its expectations, beside which the watches have their names.
-        live: answers them; what it cannot answer is not watched, and judged as not evaluated.
+        expect: its expectations, which share their names with the watches.
+        live: evaluates them; a watch that it cannot evaluate is skipped, and judged as not evaluated.
     """
 
     def __init__(self, watches: Sequence[WatchSpec], expect: Sequence[ExpectationSpec], live: Live) -> None:
@@ -43,7 +43,7 @@ class Monitors:
         self._probes: dict[int, Probe] = {}
         self._ended: set[str] = set()
         self.broken: Broken | None = None
-        """The first that was broken."""
+        """The first broken watch."""
         for k, watch, name in self._watches:
             if not watch.steps:
                 self._open(k, watch, name)
@@ -62,15 +62,15 @@ class Monitors:
                 self._live.close(self._probes.pop(k))
 
     def _open(self, k: int, watch: WatchSpec, name: str) -> None:
-        def told(window: StateWindow, robustness: Robustness) -> None:
+        def callback(window: StateWindow, robustness: Robustness) -> None:
             if self.broken is None:
                 self.broken = _broken(k, watch, name, window, robustness)
 
-        self._probes[k] = self._live.open(watch.condition, told=told)
+        self._probes[k] = self._live.open(watch.condition, callback=callback)
 
 
 def _broken(k: int, watch: WatchSpec, name: str, window: StateWindow, robustness: Robustness) -> Broken | None:
-    """The first of these moments that breaks a watch."""
+    """The first tick of the window that breaks a watch; None without one."""
     answer = never(robustness) if watch.quantifier == "never" else robustness
     bad = answer.applies & ~(answer.order >= 0.0)
     if watch.steps:
@@ -83,7 +83,7 @@ def _broken(k: int, watch: WatchSpec, name: str, window: StateWindow, robustness
 
 
 def _during(steps: Sequence[str], window: StateWindow) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(T,) which of the moments lie in one of the steps."""
+    """(T,) True for ticks in one of the steps."""
     inside = np.zeros(len(window.times), dtype=np.bool_)
     for step in window.steps:
         if step.id in steps and step.started is not None:

@@ -1,4 +1,4 @@
-"""Who looks on while a plan is carried out: recorder and live conditions, and whoever shows how far it is."""
+"""Observer of a running plan: feeds every tick to the recorder, the live conditions and the progress display."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from manipcli.run.live_conditions import Live
 from manipcli.task.plan_task import PlannedStep
 
 FEEDBACK_PERIOD: Final = 0.05
-"""[s] between two records of how far a goal is, as ROS's action servers tell it."""
+"""[s] Period of recorded goal feedback, as of ROS action servers."""
 PROGRESS_TICKS: Final = 50
-"""Control ticks between two times that are told to whoever shows the progress."""
+"""Control ticks between two updates of the progress display."""
 
 
 class Progress(Protocol):
-    """Whoever shows how far a run is."""
+    """Display of the progress of a run."""
 
     def doing(self, what: str) -> None:
-        """A sign of life while no time goes by: a step is planned, a part of the log is judged."""
+        """Activity without simulated time: a step is planned, a part of the log is judged."""
         ...
 
     def warned(self, findings: Sequence[Diagnostic]) -> None:
-        """What may go wrong, known before the first step: once of the files, once of the plan."""
+        """Warnings before the first step: called once for the files and once for the plan."""
         ...
 
     def step_started(self, step: PlannedStep, index: int, total: int) -> None:
@@ -39,21 +39,19 @@ class Progress(Protocol):
         ...
 
     def told(self, text: str, *, detail: bool) -> None:
-        """Something that was not planned happened in the step that is on; a `detail` is not for everyone."""
+        """An unplanned event in the current step; `detail`: only for verbose output."""
         ...
 
     def tick(self, simulated_time: float, wall: float) -> None:
-        """Now and then; both [s] from the start."""
+        """Every `PROGRESS_TICKS` control ticks; both times [s] from the start."""
         ...
 
     def step_ended(self, outcome: StepOutcome) -> None:
-        """A step is over, well or not."""
+        """A step ended, done or failed."""
         ...
 
 
 class _Silent:
-    """Shows nothing."""
-
     def doing(self, what: str) -> None: ...
     def warned(self, findings: Sequence[Diagnostic]) -> None: ...
     def step_started(self, step: PlannedStep, index: int, total: int) -> None: ...
@@ -67,7 +65,7 @@ SILENT: Final = _Silent()
 
 @dataclass(frozen=True, slots=True)
 class _Goal:
-    """A goal on its way, and the number by which the log knows it."""
+    """An active goal, and its number in the log."""
 
     controller: str
     number: int
@@ -75,7 +73,7 @@ class _Goal:
 
 
 class Observer:
-    """Hands every tick to the recorder and to live conditions, and now and then the time to who shows the progress."""
+    """Feeds every tick to the recorder and to live conditions, and the time to the progress display."""
 
     def __init__(self, recorder: Recorder, live: Live, progress: Progress, period: float) -> None:
         self._recorder = recorder
@@ -107,12 +105,12 @@ class Observer:
             self._live.contacts(tick, changed)
 
     def goal(self, controller: str, handle: GoalHandle) -> None:
-        """A controller has a new goal; one that it had before may have ended by that."""
+        """Record a new goal of a controller, which can end its previous goal."""
         self._follow(self._next_tick)
         self._goals.append(_Goal(controller, self._recorder.goal_sent(self._next_tick, controller), handle))
 
     def _follow(self, tick: int) -> None:
-        """Records the ends of goals, and now and then how far they are."""
+        """Record ends and feedback of goals."""
         for goal in [*self._goals]:
             result = goal.handle.result
             if result is not None:

@@ -1,8 +1,8 @@
-"""The situation as it is measured, and in what it is not the one that a step was planned for.
+"""Re-planning from the measured state: its differences to the state a step was planned from, and the new plan.
 
-Joints that follow trajectories are where they are commanded to be as long as they are near to it: a new trajectory then
-begins where the last one ended. An object in the hand is where it is measured in the hand, so that what slipped is put
-down where it belongs.
+Joints that follow trajectories count as at their commanded position if they are near it, so that a new trajectory
+starts at the end of the last one. An object in the hand has its measured pose in the hand, so that it is placed
+correctly after slip.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from manipcli.spec.task import StepSpec
 from manipcli.task.plan_task import plan_step
 
 COMMANDED: Final = 1e-4
-"""A trajectory that begins further than this [rad or m] from what is commanded would make the robot jump."""
+"""[rad or m] Largest distance of the start of a trajectory from the commanded position, without a jump."""
 
 
 class Measured:
-    """What the planner is told of a running world.
+    """The planning state of a running world.
 
     Args:
-        session: is asked where everything is.
+        session: gives the measured state.
         planner: of the task.
-        limits: which differences count.
-        physics: whether bodies move; where they do not, they are where they were predicted to be.
+        limits: differences above which a step is re-planned.
+        physics: whether the engine moves bodies; otherwise their predicted poses are used.
 
     Attributes:
-        grasp: what the hand carries.
+        grasp: the grasp of the carried object.
     """
 
     def __init__(self, session: Session, planner: Planner, limits: ReplanSpec, *, physics: bool) -> None:
@@ -54,10 +54,10 @@ class Measured:
         self.grasp = Grasp(planner.kinematics, planner.scene, period=SLOW * session.period)
 
     def situation(self, believed: PlanningState) -> PlanningState:
-        """Where everything is now.
+        """The measured planning state.
 
         Args:
-            believed: says what the hand holds; it holds nothing any more where that is elsewhere.
+            believed: names the carried object; the result carries nothing if that object was lost.
         """
         self._lost = ""
         state = self._session.engine.read()
@@ -78,62 +78,62 @@ class Measured:
             return now
         X_WO = planner.body_pose(now, carried.body)
         X_LO = planner.kinematics.forward(measured, carried.link).inverse() @ X_WO
-        # The robot is told to be where it is commanded to be; so is what it holds, and what lies in that.
+        # The planner uses the commanded position, so the carried object and its contents are shifted to it.
         shift = planner.kinematics.forward(position, carried.link) @ X_LO @ X_WO.inverse()
         return replace(self._shifted(now, carried.body, shift), carried=Carried(carried.body, carried.link, X_LO))
 
     def differences(self, planned: PlanningState, now: PlanningState, step: StepSpec) -> tuple[str, ...]:
-        """In what `now` is not what the step was `planned` for, each with how much; () where it is near enough."""
+        """Texts of the differences of `now` to the `planned` state of a step, with amounts; () within the limits."""
         return (*self._joints(planned, now), *self._held(planned, now), *self._bodies(planned, now, step))
 
     def plan(
         self, step: StepSpec, planned: PlanningState, now: PlanningState, grasps: Sequence[Array] = ()
     ) -> tuple[StepPlan, PlanningState, str]:
-        """The plan, by none of `grasps`, of a step that was `planned` for another situation, from where things are.
+        """Plan a step from the measured state, without the grasps in `grasps`.
 
-        An arm of few joints may be able to move what is held to where it belongs and unable to turn it. Where nothing
-        can be planned, a turn in the hand that does not count by itself is left as it is.
+        An arm with few joints may be able to correct the position of a carried object but not its rotation. If planning
+        fails, it is repeated without correcting a rotation in the hand that is within the limits.
 
         Returns:
-            The plan; the situation in which it begins; what is to be told of it, "" where there is nothing.
+            The plan; the state it starts from; a note for reports, "" without one.
 
         Raises:
-            NotPlannable: neither can be planned; why the first one cannot.
+            NotPlannable: both attempts failed; with the cause of the first.
         """
         try:
             return plan_step(self._planner, step, now, grasps), now, ""
         except NotPlannable:
-            left = self._turn_left(planned, now)
-            if left is not None:
-                turned, told = left
+            uncorrected = self._uncorrected(planned, now)
+            if uncorrected is not None:
+                rotated, note = uncorrected
                 with suppress(NotPlannable):
-                    return plan_step(self._planner, step, turned), turned, told
+                    return plan_step(self._planner, step, rotated), rotated, note
             raise
 
-    def _turn_left(self, planned: PlanningState, now: PlanningState) -> tuple[PlanningState, str] | None:
-        """`now` with what is held turned in the hand as `planned`, and what to tell; None where the turn counts."""
+    def _uncorrected(self, planned: PlanningState, now: PlanningState) -> tuple[PlanningState, str] | None:
+        """`now` with the `planned` rotation of the carried object in the hand, and a note; None beyond the limit."""
         before, after = planned.carried, now.carried
         if before is None or after is None or before.body != after.body:
             return None
-        _, turn = _between(before.X_LO, after.X_LO)
-        if turn > self._limits.rotation:
+        _, rotation = _between(before.X_LO, after.X_LO)
+        if rotation > self._limits.rotation:
             return None
         planner = self._planner
         X_LO = Transform(R=before.X_LO.R, p=after.X_LO.p)
         X_WO = planner.body_pose(now, after.body)
         shift = planner.kinematics.forward(now.position, after.link) @ X_LO @ X_WO.inverse()
-        turned = replace(self._shifted(now, after.body, shift), carried=replace(after, X_LO=X_LO))
-        return turned, f"; the arm cannot undo the {_deg(turn)} by which '{after.body}' is turned in the hand"
+        rotated = replace(self._shifted(now, after.body, shift), carried=replace(after, X_LO=X_LO))
+        return rotated, f"; the arm cannot correct the rotation of '{after.body}' by {_deg(rotation)} in the hand"
 
     def _shifted(self, now: PlanningState, body: str, shift: Transform) -> PlanningState:
-        """With a body, and what lies in it, moved in the world."""
+        """`now` with a body and its contents moved in the world."""
         moving = {body, *self._planner.contents(now, body)}
-        names = [one.name for one in self._planner.scene.movable]
+        names = [movable.name for movable in self._planner.scene.movable]
         moved = (shift @ X if name in moving else X for name, X in zip(names, now.bodies, strict=True))
         return replace(now, bodies=tuple(moved))
 
     def _commanded(self, measured: Array) -> Array:
-        """(n) where joints are commanded to be if that is near, else where they are, also beyond soft limits."""
+        """(n) the commanded position of each joint if it is near the measured one, else the measured one."""
         session, robot = self._session, self._planner.robot
         position = measured.copy()
         manager = session.manager
@@ -147,7 +147,7 @@ class Measured:
         return frozen(np.clip(position, lower, upper))
 
     def _joints(self, planned: PlanningState, now: PlanningState) -> Iterator[str]:
-        """The joint that is furthest off. Fingers of a closed hand are where the object lets them be."""
+        """The joint with the largest difference, for arm and fingers; fingers of a closed hand are not compared."""
         robot, hand = self._planner.robot, self._planner.gripper_joints
         independent = [joint.name for joint in robot.moving_joints if joint.independent]
         arm = [name for name in independent if name not in hand]
@@ -159,24 +159,24 @@ class Measured:
                 k = int(np.argmax(off))
                 here, there = now.position[columns][k], planned.position[columns][k]
                 unit = robot.joint(names[k]).unit
-                yield f"joint '{names[k]}' is at {round(here, 4):g} {unit} and not at {round(there, 4) + 0.0:g} {unit}"
+                yield f"joint '{names[k]}' is at {round(here, 4):g} {unit} instead of {round(there, 4) + 0.0:g} {unit}"
 
     def _held(self, planned: PlanningState, now: PlanningState) -> Iterator[str]:
         before, after = planned.carried, now.carried
         if before is not None and (after is None or after.body != before.body):
             away = float(np.linalg.norm(self._pose(now, before.body).p - self._pose(planned, before.body).p))
-            why = self._lost or f"it is {_mm(away)} from its planned place"
+            why = self._lost or f"it is {_mm(away)} from its planned pose"
             yield f"'{before.body}' is not in the hand: {why}"
         elif after is not None and before is None:
-            yield f"the hand holds '{after.body}'"
+            yield f"the hand holds '{after.body}' instead of nothing"
         elif before is not None and after is not None:
-            slip, turn = _between(before.X_LO, after.X_LO)
-            if slip > self._limits.slip or turn > self._limits.rotation:
-                yield f"'{after.body}' sits {_mm(slip)} and {_deg(turn)} off in the hand"
+            slip, rotation = _between(before.X_LO, after.X_LO)
+            if slip > self._limits.slip or rotation > self._limits.rotation:
+                yield f"'{after.body}' slipped {_mm(slip)} and {_deg(rotation)} in the hand"
 
     def _bodies(self, planned: PlanningState, now: PlanningState, step: StepSpec) -> Iterator[str]:
-        """Bodies that stand elsewhere. What lies in the container that it was planned to lie in matters to no way;
-        only to a step that names it."""
+        """Bodies away from their planned pose. A body inside its planned container is compared only if the step names
+        it: it does not affect paths."""
         scene = self._planner.scene
         named = _texts(step.body.model_dump())
         named |= {frame.parent for frame in scene.frames if frame.name in named}
@@ -186,12 +186,12 @@ class Measured:
             name = body.name
             if name in held or (name not in named and name in where and where[name] == planned_where.get(name)):
                 continue
-            away, turn = _between(self._pose(planned, name), self._pose(now, name), round_as=body.kind)
-            if away > self._limits.position or turn > self._limits.rotation:
-                yield f"'{name}' is {_mm(away)} and {_deg(turn)} from where it was to be"
+            away, rotation = _between(self._pose(planned, name), self._pose(now, name), round_as=body.kind)
+            if away > self._limits.position or rotation > self._limits.rotation:
+                yield f"'{name}' is {_mm(away)} and {_deg(rotation)} from its planned pose"
 
     def _containers(self, situation: PlanningState) -> dict[str, str]:
-        """In what each body lies, of those that lie in something."""
+        """Body -> the container that it is in."""
         planner = self._planner
         return {
             inside: body.name
@@ -205,8 +205,7 @@ class Measured:
 
 
 def after(planned: StepPlan, before: PlanningState, *, done: int) -> PlanningState:
-    """What the hand is believed to hold when `done` motions of a plan that began in `before` were done, and the next
-    one was not; where things are has to be measured."""
+    """The expected grasp after the first `done` motions of a plan that started in `before`; poses must be measured."""
     carried, closed = before.carried, before.closed
     for k, motion in enumerate(planned.motions[: done + 1]):
         if motion.grip is not None and motion.grip.force is not None:
@@ -217,7 +216,7 @@ def after(planned: StepPlan, before: PlanningState, *, done: int) -> PlanningSta
 
 
 def _between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, float]:
-    """Distance [m] of two poses, and the angle [rad] between them, but for turns that do not show on a round body."""
+    """Distance [m] and angle [rad] between two poses, without rotations about the symmetry axes of a round body."""
     away = float(np.linalg.norm(a.p - b.p))
     if round_as == "sphere":
         return away, 0.0
@@ -228,7 +227,7 @@ def _between(a: Transform, b: Transform, *, round_as: str = "") -> tuple[float, 
 
 
 def _texts(value: Plain | tuple[object, ...] | object) -> set[str]:
-    """Every text in plain data."""
+    """All strings in plain data."""
     if isinstance(value, str):
         return {value}
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""The log of a run: what it is opened with, and what is added at its end."""
+"""The log of a run: its attachments and metadata at the start and at the end."""
 
 from __future__ import annotations
 
@@ -37,17 +37,21 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 RUNS = Path("runs")
-"""Where logs go that nobody asked elsewhere, below the working directory."""
+"""Default folder of logs, in the working directory."""
 YAML, XML, JSON, BYTES = "application/yaml", "application/xml", "application/json", "application/octet-stream"
 
 
 def default_log(task: Task) -> Path:
-    """`runs/<task>.mcap`; the folder is made."""
+    """`runs/<task>.mcap`; creates the folder.
+
+    Raises:
+        InvalidInput: the folder cannot be created.
+    """
     try:
         RUNS.mkdir(exist_ok=True)
     except OSError as error:
-        message = f"cannot make the folder '{RUNS}' for the log: {error.strerror}"
-        raise InvalidInput([Diagnostic("LOG101", message, hint="say where it goes with --log PATH")]) from error
+        message = f"cannot create folder '{RUNS}' for the log: {error.strerror}"
+        raise InvalidInput([Diagnostic("LOG101", message, hint="choose another file with --log PATH")]) from error
     return RUNS / f"{task.name}.mcap"
 
 
@@ -55,19 +59,24 @@ def default_log(task: Task) -> Path:
 def open_log(
     task: Task, plan: Plan, manager: ControllerManager, path: Path, *, overwrite: bool, embed_meshes: bool
 ) -> Iterator[Recorder]:
-    """A recorder whose file already holds everything that is known before the run; with `embed_meshes` the files of all
-    meshes, too, so that the log is shown without any package.
+    """A recorder with all attachments and metadata known before the run.
+
+    Args:
+        task, plan, manager: of the run.
+        path: of the log.
+        overwrite: replace an existing log.
+        embed_meshes: also attach all mesh files, so that the log can be shown without packages.
 
     Raises:
-        RecordingRefused: nothing can or may be written there; above all not over a file that the task is made from.
-        RecordingFailed: the disk refused more of the log; what could be written stays readable.
+        RecordingRefused: the file cannot be written, exists, or is an input of the task.
+        RecordingFailed: a write failed during the run; the part written so far stays readable.
     """
     engine = ENGINES[task.spec.simulation.engine]
     meshes = mesh_files(task)
     files = (task.file, task.robot_file, task.controllers_file)
     for read in (*(Path(file.source.name) for file in files), *meshes.values()):
         if path.exists() and read.exists() and path.samefile(read):
-            raise RecordingRefused(path, "the task is made from this file", hint="choose another name")
+            raise RecordingRefused(path, "the task reads this file", hint="choose another name for the log")
     embedded = embeddable(meshes) if embed_meshes else ()
     attachments = [
         (TASK, YAML, resolved(_portable_task(task.spec), expressions(task.file)).encode()),
@@ -85,7 +94,7 @@ def open_log(
         period=task.spec.simulation.control_period,
         attachments=[
             *attachments,
-            *((one.attachment, BYTES, one.path.read_bytes()) for one in embedded),
+            *((file.attachment, BYTES, file.path.read_bytes()) for file in embedded),
         ],
         metadata={
             "run": run_metadata(task),
@@ -93,7 +102,7 @@ def open_log(
             "versions": {"manipcli": __version__, engine.name: engine.version()},
             "files": {name: hashlib.sha256(content).hexdigest() for name, _, content in attachments},
             "meshes": {uri: hashlib.sha256(path.read_bytes()).hexdigest() for uri, path in meshes.items()},
-            **({EMBEDDED: {one.uri: one.attachment for one in embedded}} if embedded else {}),
+            **({EMBEDDED: {file.uri: file.attachment for file in embedded}} if embedded else {}),
         },
         selection=Selection(task.spec.record.strides(task.spec.simulation.control_period), task.spec.record.left_out),
         overwrite=overwrite,
@@ -114,7 +123,7 @@ def open_log(
 
 
 def run_metadata(task: Task, **end: str) -> dict[str, str]:
-    """What a log says of its run: at once, and again with its `end`, for who keeps of two records the last."""
+    """Metadata of the run; written at the start, and once more at the end with `end`, which replaces it in readers."""
     simulation = task.spec.simulation
     engine = ENGINES[simulation.engine]
     return {
@@ -128,7 +137,7 @@ def run_metadata(task: Task, **end: str) -> dict[str, str]:
 
 
 def recorded(controller: Controller) -> Recorded:
-    """What the log keeps of a controller."""
+    """The log channel of a controller; None for a controller that is not recorded."""
     if controller.interfaces:
         return ControllerChannel(controller.name, controller.joints, controller.interfaces, action_of(controller))
     if not controller.sensors:
@@ -139,14 +148,14 @@ def recorded(controller: Controller) -> Recorded:
 
 
 def action_of(controller: Controller) -> Literal["", "follow_joint_trajectory", "gripper_cmd"]:
-    """By which it takes goals."""
+    """The action interface of a controller; "" without one."""
     if is_follower(controller):
         return "follow_joint_trajectory"
     return "gripper_cmd" if is_hand(controller) else ""
 
 
 def mesh_files(task: Task) -> dict[str, Path]:
-    """Every mesh file of the robot and of the scene, by its URI, sorted."""
+    """The mesh files of robot and scene by URI, sorted."""
     geometries = [g for link in task.robot.links for g in (*link.visuals, *link.collisions)]
     geometries += [g for body in task.scene.bodies for g in body.geometries]
     meshes = {g.shape.uri: g.shape.path for g in geometries if isinstance(g.shape, Mesh)}
@@ -154,7 +163,7 @@ def mesh_files(task: Task) -> dict[str, Path]:
 
 
 def _portable_task(spec: TaskSpec) -> TaskSpec:
-    """The task without folders of this machine in the names of its files."""
+    """The task with file names that do not depend on this machine."""
     scene = dict(spec.scene)
     for name, body in scene.items():
         for key, shape in (("mesh", body.mesh), ("urdf", body.urdf)):
@@ -166,13 +175,13 @@ def _portable_task(spec: TaskSpec) -> TaskSpec:
 
 
 def _portable_robot(spec: RobotSpec) -> RobotSpec:
-    """The robot file without folders of this machine in the names of its descriptions."""
-    attach = tuple(one.model_copy(update={"description": portable_name(one.description)}) for one in spec.attach)
+    """The robot file with file names that do not depend on this machine."""
+    attach = tuple(part.model_copy(update={"description": portable_name(part.description)}) for part in spec.attach)
     return spec.model_copy(update={"attach": attach, "description": portable_name(spec.description)})
 
 
 def verdict_metadata(verdict: Verdict) -> Mapping[str, Mapping[str, str]]:
-    """What the log keeps of its own verdict, for whoever looks at it without manipcli; and up to when it was judged."""
+    """The verdict as metadata of its log, for readers without manipcli, and the time [s] of the last judged tick."""
     return {
         STORED: {
             "verdict": verdict.verdict,

@@ -1,4 +1,4 @@
-"""The loop over steps: planned again where things are elsewhere, tried again where the task says so."""
+"""The loop over the steps of a task, with re-planning and retries."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from manipcli.task.plan_task import Plan, PlannedStep
 from manipcli.task.task import Task
 
 DEFAULT_UNTIL_TIME: Final = 30.0
-"""How long [s] an `until` without `timeout` is waited for."""
+"""[s] Timeout of an `until` on a step without `timeout`."""
 AFTERMATH: Final = 0.6
-"""How long [s] the world is watched after the last step, so that "at rest" can be judged."""
+"""[s] Simulated after the last step, so that `at_rest` can be judged."""
 
 
 def cuts_of(session: Session) -> Saturations:
-    """In how many ticks each joint's command was cut, at which limits, and each actuator had no more to give."""
+    """The saturations of joints, by limit, and of actuators so far."""
     names = session.robot.joint_names
     joints = dict(zip(names, map(int, session.saturations), strict=True))
     kinds = {
@@ -54,13 +54,13 @@ class StepLoop:
     """One pass over the steps.
 
     Args:
-        task, plan: what to do.
-        session: in which world; its clock stands at 0.
-        recorder: is told of everything that happens.
-        live: asks the conditions that steps wait for; is told of steps.
-        progress: is told of steps, and of what was not planned.
-        told: is told of every goal, see `Executor`.
-        replanning: runs while a step is planned again.
+        task, plan: to run.
+        session: the world, at time 0.
+        recorder: receives all events.
+        live: evaluates the conditions that steps wait for; receives starts and ends of steps.
+        progress: receives steps and unplanned events.
+        on_goal: called with every goal, see `Executor`.
+        replanning: stopwatch of re-planning.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class StepLoop:
         live: Live,
         progress: Progress,
         *,
-        told: Callable[[str, GoalHandle], None],
+        on_goal: Callable[[str, GoalHandle], None],
         replanning: Stopwatch,
     ) -> None:
         self._task = task
@@ -82,14 +82,14 @@ class StepLoop:
         self._recorder = recorder
         self._progress = progress
         self._physics = ENGINES[task.spec.simulation.engine].physics == "full"
-        self._watching = Monitors(task.spec.watch, task.spec.expect, live)
-        self._executor = Executor(session, touch=self._physics, told=told, alarm=self._look)
+        self._monitors = Monitors(task.spec.watch, task.spec.expect, live)
+        self._executor = Executor(session, touch=self._physics, told=on_goal, alarm=self._look)
         replan = task.spec.replan
         self._replans = replan is not False
         self._guards = any(motion.guarded for step in plan.steps for motion in step.plan.motions)
         limits = replan if isinstance(replan, ReplanSpec) else ReplanSpec()
         self._measured = Measured(session, plan.planner, limits, physics=self._physics)
-        self._holding = GraspMargin(task.true.robot, task.true.scene)
+        self._grasp_margin = GraspMargin(task.true.robot, task.true.scene)
         self._believed = plan.start
         self._replanning = replanning
         self._failed = False
@@ -97,7 +97,7 @@ class StepLoop:
         self._at: PlannedStep | None = None
 
     def steps(self) -> None:
-        """Every step in order, until one fails that may not, or a watch is broken."""
+        """Run all steps in order, until a step fails without being tolerated, or a watch is broken."""
         total = len(self._plan.steps)
         planned_start = self._plan.start
         for index, (step, planned) in enumerate(zip(self._task.spec.steps, self._plan.steps, strict=True)):
@@ -114,23 +114,22 @@ class StepLoop:
             self._executor.stop()
 
     def _step(self, index: int, step: StepSpec, planned: PlannedStep, planned_start: PlanningState) -> StepOutcome:
-        """All attempts at a step. Where a watch is broken it ends at once; that the robot is stopped then is no part of
-        it."""
+        """All attempts at a step. A broken watch ends the step at once; the stopping motion follows the step."""
         began = ended = self._session.time
         retry = step.retry
         attempts = 1 if retry is None else 1 + retry.retry
         end = DONE
         self._at = planned
         self._live.step_started(planned.id)
-        self._watching.step_started(planned.id)
+        self._monitors.step_started(planned.id)
         for attempt in range(1, attempts + 1):
             if attempt > 1:
-                again = retried(self._task.file, index)
-                if again != step:
-                    planned = replace(planned, grasps=())  # they are of the step as it was
-                step = again
+                changed = retried(self._task.file, index)
+                if changed != step:
+                    planned = replace(planned, grasps=())  # they belong to the unchanged step
+                step = changed
             self._event("step_started", planned, "", self._nth(step, attempt, attempts))
-            end = self._attempt(step, planned, planned_start, again=attempt > 1)
+            end = self._attempt(step, planned, planned_start, retry=attempt > 1)
             if end.outcome == "done" or attempt == attempts or not self._may_go_on:
                 end = self._closed(planned, end)
             ended = self._session.time
@@ -139,7 +138,7 @@ class StepLoop:
                 break
             self._failed = True
             if attempt < attempts:
-                self._tell(f"{end.outcome}: {end.text}; it is tried again", detail=False)
+                self._report(f"{end.outcome}: {end.text}; retrying", detail=False)
             if attempt < attempts or step.may_fail:
                 self._executor.stop()
         if self._over:
@@ -159,10 +158,9 @@ class StepLoop:
         )
 
     def _closed(self, planned: PlannedStep, end: MotionEnd) -> MotionEnd:
-        """The end of a step; another one if what is watched in it turns out to be broken, of which the last ticks are
-        only looked at now."""
+        """The end of a step; a failure if its last ticks, which are evaluated only now, break a watch."""
         self._live.step_ended(planned.id, end.outcome)
-        self._watching.step_ended(planned.id)
+        self._monitors.step_ended(planned.id)
         broken = self._alarm(self._session.state)
         if not broken:
             return end
@@ -171,19 +169,19 @@ class StepLoop:
         return MotionEnd("failed", f"stopped: {broken}{before}")
 
     def _look(self, state: WorldState) -> str:
-        """Every tick of the robot: the alarm, and what the hand carries."""
+        """At every tick: update the grasp and return the alarm."""
         if self._physics and self._session.ticks % SLOW == 0:
             self._measured.grasp.look(state, self._session.touching)
         return self._alarm(state) if self._task.spec.watch else ""
 
     @property
     def _may_go_on(self) -> bool:
-        """Whether the task has a say in what follows a failure."""
+        """Whether a retry or `on_fail: continue` is possible: no broken watch and no controller fault."""
         return not self._over and not self._session.manager.faults
 
     def _alarm(self, _: WorldState) -> str:
-        """What is the first to be broken of what the task watches."""
-        broken = None if self._over else self._watching.broken
+        """The first broken watch, recorded as an event; "" without one."""
+        broken = None if self._over else self._monitors.broken
         if broken is None:
             return ""
         self._over = True
@@ -200,57 +198,57 @@ class StepLoop:
         return broken.text
 
     def _nth(self, step: StepSpec, attempt: int, attempts: int) -> str:
-        """What an attempt begins with; nothing where there is but one."""
+        """`attempt 2 of 3, with tilt = 140 deg`; "" if there is only one attempt."""
         if attempts == 1:
             return ""
         changed = {} if step.retry is None or attempt == 1 else step.retry.with_
         values = ", ".join(f"{name} = {value}" for name, value in changed.items())
         return f"attempt {attempt} of {attempts}{f', with {values}' if values else ''}"
 
-    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, again: bool) -> MotionEnd:
-        """One attempt, planned anew where things are not as they were planned to be, or `again`."""
+    def _attempt(self, step: StepSpec, planned: PlannedStep, planned_start: PlanningState, *, retry: bool) -> MotionEnd:
+        """One attempt, re-planned on `retry`, after a failed step, or if the measured state differs from the plan."""
         before = cuts_of(self._session)
         now = self._measured.situation(self._believed)
-        if again and planned_start.carried is None and planned.plan.end.carried is not None:
-            now = replace(now, carried=None)  # it takes again what it took in vain, with a hand that is closed on it
+        if retry and planned_start.carried is None and planned.plan.end.carried is not None:
+            now = replace(now, carried=None)  # a retried grasp may start with the hand closed on its object
         differences = self._measured.differences(planned_start, now, step)
-        anew = again or self._failed or (self._replans and bool(differences) and _moves(planned))
-        if anew:
+        replanned = retry or self._failed or (self._replans and bool(differences) and _moves(planned))
+        if replanned:
             try:
                 with self._replanning:
-                    plan, now, stays = self._measured.plan(step, planned_start, now, planned.grasps)
+                    plan, now, note = self._measured.plan(step, planned_start, now, planned.grasps)
                 planned = replace(planned, plan=plan)
             except NotPlannable as refusal:
                 self._believed = now
-                why = f", where {'; '.join(differences)}" if differences else ""
-                bound = again or self._failed or self._guards
-                way_out = "" if bound else "; `replan: false` keeps the plan that there was"
-                return MotionEnd("failed", f"it cannot be planned from what is measured{why}: {refusal.cause}{way_out}")
-            why = "; ".join(differences) or ("it is tried again" if again else "the step before it failed")
-            why += stays
+                why = f" ({'; '.join(differences)})" if differences else ""
+                forced = retry or self._failed or self._guards
+                hint = "" if forced else "; `replan: false` keeps the original plan"
+                return MotionEnd("failed", f"re-planning from the measured state failed{why}: {refusal.cause}{hint}")
+            why = "; ".join(differences) or ("retry" if retry else "the previous step failed")
+            why += note
             self._event("replanned", planned, "", why)
-            self._tell(f"planned again: {why}", detail=True)
+            self._report(f"re-planned: {why}", detail=True)
             self._failed = False
         try:
             end = self._motions(step, planned, now)
         except Alarmed as alarm:
             return MotionEnd("failed", f"stopped: {alarm}")
         except SimulationFailed as failure:
-            text = str(failure) + _cut_since(before, self._session)
+            text = str(failure) + _saturated_since(before, self._session)
             self._event("step_ended", planned, "failed", text)
             raise
         if end.outcome == "done":
             return end
-        found = "" if anew or not differences else f"; when it began, {'; '.join(differences)}"
-        return MotionEnd(end.outcome, end.text + found + _cut_since(before, self._session))
+        found = "" if replanned or not differences else f"; at its start {'; '.join(differences)}"
+        return MotionEnd(end.outcome, end.text + found + _saturated_since(before, self._session))
 
     def _motions(self, step: StepSpec, planned: PlannedStep, before: PlanningState) -> MotionEnd:
-        """Every motion of the plan, which begins in `before`, and what the step waits for."""
+        """All motions of the plan, which starts in `before`, and the wait for `until`."""
         deadline = None if step.timeout is None else self._session.time + step.timeout
         if before.carried is not None and self._physics:
             self._measured.grasp.begin_step(before.carried, self._session.engine.read(), self._session.touching)
         texts = []
-        with self._asked(step) as probe:
+        with self._awaited(step) as probe:
             until: Until | None = None if probe is None else lambda _: probe.holds
             awaited = until is not None
             for k, motion in enumerate(planned.plan.motions):
@@ -269,10 +267,10 @@ class StepLoop:
                     text = f"{motion.label}: {end.text}{_missing(end, probe)}{f'; {held}' if held else ''}"
                     return MotionEnd(end.outcome, text)
                 if motion.grip is not None and motion.grip.force is not None and planned.plan.end.carried is not None:
-                    self._holding.taken(planned.plan.end.carried.body, self._session.touching)
+                    self._grasp_margin.taken(planned.plan.end.carried.body, self._session.touching)
                     self._take(planned.plan.end.carried)
                 if end.weak:
-                    self._tell(f"{motion.label}: {end.text}", detail=False)
+                    self._report(f"{motion.label}: {end.text}", detail=False)
                 awaited = awaited and not motion.awaits
                 texts += [end.text + _no_longer(motion, probe)] if end.text else []
             self._believed = planned.plan.end
@@ -291,9 +289,8 @@ class StepLoop:
         return left or (MotionEnd("done", "; ".join(texts)) if texts else DONE)
 
     @contextmanager
-    def _asked(self, step: StepSpec) -> Iterator[Probe | None]:
-        """What the step waits for, asked from now on; None where it waits for nothing, or only physics could answer
-        it."""
+    def _awaited(self, step: StepSpec) -> Iterator[Probe | None]:
+        """The open probe of the step's `until`; None without `until`, or if the engine cannot evaluate it."""
         if step.until is None or self._live.absent(step.until) is not None:
             yield None
             return
@@ -309,18 +306,18 @@ class StepLoop:
             self._measured.grasp.close(carried, self._session.engine.read(), self._session.touching)
 
     def _left_behind(self, carried: Carried | None) -> MotionEnd | None:
-        """A failure where the hand does not carry what it is planned to; None where it does."""
+        """A failure if the hand does not carry the planned object; None if it does."""
         if carried is None or not self._physics:
             return None
         why = self._measured.grasp.lost(carried, self._session.engine.read(), self._session.touching)
         if not why:
             return None
-        grasp = self._holding.told(carried.body)
-        text = f"the hand does not carry '{carried.body}': {why}; it slipped, or was never held"
+        grasp = self._grasp_margin.summary(carried.body)
+        text = f"the hand does not carry '{carried.body}': {why}; it slipped or was never held"
         return MotionEnd("failed", f"{text}{f'; {grasp}' if grasp else ''}")
 
     def _still_held(self, before: PlanningState) -> str:
-        """That the hand did not let go what it held `before`, and between what it has it; "" where it did."""
+        """Which links still hold the object that was carried `before`; "" if it was released."""
         if before.carried is None or not self._physics:
             return ""
         body = before.carried.body
@@ -330,7 +327,7 @@ class StepLoop:
         (_, first), (_, second), *_ = pressing(self._session.touching, body)
         return f"the hand still holds '{body}', between '{first}' and '{second}'"
 
-    def _tell(self, text: str, *, detail: bool) -> None:
+    def _report(self, text: str, *, detail: bool) -> None:
         self._progress.told(text, detail=detail)
 
     def _event(self, kind: str, step: PlannedStep, outcome: str, text: str) -> None:
@@ -340,23 +337,23 @@ class StepLoop:
 
 
 def _moves(planned: PlannedStep) -> bool:
-    """Whether a step does anything that depends on where things are."""
+    """Whether a step has motions that depend on the state."""
     return any(motion.trajectory is not None or motion.grip is not None for motion in planned.plan.motions)
 
 
 def _missing(end: MotionEnd, probe: Probe | None) -> str:
-    """How far what was waited for was from holding, where that is why a motion ended."""
+    """By how much `until` fails, if the motion ended for it; else ""."""
     missing = probe.missing if probe is not None and end.awaited else ""
     return f"; at the end {missing}" if missing else ""
 
 
 def _no_longer(motion: Motion, probe: Probe | None) -> str:
-    """What a guarded motion was stopped by, where it does not hold any more at rest: the robot may have bounced off."""
+    """By how much the `until` of a guarded motion fails at rest, after a bounce; "" if it holds."""
     missing = probe.missing if motion.guarded and probe is not None and not probe.holds else ""
     return f"; at rest {missing}" if missing else ""
 
 
-def _cut_since(before: Saturations, session: Session) -> str:
-    """What had nothing left to give since then; nothing where everything had."""
-    cut = str(cuts_of(session).since(before))
-    return f"; {cut}" if cut else ""
+def _saturated_since(before: Saturations, session: Session) -> str:
+    """The saturations since `before`; "" without any."""
+    saturated = str(cuts_of(session).since(before))
+    return f"; {saturated}" if saturated else ""

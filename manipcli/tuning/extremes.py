@@ -1,4 +1,4 @@
-"""Postures in which something is extreme: looked for uphill, from the best of some that are known."""
+"""Search for a configuration that maximises a score, by coordinate ascent."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from manipcli.model.configuration import with_mimics
 from manipcli.model.robot import RobotModel
 
 FIRST: Final = 0.25
-"""Of a joint's range: the first steps."""
+"""First step, as a share of the range of a joint."""
 LAST: Final = 0.004
-"""Of a joint's range: no smaller ones."""
+"""Smallest step, as a share of the range of a joint."""
 
 
 def climbed(
     robot: RobotModel, score: Callable[[Array], Array], known: Array, low: Array, high: Array, *, starts: int = 1
 ) -> Array:
-    """The posture (n) of the largest score that is found.
+    """The configuration (n) with the largest score found.
 
-    From each of the best known, one joint at a time is moved up or down, by whatever raises the score the most; where
-    nothing does, by half as much.
+    Coordinate ascent from the best known configurations: the joint step that raises the score most is taken; if none
+    does, the step is halved.
 
     Args:
-        robot: whose postures they are.
-        score: of postures (T, n), (T,).
-        known: (T, n) postures.
-        low, high: (n) of the joints.
-        starts: how many of the known it is tried from.
+        robot: the robot of the configurations.
+        score: configurations (T, n) -> scores (T,).
+        known: (T, n) configurations.
+        low, high: (n) limits of the joints.
+        starts: number of known configurations to start from.
     """
     values = score(known)
     moves = np.vstack([np.diag(sign * (high - low)) for sign in (1.0, -1.0)])

@@ -1,4 +1,4 @@
-"""How the joints of a whole robot, held by proposed gains, answer a step in the engine, under gravity."""
+"""Step responses of the joints of a whole robot in the engine, with proposed gains, under gravity."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from manipcli.spec.controllers import Interface, Role
 from manipcli.spec.controllers_file import ControllersSpec
 
 RETURN: Final = 0.5
-"""[s] at least that a joint has to come back before the next one steps."""
+"""[s] Least time for a joint to return before the next joint steps."""
 
 
 def simulated_answers(
@@ -38,25 +38,25 @@ def simulated_answers(
     wish: Wish,
     start: Array,
 ) -> tuple[Tuned, ...]:
-    """Joints step and come back, one after the other, while all others hold.
+    """Step the joints one after the other and back, while all others hold.
 
     Args:
-        robot: the whole of it.
-        spec: the controllers, whose gains are the proposed ones.
-        proposals: for all joints that are held.
+        robot: the whole robot.
+        spec: the controllers, with the proposed gains.
+        proposals: for all held joints.
         joints: those that step.
-        wish: of the gains: the control period.
-        start: (n) the posture.
+        wish: gives the control period.
+        start: (n) the configuration.
 
     Returns:
-        The proposals for `joints`, with their answers.
+        The proposals for `joints`, with their step responses.
 
     Raises:
         InvalidInput: the engine cannot hold this robot.
     """
     holders = [
-        _Holder(name, [one for one in proposals if one.controller == name], spec, robot, start)
-        for name in dict.fromkeys(one.controller for one in proposals)
+        _Holder(name, [tuned for tuned in proposals if tuned.controller == name], spec, robot, start)
+        for name in dict.fromkeys(tuned.controller for tuned in proposals)
     ]
     member = ENGINES["pybullet"]
     refused = member.refuses(robot)
@@ -77,18 +77,18 @@ def simulated_answers(
             for _ in range(round(RETURN / wish.period)):
                 session.tick()
             answers = {
-                one.joint: _stepped(session, holder, one)
+                tuned.joint: _stepped(session, holder, tuned)
                 for holder in holders
-                for one in holder.tuned
-                if one.joint in joints
+                for tuned in holder.tuned
+                if tuned.joint in joints
             }
         finally:
             engine.close()
-    return tuple(replace(one, simulated=answers[one.joint]) for one in proposals if one.joint in joints)
+    return tuple(replace(tuned, simulated=answers[tuned.joint]) for tuned in proposals if tuned.joint in joints)
 
 
 class _Holder:
-    """Holds joints with proposed gains at a reference that can be stepped: what their controller does with it."""
+    """Holds joints with proposed gains at a reference that can step, in place of their controller."""
 
     role: Role = "other"
     senses_contact = False
@@ -97,15 +97,15 @@ class _Holder:
     def __init__(self, name: str, tuned: list[Tuned], spec: ControllersSpec, robot: RobotModel, start: Array) -> None:
         own = spec.controllers[name]
         self.name, self.tuned = name, tuned
-        self.joints = tuple(one.joint for one in tuned)
+        self.joints = tuple(each.joint for each in tuned)
         self.interfaces: tuple[Interface, ...] = (tuned[0].interface,)
         weightless = getattr(own, "gravity_compensation", False) or getattr(own, "inverse_dynamics", False)
         self.feed_forward: FeedForward = "gravity" if weightless else "none"
-        clamp = np.array([np.inf if one.i_clamp is None else one.i_clamp for one in tuned])
+        clamp = np.array([np.inf if each.i_clamp is None else each.i_clamp for each in tuned])
         self._pid = Pid(
-            p=[one.p for one in tuned],
-            i=[one.i for one in tuned],
-            d=[one.d for one in tuned],
+            p=[each.p for each in tuned],
+            i=[each.i for each in tuned],
+            d=[each.d for each in tuned],
             i_min=-clamp,
             i_max=clamp,
         )
@@ -126,15 +126,15 @@ class _Holder:
         self._pid.reset()
 
 
-def _stepped(session: Session, holder: _Holder, one: Tuned) -> StepAnswer:
-    """The joint steps, away from its nearer limit, and comes back."""
-    k = holder.joints.index(one.joint)
-    limits = session.robot.joint(one.joint).limits
+def _stepped(session: Session, holder: _Holder, tuned: Tuned) -> StepAnswer:
+    """Step the joint away from its upper limit, and back."""
+    k = holder.joints.index(tuned.joint)
+    limits = session.robot.joint(tuned.joint).limits
     before = float(holder.reference[k])
-    beyond = limits.upper is not None and before + 2.0 * one.predicted.size > limits.upper
-    size = -one.predicted.size if beyond else one.predicted.size
-    rest = float(session.state.position[session.robot.joint_names.index(one.joint)])
-    count = len(one.predicted.times)
+    beyond = limits.upper is not None and before + 2.0 * tuned.predicted.size > limits.upper
+    size = -tuned.predicted.size if beyond else tuned.predicted.size
+    rest = float(session.state.position[session.robot.joint_names.index(tuned.joint)])
+    count = len(tuned.predicted.times)
     share = np.zeros(count)
     holder.reference[k] += size
     for tick in range(count):
@@ -143,4 +143,4 @@ def _stepped(session: Session, holder: _Holder, one: Tuned) -> StepAnswer:
     holder.reference[k] = before
     for _ in range(max(count, round(RETURN / session.period))):
         session.tick()
-    return StepAnswer(abs(size), one.predicted.times, share)
+    return StepAnswer(abs(size), tuned.predicted.times, share)

@@ -1,4 +1,4 @@
-"""Gains proposed for the controllers of a robot, and tried on the whole robot in the engine."""
+"""Gain proposals for the controllers of a robot, with an optional test of the whole robot in the engine."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from manipcli.tuning.simulated_steps import simulated_answers
 if TYPE_CHECKING:
     from manipcli.replay.curves import Chart
 
-RANDOM_POSTURES: Final = 60
-"""Configurations within the limits, beside the named ones; always the same."""
+RANDOM_CONFIGURATIONS: Final = 60
+"""Number of random configurations within the limits, in addition to the named ones; always the same."""
 WIDE: Final = 2.0
-"""[rad or m] how far from the start a joint without limits is put."""
+"""[rad or m] Range of a joint without limits, to each side of its start."""
 HOPELESS: Final = 0.01
-"""Of the bandwidth that is asked for: where less is stable, gains are of no use."""
+"""Least share of the asked bandwidth for useful gains."""
 ROUNDS: Final = 12
-"""How often the gains are calmed at the posture in which they have the least margin."""
+"""Number of rounds of reducing all gains at the configuration with the least margin."""
 
 
 @dataclass(frozen=True, slots=True)
 class Tuning:
-    """Proposed gains, the file with them in place of its own, and what else there is to say."""
+    """Proposed gains, the controllers file with them, and notes for the user."""
 
     robot: str
     wish: Wish
@@ -65,32 +65,32 @@ def tune(
     allow_outside: bool = False,
     simulated: bool = False,
 ) -> Tuning:
-    """Gains for the loops of a controllers file.
+    """Propose gains for the loops of a controllers file.
 
     Args:
         robot_path, controllers_path: the two files.
-        wish: what is wanted.
-        joints: only these; () is all that have gains.
-        step: that must not saturate [rad]; a tenth of it [m] for joints that slide.
-        package_path, allow_outside: as everywhere.
-        simulated: also let every joint of the whole robot step in the engine, under gravity.
+        wish: bandwidth, damping and control period.
+        joints: only these joints; (): all joints with gains.
+        step: size of a step [rad] that must not saturate; a tenth of it [m] for prismatic joints.
+        package_path, allow_outside: see `read_robot`.
+        simulated: also step every joint of the whole robot in the engine, under gravity.
 
     Raises:
-        InvalidInput: a file cannot be used, a joint has no loop, nothing has gains, or none are stable.
+        InvalidInput: a file is invalid, a joint has no loop, no controller has gains, or no gains are stable.
     """
     _, robot, _ = read_robot(robot_path, package_path=package_path, allow_outside=allow_outside)
     file = load.load_controllers(controllers_path, model=controllers_spec())
     tuner = _Tuner(robot, file, wish, step)
     everything = tuner.proposals()
-    there = [one.joint for one in everything]
+    there = [tuned.joint for tuned in everything]
     for joint in joints:
         if joint not in there:
             hint = did_you_mean(joint, there, kind="joints with gains")
             raise InvalidInput([Diagnostic("TUNE001", f"joint '{joint}' has no loop to propose gains for", hint=hint)])
-    found = tuple(one for one in everything if not joints or one.joint in joints)
+    found = tuple(tuned for tuned in everything if not joints or tuned.joint in joints)
     if simulated:
         found = simulated_answers(
-            robot, file.spec, everything, [one.joint for one in found], wish, configuration(robot)
+            robot, file.spec, everything, [tuned.joint for tuned in found], wish, configuration(robot)
         )
     return Tuning(robot.name, wish, found, _with_gains(file.spec, found), tuner.notes)
 
@@ -106,20 +106,20 @@ def written(tuning: Tuning, controllers_path: Path) -> str:
 
 
 def chart_of(tuning: Tuning) -> Chart:
-    """The answers to a step, a panel a controller; what was simulated over what was predicted."""
+    """The step responses, predicted and simulated, with one panel per controller."""
     from manipcli.replay.curves import Chart, Curve, Panel
 
     panels, end = [], 0.1
-    for name in dict.fromkeys(one.controller for one in tuning.joints):
+    for name in dict.fromkeys(tuned.controller for tuned in tuning.joints):
         curves = []
-        for one in tuning.joints:
-            for log, answer in (("predicted", one.predicted), ("simulated", one.simulated)):
-                if one.controller == name and answer is not None:
+        for tuned in tuning.joints:
+            for log, answer in (("predicted", tuned.predicted), ("simulated", tuned.simulated)):
+                if tuned.controller == name and answer is not None:
                     log = log if any(each.simulated for each in tuning.joints) else ""
-                    curves.append(Curve(one.joint, one.joint, log, answer.times, 100.0 * answer.share))
+                    curves.append(Curve(tuned.joint, tuned.joint, log, answer.times, 100.0 * answer.share))
                     end = max(end, min(1.6 * answer.settling_time, float(answer.times[-1])))
-        panels.append(Panel(name, "done of the step", "%", tuple(curves)))
-    return Chart(title=f"{tuning.robot}: answers to a step", panels=tuple(panels), steps=(), start=0.0, end=end)
+        panels.append(Panel(name, "step response", "%", tuple(curves)))
+    return Chart(title=f"{tuning.robot}: step responses", panels=tuple(panels), steps=(), start=0.0, end=end)
 
 
 class _Tuner:
@@ -139,14 +139,14 @@ class _Tuner:
             raise InvalidInput(missing)
 
     def proposals(self) -> tuple[Tuned, ...]:
-        """Of every loop in the file; of several on one joint, of that which is active at the start."""
+        """Proposals for every loop in the file; for several loops on one joint, for the active one."""
         efforts: list[tuple[str, str, bool]] = []
         velocities: list[tuple[str, str]] = []
         elsewhere = self._elsewhere()
         for name, spec in self._file.spec.controllers.items():
             if name in elsewhere:
-                told = f"{name}: its gains stay, because joints of it are those of {elsewhere[name]}"
-                self.notes += (f"{told}; `active` says which one is tuned",)
+                note = f"{name}: its gains are unchanged, it shares joints with {elsewhere[name]}"
+                self.notes += (f"{note}; set `active` on the controller to tune",)
                 continue
             match CONTROLLERS[spec.type].loop(spec):
                 case PidLoop(tunable=True, carries_weight=carried):
@@ -155,10 +155,10 @@ class _Tuner:
                     else:
                         velocities += [(name, joint) for joint in spec.joints]
                 case PidLoop():
-                    self.notes += (f"{name}: gains of the type {spec.type} are not proposed",)
+                    self.notes += (f"{name}: no gains are proposed for the type {spec.type}",)
                 case InverseDynamicsLoop():
-                    told = f"the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` give them"
-                    self.notes += (f"{name}: {told}",)
+                    note = f"the type {spec.type} needs no gains, its `bandwidth` and `damping_ratio` define them"
+                    self.notes += (f"{name}: {note}",)
                 case NoLoop(reason) if spec.interfaces:
                     self.notes += (f"{name}: {reason}",)
         if not efforts and not velocities:
@@ -168,10 +168,10 @@ class _Tuner:
         return self._of_efforts(efforts) + self._of_velocities(velocities)
 
     def _elsewhere(self) -> dict[str, str]:
-        """The controllers of which joints have a loop in another one, and which: what is active comes first."""
+        """Controllers that share joints with another loop -> that controller; active controllers come first."""
         owners: dict[str, str] = {}
         found: dict[str, str] = {}
-        for name, spec in sorted(self._file.spec.controllers.items(), key=lambda one: not one[1].active):
+        for name, spec in sorted(self._file.spec.controllers.items(), key=lambda item: not item[1].active):
             if _tunable(spec) is not None:
                 first = next((owners[joint] for joint in spec.joints if joint in owners), None)
                 if first is None:
@@ -188,64 +188,62 @@ class _Tuner:
         carried = np.array([each for _, _, each in loops])
         steps = np.array([self._step_of(joint) for joint in joints])
         pressing = np.array([self._pressing(name, joint) for name, joint, _ in loops])
-        postures = self._postures().position
-        heaviest = [self._extreme(joints, partial(_inertia, k), postures) for k in range(len(joints))]
-        lightest = [self._extreme(joints, partial(_lightness, k), postures) for k in range(len(joints))]
-        postures = np.vstack([postures, *heaviest, *lightest])
+        known = self._configurations().position
+        heaviest = [self._extreme(joints, partial(_inertia, k), known) for k in range(len(joints))]
+        lightest = [self._extreme(joints, partial(_lightness, k), known) for k in range(len(joints))]
+        known = np.vstack([known, *heaviest, *lightest])
         for _ in range(ROUNDS):
-            met = self._load(joints, postures)
+            met = self._load(joints, known)
             tuned = tune_efforts(names, met, self._wish, steps=steps, carried=carried, pressing=pressing)
             tight = partial(tightness, tuned=tuned, wish=self._wish)
-            tightest = self._extreme(joints, tight, postures, starts=3)
+            tightest = self._extreme(joints, tight, known, starts=3)
             margin = least_margin(self._load(joints, tightest[None]), tuned, self._wish)
             if margin >= MARGIN:
                 break
-            postures = np.vstack([postures, tightest])
+            known = np.vstack([known, tightest])
         self._refuse_hopeless(tuned)
-        raised = [one.joint for one in tuned if one.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
+        raised = [each.joint for each in tuned if each.frequency > self._wish.bandwidth * (1.0 + 1e-9)]
         if raised:
-            self.notes += (f"Raised, so that a finger presses with all its effort over its travel: {listed(raised)}.",)
+            self.notes += (f"Gains raised so that a finger reaches its full effort over its travel: {listed(raised)}.",)
         if margin < MARGIN:
-            self._tell_margin(margin)
+            self._check_margin(margin)
         return tuned
 
     def _load(self, joints: list[str], q: Array) -> JointSpaceLoad:
         return load_of(self._robot, self._kinematics, joints, Configurations.at_rest(q))
 
     def _extreme(
-        self, joints: list[str], score: Callable[[JointSpaceLoad], Array], postures: Array, *, starts: int = 1
+        self, joints: list[str], score: Callable[[JointSpaceLoad], Array], known: Array, *, starts: int = 1
     ) -> Array:
-        """(n) the posture in which the score of what these joints meet is largest, uphill from `postures` (T, n)."""
-        return climbed(self._robot, lambda q: score(self._load(joints, q)), postures, *self._range(), starts=starts)
+        """(n) the configuration with the largest score of the joint-space load, searched from `known` (T, n)."""
+        return climbed(self._robot, lambda q: score(self._load(joints, q)), known, *self._range(), starts=starts)
 
-    def _tell_margin(self, margin: float) -> None:
-        """Notes that less than `MARGIN` is left; raises InvalidInput where these gains are unstable (0)."""
-        there = f"in a posture that was found last, after {ROUNDS} rounds of calming all gains"
+    def _check_margin(self, margin: float) -> None:
+        """Add a note on a gain margin below `MARGIN`; raises InvalidInput for unstable gains (below 1)."""
+        there = f"in the last configuration found, after {ROUNDS} rounds of reducing all gains"
         if margin < 1.0:
-            hint = "a shorter `--period`, or less `--bandwidth`"
-            message = f"no gains were found that are stable in all postures: these are unstable {there}"
+            hint = "use a shorter `--period` or a lower `--bandwidth`"
+            message = f"no gains are stable in all configurations: they are unstable {there}"
             raise InvalidInput([Diagnostic("TUNE003", message, self._file.place("controllers"), hint)])
         left, wanted = told_apart(margin, MARGIN, form=".2g")
-        self.notes += (f"But {there}, all of them together may grow by {left} alone, not by {wanted}.",)
+        self.notes += (f"Gain margin {left} of all loops together is below {wanted} {there}.",)
 
     def _refuse_hopeless(self, tuned: Sequence[Tuned]) -> None:
-        """Raises InvalidInput where what is stable is next to nothing."""
+        """Raise InvalidInput if the stable bandwidth is below `HOPELESS`."""
         period = f"{1e3 * self._wish.period:g} ms"
-        hint = (
-            "a shorter `--period`, less latency of the actuators, or masses and moments that are nearer to each other"
-        )
+        hint = "use a shorter `--period` or less actuator latency, or check the masses and inertias for a large ratio"
         hopeless = []
-        for one in tuned:
-            if one.limited_by not in ("control step", "other joints"):
+        for proposal in tuned:
+            if proposal.limited_by not in ("control step", "other joints"):
                 continue
-            if one.frequency < HOPELESS * self._wish.bandwidth:
-                unit = self._robot.joint(one.joint).inertia_unit
+            if proposal.frequency < HOPELESS * self._wish.bandwidth:
+                unit = self._robot.joint(proposal.joint).inertia_unit
                 message = (
-                    f"{one.joint}: no useful gains are stable at {period}: less than {one.frequency:.2g} Hz of the "
-                    f"{self._wish.bandwidth:g} Hz asked for; its inertia is {one.inertia:.2g} {unit} at most, and "
-                    f"{one.least:.2g} {unit} at least"
+                    f"{proposal.joint}: no useful gains are stable at {period}: bandwidth below "
+                    f"{proposal.frequency:.2g} Hz instead of {self._wish.bandwidth:g} Hz; "
+                    f"its inertia is {proposal.least:.2g} to {proposal.inertia:.2g} {unit}"
                 )
-                place = self._file.place("controllers", one.controller, "gains", one.joint)
+                place = self._file.place("controllers", proposal.controller, "gains", proposal.joint)
                 hopeless.append(Diagnostic("TUNE003", message, place, hint))
         if hopeless:
             raise InvalidInput(hopeless)
@@ -253,7 +251,7 @@ class _Tuner:
     def _of_velocities(self, loops: list[tuple[str, str]]) -> tuple[Tuned, ...]:
         if not loops:
             return ()
-        found = load_of(self._robot, self._kinematics, [joint for _, joint in loops], self._postures())
+        found = load_of(self._robot, self._kinematics, [joint for _, joint in loops], self._configurations())
         tuned = []
         for k, (name, joint) in enumerate(loops):
             limits = self._robot.joint(joint).limits
@@ -274,7 +272,7 @@ class _Tuner:
         return tuple(tuned)
 
     def _pressing(self, controller: str, joint: str) -> float:
-        """p with which the joint of a hand gives its effort over its travel; 0 of others, and where one is unknown."""
+        """The p gain that gives the full effort of a hand joint over its travel; 0 for others, and if unknown."""
         spec, limits = self._file.spec.controllers[controller], self._robot.joint(joint).limits
         hand = CONTROLLERS[spec.type].hand
         if hand is None:
@@ -286,48 +284,48 @@ class _Tuner:
     def _step_of(self, joint: str) -> float:
         return self._step * (0.1 if self._robot.joint(joint).type == "prismatic" else 1.0)
 
-    def _postures(self) -> Configurations:
-        """The named ones, and some from the whole range of the joints."""
+    def _configurations(self) -> Configurations:
+        """Named configurations, and random ones from the whole range of the joints."""
         start = configuration(self._robot)
         rng = np.random.default_rng(0)
-        spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_POSTURES, len(start)))]
+        spread = [with_mimics(self._robot, q) for q in rng.uniform(*self._range(), (RANDOM_CONFIGURATIONS, len(start)))]
         return Configurations.at_rest(np.vstack([named_configurations(self._robot, start), *spread]))
 
     def _range(self) -> tuple[Array, Array]:
-        """(n), (n) the least and the greatest of the joints."""
+        """(n), (n) lower and upper ends of the joint ranges."""
         start = configuration(self._robot)
         lower, upper = np.array([joint.limits.range for joint in self._robot.moving_joints]).reshape(-1, 2).T
         return np.where(np.isneginf(lower), start - WIDE, lower), np.where(np.isposinf(upper), start + WIDE, upper)
 
 
 def _tunable(spec: ControllerSpec) -> PidLoop | None:
-    """Its loop, where gains are proposed for it."""
+    """The loop of a controller if gains can be proposed for it; else None."""
     loop = CONTROLLERS[spec.type].loop(spec)
     return loop if isinstance(loop, PidLoop) and loop.tunable else None
 
 
 def _inertia(k: int, load: JointSpaceLoad) -> Array:
-    """(T,) of a joint whose others stand."""
+    """(T,) inertia of joint `k` with all others fixed."""
     return load.held_inertia[:, k]
 
 
 def _lightness(k: int, load: JointSpaceLoad) -> Array:
-    """(T,) the inverse of what the effort of a joint alone moves."""
+    """(T,) inverse of the inertia of joint `k` with all others free."""
     return np.asarray(1.0 / load.own_inertia[:, k])
 
 
 def _with_gains(spec: ControllersSpec, tuned: Sequence[Tuned]) -> ControllersSpec:
     changed = dict(spec.controllers)
-    for one in tuned:
-        own = changed[one.controller]
+    for proposal in tuned:
+        own = changed[proposal.controller]
         loop = _tunable(own)
         assert loop is not None
-        old = loop.gains.get(one.joint, GainsSpec())
-        update: dict[str, float | None] = {"p": one.p, "d": one.d}
-        if one.i or old.i:
-            update |= {"i": one.i, "i_clamp": one.i_clamp}
-        if one.interface == "velocity":
+        old = loop.gains.get(proposal.joint, GainsSpec())
+        update: dict[str, float | None] = {"p": proposal.p, "d": proposal.d}
+        if proposal.i or old.i:
+            update |= {"i": proposal.i, "i_clamp": proposal.i_clamp}
+        if proposal.interface == "velocity":
             update["ff_velocity_scale"] = 1.0
-        gains = {**loop.gains, one.joint: old.model_copy(update=update)}
-        changed[one.controller] = own.model_copy(update={"gains": gains})
+        gains = {**loop.gains, proposal.joint: old.model_copy(update=update)}
+        changed[proposal.controller] = own.model_copy(update={"gains": gains})
     return spec.model_copy(update={"controllers": changed})

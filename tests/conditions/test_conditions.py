@@ -211,7 +211,7 @@ def test_a_tilt_just_beyond_is_told_with_digits_that_differ() -> None:
     leaning = state(poses={"cup": Transform.of(rpy=(tilt, 0, 0))})
     found = read("upright", leaning, object="cup", within=np.radians(30.0)).found(0)
     assert found.margin == pytest.approx(-2e-5)
-    assert found.text == "'cup' leans 30.001 deg; within 30 deg"
+    assert found.text == "'cup' is tilted 30.001 deg; within 30 deg"
 
 
 @pytest.mark.parametrize(
@@ -405,7 +405,7 @@ def test_all_ticks_at_once_give_what_pieces_of_them_give(
         ("upright", {"object": "cp", "within": 0.1}, ("object",), "did you mean 'cup'?"),
         ("near", {"object": "cup", "to": "stat", "within": 0.1}, ("to",), "did you mean 'start'?"),
         ("near", {"object": "cup", "to": "drp", "within": 0.1}, ("to",), "did you mean 'drop'?"),
-        ("near", {"object": "cup", "to": "cup", "within": 0.1}, ("to",), "`to: start` is where it was at first"),
+        ("near", {"object": "cup", "to": "cup", "within": 0.1}, ("to",), "use `to: start` for its position at time 0"),
         ("at_rest", {"object": "trai"}, ("object",), "did you mean 'tray'?"),
         ("outside", {"object": "ball", "of": "stick"}, ("of",), None),
         ("above", {"object": "cup", "of": "try"}, ("of",), "did you mean 'tray'?"),

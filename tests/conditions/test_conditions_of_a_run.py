@@ -138,7 +138,7 @@ def test_rests_on_is_the_share_of_the_weight() -> None:
     held = touching((0.0, [("cube", "desk", weight)]), (0.5, [("cube", "desk", 0.25 * weight)]))
     found = read("rests_on", held, object="cube", of="desk")
     assert found.margins[[0, 49, 50]] == pytest.approx([weight / 2, weight / 2, -weight / 4])
-    assert found.found(0).text == "'cube' presses on 'desk' with 19.6 N; at least 9.81 N of its weight of 19.6 N"
+    assert found.found(0).text == "'cube' presses on 'desk' with 19.6 N, its weight is 19.6 N; at least 9.81 N"
 
 
 @pytest.mark.parametrize("share", [0.5, 0.1, 1.0])
@@ -199,8 +199,8 @@ def test_collision_and_its_absence_name_the_hardest_touch() -> None:
     moments = touching((0.2, [("desk", "robot/one", 2.0), ("desk", "robot/thumb", 5.0)]), (0.4, []))
     none = read("no_collision", moments, pairs=[["robot", "desk"]])
     assert none.margins[[0, 19, 20, 39, 40]] == pytest.approx([0, 0, -5, -5, 0])
-    assert (none.found(20).text, none.found(20).at) == ("'desk' and 'robot/thumb' press with 5 N", 0.2)
-    assert (none.found(0).text, none.found(0).at) == ("never touched", None)
+    assert (none.found(20).text, none.found(20).at) == ("'desk' and 'robot/thumb' touch with 5 N", 0.2)
+    assert (none.found(0).text, none.found(0).at) == ("no contact", None)
     some = read("collision", moments, pairs=[["desk", "robot/one"]], above=1.5)
     assert some.margins[[0, 20, 40]] == pytest.approx([-1.5, 0.5, -1.5])
     short = CONDITIONS["collision"].spec.model_validate(["robot", "desk"])
@@ -252,7 +252,7 @@ def test_slip_is_a_turn_too_and_a_new_grasp_begins_anew() -> None:
 def test_an_object_that_nobody_holds_has_no_slip() -> None:
     found = read("slip", touching((0.0, GRIP[:1])), object="cube", within=0.01)
     assert not found.applies.any()
-    assert found.idle == "the robot never held 'cube' between two links with 0.1 N"
+    assert found.idle == "'cube' was never held by two links with 0.1 N each"
 
 
 def test_tool_speed_is_that_of_a_point_on_a_circle() -> None:
@@ -277,7 +277,7 @@ def test_energy_is_the_positive_work_of_the_joints() -> None:
     assert found.margins[0] == 10.0
     assert found.margins[-1] == pytest.approx(10 - 2.0 - 3.0 / np.pi, abs=1e-3)  # trapezoids: (2 pi / 100)^2 / 12
     np.testing.assert_array_less(-1e-12, -np.diff(found.margins))
-    assert found.found(100).text == "2.95 J of 10 J"
+    assert found.found(100).text == "2.95 J; below 10 J"
     arm = read("energy", still(velocity=velocity, effort=effort), below=0.9, group="arm")
     assert arm.margins[-1] == pytest.approx(0.9 - 3.0 / np.pi, abs=1e-3)
 
@@ -330,7 +330,7 @@ def test_tracking_of_a_joint_without_a_controller_cannot_be_judged() -> None:
     condition: Condition[Any] = CONDITIONS["tracking"]
     spec = condition.spec(group="all", within=0.1)
     assert condition.absent(spec, replace(WORLD, referenced=frozenset({"j1"}))) == (
-        "the recording holds no reference of joint 'slide'"
+        "the recording has no reference of joint 'slide'"
     )
 
 
@@ -349,10 +349,10 @@ def test_a_joint_that_leans_on_its_stop_keeps_its_limit_and_one_beyond_it_is_tol
 @pytest.mark.parametrize(
     ("name", "written", "told"),
     [
-        ("energy", {"below": 1}, "no joint needs any effort"),
-        ("tracking", {"group": "arm", "within": 0.1}, "every reference comes true at once"),
-        ("limits", {}, "no joint needs any effort; `of: [position, velocity]` asks for the rest"),
-        ("limits", {"of": ["effort"]}, "no joint needs any effort"),
+        ("energy", {"below": 1}, "joints have no efforts"),
+        ("tracking", {"group": "arm", "within": 0.1}, "tracking is ideal"),
+        ("limits", {}, "joints have no efforts; use `of: [position, velocity]`"),
+        ("limits", {"of": ["effort"]}, "joints have no efforts"),
         ("limits", {"of": ["velocity", "position"]}, None),
     ],
 )
@@ -378,7 +378,7 @@ def test_duration_counts_from_the_first_tick_that_is_shown() -> None:
     condition: Condition[Any] = CONDITIONS["duration"]
     late = condition.open(condition.spec(below="250 ms"), WORLD)(still().part(20, 61))
     assert late.margins[[0, 25, 40]] == pytest.approx([0.25, 0.0, -0.15])
-    assert late.found(40).text == "0.400 s of 0.25 s"
+    assert late.found(40).text == "0.400 s; below 0.25 s"
     assert read("duration", still(), below=2).margins[-1] == pytest.approx(1.0)
 
 
@@ -402,7 +402,7 @@ def test_a_step_is_done_from_its_end_on() -> None:
         ("contact_force", {"of": "cbe", "below": 1}, ("of",), "did you mean 'cube'?"),
         ("no_collision", {"pairs": [["robot", "deks"]]}, ("pairs", 0, 1), "did you mean 'desk'?"),
         ("collision", ["robt", "desk"], ("pairs", 0, 0), "did you mean 'robot'?"),
-        ("collision", ["finger", "desk"], ("pairs", 0, 0), "links are written with the robot: 'robot/finger'"),
+        ("collision", ["finger", "desk"], ("pairs", 0, 0), "name a link with its robot: 'robot/finger'"),
         ("tracking", {"group": "ram", "within": 1}, ("group",), "did you mean 'arm'?"),
         ("limits", {"group": "ram"}, ("group",), "did you mean 'arm'?"),
         ("tool_speed", {"below": 1, "link": "fingr"}, ("link",), "did you mean 'finger'?"),
@@ -422,9 +422,9 @@ def test_what_robot_scene_and_steps_do_not_know_is_told(
 @pytest.mark.parametrize(
     ("pair", "told"),
     [
-        (["robot", "robot"], "the robot does not collide with itself"),
-        (["robot/finger", "robot"], "the robot does not collide with itself"),
-        (["robot/finger", "robot/thumb"], "the robot does not collide with itself"),
+        (["robot", "robot"], "the simulation has no self-collision of the robot"),
+        (["robot/finger", "robot"], "the simulation has no self-collision of the robot"),
+        (["robot/finger", "robot/thumb"], "the simulation has no self-collision of the robot"),
         (["cube", "cube"], "'cube' cannot touch itself"),
         (["desk", "shelf"], "'desk' and 'shelf' are both fixed"),
         (["desk", f"robot/{ROBOT.root}"], f"'desk' and 'robot/{ROBOT.root}' are both fixed"),
@@ -457,7 +457,7 @@ def test_a_short_collision_is_two_names(name: str, written: Any) -> None:
 
 @pytest.mark.parametrize("above", [1.0, 3.0])
 def test_a_range_of_forces_in_which_no_force_is_is_refused(above: float) -> None:
-    with pytest.raises(ValidationError, match=r"no force is below 1 N and above [13] N"):
+    with pytest.raises(ValidationError, match=r"`above` [13] N is not less than `below` 1 N"):
         CONDITIONS["contact_force"].spec.model_validate({"of": "cube", "below": 1.0, "above": above})
 
 

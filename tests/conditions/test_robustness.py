@@ -75,7 +75,7 @@ def of(formula: Node | Leaf) -> Robustness:
             TIMES,
             unit=formula.unit,
             scale=UNITS[formula.unit],
-            say=lambda k: f"{formula.margins[k]:g} {formula.unit}",
+            describe=lambda k: f"{formula.margins[k]:g} {formula.unit}",
             applies=np.array(formula.applies),
             idle=f"{formula.name} rests",
         )
@@ -165,7 +165,7 @@ def test_over_time_it_is_the_extreme_of_what_applies_wherever_it_is_cut(
 
 
 def test_of_a_condition_without_room_and_its_not_exactly_one_is_met() -> None:
-    untouched = robustness(np.array([0.0]), TIMES[:1], unit="N", scale=1.0, say=lambda k: "never touched")
+    untouched = robustness(np.array([0.0]), TIMES[:1], unit="N", scale=1.0, describe=lambda k: "never touched")
     against = opposite(untouched)
     for one, met in ((untouched, True), (against, False), (never(untouched), False), (opposite(against), True)):
         assert (one.order >= 0.0).tolist() == [met]
@@ -176,7 +176,7 @@ def test_of_a_condition_without_room_and_its_not_exactly_one_is_met() -> None:
 
 @given(st.lists(st.floats(-3 * EDGE, 3 * EDGE), min_size=2, max_size=4))
 def test_also_beside_the_edge_not_of_all_is_any_of_nots(margins: list[float]) -> None:
-    members = [robustness(np.array([one]), TIMES[:1], unit="N", scale=1.0, say=str) for one in margins]
+    members = [robustness(np.array([one]), TIMES[:1], unit="N", scale=1.0, describe=str) for one in margins]
     every, against = opposite(least(members)), greatest([opposite(one) for one in members])
     assert every.margins.tolist() == against.margins.tolist() == [every.found(0).margin]
     assert (every.margins[0] >= 0.0) == (min(margins) < 0.0)
@@ -184,8 +184,8 @@ def test_also_beside_the_edge_not_of_all_is_any_of_nots(margins: list[float]) ->
 
 
 def test_signs_come_before_sizes_where_units_differ() -> None:
-    tilt = robustness(np.array([0.5, -0.001]), TIMES[:2], unit="rad", scale=0.1, say=lambda k: "tilt")
-    near = robustness(np.array([0.01, 0.019]), TIMES[:2], unit="m", scale=0.02, say=lambda k: "near")
+    tilt = robustness(np.array([0.5, -0.001]), TIMES[:2], unit="rad", scale=0.1, describe=lambda k: "tilt")
+    near = robustness(np.array([0.01, 0.019]), TIMES[:2], unit="m", scale=0.02, describe=lambda k: "near")
     both = least([tilt, near])
     assert [both.found(k).unit for k in (0, 1)] == ["m", "rad"]
     assert both.relative == pytest.approx([0.5, -0.01])
@@ -196,7 +196,7 @@ def test_signs_come_before_sizes_where_units_differ() -> None:
 
 def test_never_is_told_as_it_was_asked_and_never_not_as_always() -> None:
     def of(text: str) -> Robustness:
-        return robustness(np.array([1.0]), np.array([0.0]), unit="m", scale=1.0, say=lambda k: text)
+        return robustness(np.array([1.0]), np.array([0.0]), unit="m", scale=1.0, describe=lambda k: text)
 
     assert (
         never(of("'cup' moved by 38 mm; at least 60 mm")).found(0).text == "'cup' moved by 38 mm; never at least 60 mm"
@@ -207,8 +207,8 @@ def test_never_is_told_as_it_was_asked_and_never_not_as_always() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_what_is_not_a_number_is_never_lost(bad: float) -> None:
-    broken = robustness(np.array([1.0, bad, 1.0]), TIMES[:3], unit="m", scale=1.0, say=lambda k: "broken")
-    fine = robustness(np.full(3, -0.5), TIMES[:3], unit="m", scale=1.0, say=lambda k: "fine")
+    broken = robustness(np.array([1.0, bad, 1.0]), TIMES[:3], unit="m", scale=1.0, describe=lambda k: "broken")
+    fine = robustness(np.full(3, -0.5), TIMES[:3], unit="m", scale=1.0, describe=lambda k: "fine")
     for pick in ("least", "greatest"):
         extreme = Extreme(pick)  # type: ignore[arg-type]
         extreme.add(broken, TIMES[:3], 2)
@@ -224,5 +224,5 @@ def test_what_is_not_a_number_is_never_lost(bad: float) -> None:
 def test_nothing_looked_at_is_nothing_found() -> None:
     extreme = Extreme("least")
     assert extreme.found is None
-    extreme.add(robustness(np.ones(2), TIMES[:2], unit="m", scale=1.0, say=str), TIMES[:2], 1, 1)
+    extreme.add(robustness(np.ones(2), TIMES[:2], unit="m", scale=1.0, describe=str), TIMES[:2], 1, 1)
     assert extreme.found is None

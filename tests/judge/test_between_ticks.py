@@ -122,7 +122,7 @@ def test_a_knock_between_two_ticks_is_told_with_who_knocked() -> None:
     knock = [(0, 1.0), (55, 300.0), (56, 1.0)]
     found = judged(recording(knock, EVERY), {"no_collision": {"pairs": [FORCE["pair"]], "below": 20.0}})
     assert found.outcome == "failed" and found.margin == pytest.approx(-280.0)
-    assert "'block' and 'cube' press with 300 N" in found.text and found.at == pytest.approx(0.055)
+    assert "'block' and 'cube' touch with 300 N" in found.text and found.at == pytest.approx(0.055)
     found = judged(recording(knock, EVERY), {"contact_force": {**FORCE, "below": 50.0}, "during": "a"})
     assert (found.outcome, found.margin) == ("failed", pytest.approx(-250.0))
     assert (

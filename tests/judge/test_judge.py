@@ -156,7 +156,7 @@ def moved(body: int, from_tick: int, by: tuple[float, float, float], to_tick: in
 def test_a_task_without_expectations_passes_when_its_steps_are_done_and_says_so() -> None:
     verdict = judged(recording())
     assert verdict.verdict == "passed"
-    assert verdict.text == "all 2 steps done; the task states no expectations"
+    assert verdict.text == "all 2 steps done; the task has no expectations"
     assert (verdict.task, verdict.seed, verdict.engine) == ("t", 7, "pybullet")
     assert verdict.simulated_time == pytest.approx(2.0)
     assert [(s.id, s.verb, s.outcome, s.started, s.ended, s.planned_duration) for s in verdict.steps] == [
@@ -294,7 +294,7 @@ def test_a_recording_without_states_evaluates_nothing() -> None:
 def test_a_body_that_was_not_recorded_is_named() -> None:
     made = recording(body_names=("ball", "other"))
     found = one(made, "near", object="cube", to="start", within=1)
-    assert (found.outcome, found.text) == ("not_evaluated", "the recording does not hold body 'cube'")
+    assert (found.outcome, found.text) == ("not_evaluated", "the recording has no body 'cube'")
 
 
 def test_a_state_that_is_not_finite_is_never_a_pass() -> None:
@@ -327,7 +327,7 @@ def test_a_complete_run_whose_events_are_missing_is_not_judged_as_if_it_were_who
     events = (*step("go", 0.0, 1.0), step("wait_1", 1.0, 2.0)[0])
     cut = judged(recording(events=events))
     assert (cut.verdict, cut.errors[0].code) == ("error", "RUN104")
-    assert "no end of step 'wait_1'" in cut.text
+    assert "the end of step 'wait_1' is missing" in cut.text
     assert cut.steps[1].outcome == "interrupted"
     silent = judged(recording(events=(), silent=("/task/events",)))
     assert (silent.verdict, silent.errors[0].code) == ("error", "RUN104")
@@ -343,7 +343,7 @@ def test_a_copy_without_its_last_ticks_is_not_judged_as_if_it_were_whole(until: 
     found = judged(recording(metadata=run() | stored))
     assert (end, found.verdict) == (2.0, verdict)
     if verdict == "error":
-        assert found.text == "the log is incomplete: it ends at 2.000 s, and the run at 3.000 s"
+        assert found.text == "the log is incomplete: it ends at 2.000 s, the run at 3.000 s"
 
 
 def test_what_needs_contacts_is_not_evaluated_without_any_message_of_them() -> None:
@@ -453,10 +453,10 @@ def test_a_step_is_not_done_before_its_end() -> None:
     for scope in ({"at": "wait_1"}, {"during": ["go", "wait_1"]}):
         (spec,) = expectations({"step_done": {"step": "wait_1"}, **scope})
         (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
-        assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
+        assert problem.message == "step 'wait_1' is not done yet when this is evaluated"
     (spec,) = expectations({"step_done": {"step": "wait_1"}, "at": "go"})
     (problem,) = expectation_problems(spec, SETTING, CONDITIONS)
-    assert problem.message == "step 'wait_1' is not done before its end, and this is asked before"
+    assert problem.message == "step 'wait_1' is not done yet when this is evaluated"
     (either,) = expectations({"eventually": {"step_done": {"step": "go"}}, "during": ["go", "wait_1"]})
     assert expectation_problems(either, SETTING, CONDITIONS) == ()
     (later,) = expectations({"step_done": {"step": "go"}, "at": "wait_1"})

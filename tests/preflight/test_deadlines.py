@@ -34,11 +34,11 @@ def _told(tmp_path: Path, timeout: float, wait: float) -> list[tuple[str, int | 
 
 def test_a_timeout_shorter_than_the_plan_is_told(tmp_path: Path) -> None:
     ((message, line),) = _told(tmp_path, 0.1, 2.0)
-    assert message.startswith("step 'move_1' is planned to take 0.") and message.endswith("times out after 0.1 s")
+    assert message.startswith("step 'move_1' times out after 0.1 s, its plan takes 0.")
     assert line == 6
 
 
 @pytest.mark.parametrize(("wait", "told"), [(1.999, True), (2.0, False), (2.1, False)])
 def test_it_is_told_from_the_planned_duration_on(tmp_path: Path, wait: float, told: bool) -> None:
     messages = [message for message, _ in _told(tmp_path, 100.0, wait)]
-    assert messages == (["step 'wait_1' is planned to take 2 s, and times out after 1.999 s"] if told else [])
+    assert messages == (["step 'wait_1' times out after 1.999 s, its plan takes 2 s"] if told else [])

@@ -53,7 +53,7 @@ def test_gains_of_a_controller_that_a_step_switches_on_are_looked_at(found: Foun
     assert found(PLACED, wild, steps=f"{{{UP}}}") == ()
     (one,) = found(PLACED, wild, steps=f"{{{UP}}}, {{{TO_B}}}, {{{DOWN}}}, {{{TO_A}}}, {{{UP}}}, {{{TO_B}}}")
     assert (one.code, one.severity) == ("CTRL150", "warning")
-    assert one.message.startswith(f"hinge: d 200 is unstable above {BOUND:.3g}")
+    assert one.message.startswith(f"hinge: d 200 is unstable, the limit is {BOUND:.3g}")
     assert one.place is not None
     assert (Path(one.place.file).name, one.place.line) == ("c.yaml", 3)
 
@@ -66,7 +66,7 @@ def test_they_are_looked_at_where_the_robot_is_while_it_is_active(found: Found) 
     assert found(PLACED, soft, steps=f"{{{TO_B}}}, {{{TO_A}}}, {there_and_back}") == ()
     (one,) = found(PLACED, soft, steps=f"{{{UP}}}, {{{TO_B}}}, {{{TO_A}}}, {{{DOWN}}}")
     assert one.code == "CTRL156"
-    assert "hinge: p 20 gives way by 0.11 rad under 2.29 N m of gravity" in one.message
+    assert "hinge: p 20 sags 0.11 rad under its gravity load of 2.29 N m" in one.message
 
 
 def test_who_stays_while_others_change_is_told_once(found: Found) -> None:
@@ -104,4 +104,4 @@ def test_the_effort_limit_is_examined_whatever_the_type_of_the_controller_is(fou
     task = load_task(tmp_path / "task.yaml", overrides=["robot=weak.yaml", "start=up"])
     (one,) = preflight_findings(task)
     assert (one.code, one.severity) == ("CTRL155", "warning")
-    assert one.message.startswith("hinge: holding against gravity takes up to 2.29 N m, its limit is 1 N m")
+    assert one.message.startswith("hinge: gravity needs up to 2.29 N m, its effort limit is 1 N m")

@@ -57,7 +57,7 @@ def test_a_hand_that_is_told_to_be_faster_than_a_joint_may_be_is_doubted(small: 
         assert preflight_findings(load_task(small, overrides=[f"{SPEED}={speed}"])) == ()
     (found,) = preflight_findings(load_task(small, overrides=[f"{SPEED}=0.25"]))
     assert (found.code, found.severity) == ("CTRL167", "warning")
-    assert found.message == ("panda_finger_joint1: its references move at 0.25 m/s, its velocity limit is 0.2 m/s")
+    assert found.message == ("panda_finger_joint1: closing speed 0.25 m/s exceeds its velocity limit 0.2 m/s")
 
 
 PICK = (ROOT / "tasks" / "pick_place.yaml").read_text(encoding="utf-8").partition("  - lift:")[0]
@@ -77,8 +77,8 @@ def test_a_finger_too_soft_for_its_grasp_is_told_with_what_it_gives(pick: Path) 
     gain = "controllers.hand_controller.gains.panda_finger_joint1.p"
     (found,) = preflight_findings(load_task(pick, overrides=[f"{gain}=500"]))
     assert (found.code, found.severity) == ("CTRL168", "warning")
-    assert found.message == "panda_finger_joint1: step 'pick_1' grasps with 7 N; p 500 gives about 5 N"
-    assert found.hint == "p 840 gives a fifth more than that"
+    assert found.message == "panda_finger_joint1: p 500 gives about 5 N, step 'pick_1' asks for 7 N"
+    assert found.hint == "raise p to 840 for 20 % more than 7 N"
     heard: list[str] = []
 
     def told_of(overrides: list[str]) -> str:
@@ -104,8 +104,10 @@ def test_an_object_of_next_to_no_mass_beside_the_grip_is_doubted(pick: Path, gra
     assert preflight_findings(load_task(pick, overrides=[there, "scene.block.mass=10 g"])) == ()
     (found,) = preflight_findings(load_task(pick, overrides=[there, "scene.block.mass=5 g"]))
     assert (found.code, found.severity) == ("TASK239", "warning")
-    assert found.message == ("step 'pick_1': 7 N are much for 'block' of 5 g: it may creep in the hand by millimetres")
-    assert (found.hint or "").startswith("a force below 3.7 N, or more mass")
+    assert found.message == (
+        "step 'pick_1': force 7 N exceeds 3.7 N for 'block' (5 g): it may creep in the hand by millimetres"
+    )
+    assert (found.hint or "").startswith("lower the force below 3.7 N, or raise the mass")
 
 
 @pytest.mark.slow
@@ -117,8 +119,8 @@ def test_what_is_told_of_one_grasp_points_one_way(pick: Path) -> None:
     assert [found.code for found in light] == ["TASK239"]
     soft = preflight_findings(load_task(pick, overrides=[asked, limit, "scene.block.mass=1 kg", f"{gain}=500"]))
     assert {found.code: found.hint for found in soft} == {
-        "TASK238": "lower `force`, or raise what limits it: the joint's effort, or `max_effort`",
-        "CTRL168": "p 6000 gives a fifth more than 50 N",
+        "TASK238": "lower `force`, or raise the limit: the joint's effort, or `max_effort`",
+        "CTRL168": "raise p to 6000 for 20 % more than 50 N",
     }
 
 
@@ -135,10 +137,12 @@ def test_a_hand_on_the_position_interface_is_told_that_no_force_is_its_own(pick:
     (found,) = preflight_findings(load_task(pick, overrides=[f"{force}=1 N"]))
     assert (found.code, found.severity) == ("CTRL171", "warning")
     assert found.message == (
-        "panda_finger_joint1: step 'pick_1' grasps with 1 N; commanded by position it presses with 10 N, its effort "
-        "limit: `force` only says at which contact force it stops"
+        "panda_finger_joint1: presses with 10 N (its effort limit), step 'pick_1' asks for 1 N: under position "
+        "commands `force` is only the contact force at which it stops"
     )
-    assert found.hint == ("command it by effort, or limit that (robot file, limits.panda_finger_joint1.effort: 2.1)")
+    assert found.hint == (
+        "use effort commands, or lower the effort limit (robot file, limits.panda_finger_joint1.effort: 2.1)"
+    )
     assert preflight_findings(load_task(pick, overrides=[f"{force}=1 N", f"{limit}=2.1"])) == ()
     assert preflight_findings(load_task(pick, overrides=[f"{force}=10 N"])) == ()
 
@@ -151,15 +155,16 @@ def test_what_friction_cannot_carry_is_told_before_it_slips(pick: Path) -> None:
     pick.write_text(pick.read_text(encoding="utf-8") + "  - lift: {object: block, by: 10 cm}\n", encoding="utf-8")
     assert preflight_findings(load_task(pick, overrides=[f"{mass}=0.64 kg"])) == ()
     (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1 kg"]))
-    assert found.hint == "it may slip while it is accelerated, or turn: 10.9 N a finger carry it twice"
+    assert found.hint == "it may slip or rotate while accelerated: 10.9 N per finger carries twice its weight"
     run = run_task(pick, overrides=[f"{mass}=1 kg"], log=pick.with_suffix(".mcap"), force=True)
     assert "it slipped" in str(run.verdict)
     (found,) = preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg"]))
     assert (found.code, found.severity) == ("TASK241", "warning")
     assert found.message == (
-        "step 'pick_1': two fingers with 7 N each and a friction of 0.9 carry 12.6 N; 'block' of 1.9 kg weighs 18.6 N"
+        "step 'pick_1': friction carries 12.6 N, 'block' (1.9 kg) weighs 18.6 N: two fingers press with 7 N each, "
+        "coefficient of friction 0.9"
     )
-    assert found.hint == "it will slip, it takes more than 10.4 N a finger or more friction"
+    assert found.hint == "it will slip: use more than 10.4 N per finger, or raise the friction"
     run = run_task(pick, overrides=[f"{mass}=1.9 kg"], log=pick.with_suffix(".mcap"), force=True)
     assert "it slipped" in str(run.verdict)
     assert preflight_findings(load_task(pick, overrides=[f"{mass}=1.9 kg", "scene.block.friction=2.7"])) == ()

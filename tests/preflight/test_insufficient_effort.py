@@ -41,22 +41,26 @@ def told(task: Path) -> list[Diagnostic]:
 @pytest.mark.parametrize(
     ("gains", "code", "message"),
     [
-        ("p: 20, d: 2", "CTRL156", f"p 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity"),
-        ("p: 1, d: 0.1", "CTRL156", f"p 1 gives way by {WEIGHT:.2g} rad under"),
-        ("d: 12", "CTRL156", f"without p nothing holds {WEIGHT:.3g} N m of gravity; it sinks"),
-        ("p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9", "CTRL159", f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1"),
+        ("p: 20, d: 2", "CTRL156", f"p 20 sags {WEIGHT / 20:.2g} rad under its gravity load of {WEIGHT:.3g} N m"),
+        ("p: 1, d: 0.1", "CTRL156", f"p 1 sags {WEIGHT:.2g} rad under"),
+        ("d: 12", "CTRL156", f"p 0 sinks under its gravity load of {WEIGHT:.3g} N m"),
+        (
+            "p: 80, d: 6, u_clamp_max: 1, u_clamp_min: -9",
+            "CTRL159",
+            f"up to {WEIGHT:.3g} N m, its u_clamp_max is 1",
+        ),
         (
             "p: 5, d: 1, i: 20, i_clamp: 1",
             "CTRL156",
-            f"p 5, whose integral is clamped to -1 ... 1, gives way by {(WEIGHT - 1) / 5:.2g} rad under",
+            f"p 5 with its integral clamped to -1 ... 1 sags {(WEIGHT - 1) / 5:.2g} rad under",
         ),
         (
             "p: 20, d: 2, i: 4, i_clamp: 10",
             "CTRL156",
-            f"p 20 gives way by {WEIGHT / 20:.2g} rad under {WEIGHT:.3g} N m of gravity until its integral carries "
-            "it, some 5 s with i 4",
+            f"p 20 sags {WEIGHT / 20:.2g} rad under its gravity load of {WEIGHT:.3g} N m for about 5 s, "
+            "until its integral (i 4) carries it",
         ),
-        ("p: 20, d: 2, i: 16, i_clamp: 10", "CTRL156", "until its integral carries it, some 1.2 s with i 16"),
+        ("p: 20, d: 2, i: 16, i_clamp: 10", "CTRL156", "for about 1.2 s, until its integral (i 16) carries it"),
     ],
 )
 def test_gains_too_weak_for_the_weight_are_told(written: Written, gains: str, code: str, message: str) -> None:
@@ -85,7 +89,7 @@ def test_gains_that_hold_it_are_not(written: Written, gains: str) -> None:
 def test_a_clamp_on_the_other_side_is_told_on_the_other_side(written: Written) -> None:
     gains = "p: 80, d: 6, u_clamp_max: 2.5, u_clamp_min: -1"
     (one,) = told(written(gains, start="back"))
-    assert f"takes up to {-WEIGHT:.3g} N m, its u_clamp_min is -1" in one.message
+    assert f"needs up to {-WEIGHT:.3g} N m, its u_clamp_min is -1" in one.message
 
 
 def test_an_integral_without_kp_is_unstable_and_nothing_else(written: Written) -> None:
@@ -95,7 +99,7 @@ def test_an_integral_without_kp_is_unstable_and_nothing_else(written: Written) -
 
 def test_a_wide_tolerance_is_no_leave_to_sink_until_the_integral_carries_it(written: Written) -> None:
     (one,) = told(written("p: 20, d: 2, i: 4", more=", constraints: {joints: {hinge: {goal: 0.5}}}"))
-    assert "until its integral carries it" in one.message
+    assert "until its integral (i 4) carries it" in one.message
     assert told(written("p: 20, d: 2", more=", constraints: {joints: {hinge: {goal: 0.5}}}")) == []
 
 

@@ -34,7 +34,7 @@ def test_a_cylinder_between_two_fingers_turns_as_it_was_told(tmp_path: Path) -> 
     file.write_text(TASK)
     (found,) = preflight_findings(load_task(file))
     assert (found.code, found.severity, found.place and found.place.line) == ("TASK240", "warning", 10)
-    assert "'peg', a cylinder, by a point each" in found.message
+    assert "'peg' (cylinder) may rotate between the point contacts" in found.message
     spins = "scene.peg.spinning_friction=0.01"
     assert preflight_findings(load_task(file, overrides=[spins])) == ()
     assert preflight_findings(load_task(file, overrides=["params.what=cube"])) == ()

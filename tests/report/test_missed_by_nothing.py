@@ -23,7 +23,7 @@ NEAR_TO_0 = (0.0, -0.0, 5e-324, -5e-324, 4e-10, -4e-10, EDGE, -EDGE, 1.4e-9, -1.
 
 
 def of(margin: float) -> Robustness:
-    return robustness(np.full(1, margin), np.zeros(1), unit="N", scale=1.0, say=lambda k: "free")
+    return robustness(np.full(1, margin), np.zeros(1), unit="N", scale=1.0, describe=lambda k: "free")
 
 
 def told(one: ExpectationOutcome) -> dict[str, float]:

@@ -126,7 +126,7 @@ steps:
 """,
     )
     last = run_task(file, log=tmp_path / "log.mcap", allow_outside=True).verdict.steps[-1]
-    assert last.text.startswith("it cannot be planned from what is measured")
+    assert last.text.startswith("re-planning from the measured state failed")
     assert "replan: false" not in last.text
 
 

@@ -24,17 +24,18 @@ def told(holding: GraspMargin, *forces: float) -> str:
     links = ("palm", "finger_1_distal_link", "finger_3_proximal_link")
     contacts = [Contact("cup", f"robot/{link}", force, 0.0) for link, force in zip(links, forces, strict=False)]
     holding.taken("cup", [*contacts, Contact("cup", "desk", 1.0, 0.0)])
-    return holding.told("cup")
+    return holding.summary("cup")
 
 
 def test_force_that_hardly_carries_is_compared_to_the_weight(holding: GraspMargin) -> None:
-    assert told(holding, 1.0, 0.2).endswith("carries 1.2 N; it alone weighs 1.47 N")
-    assert told(holding, 1.5, 1.5).endswith("weighs 1.47 N, which leaves 10 m/s2 to accelerate it with")
+    assert told(holding, 1.0, 0.2).endswith("carries 1.2 N, its weight is 1.47 N")
+    assert told(holding, 1.5, 1.5).endswith("its weight is 1.47 N; maximum lift acceleration before slip: 10 m/s2")
 
 
 def test_force_that_is_ample_is_not_the_cause_and_the_links_are_named(holding: GraspMargin) -> None:
     """More than three times the weight, 4.41 N."""
-    assert "accelerate" in told(holding, 2.2, 2.2)
+    assert "maximum lift acceleration" in told(holding, 2.2, 2.2)
     assert told(holding, 8.0, 9.0).endswith(
-        "weighs 1.47 N: enough force, so look at where it was held, by finger_1_distal_link (9 N), palm (8 N)"
+        "its weight is 1.47 N; the force is sufficient, check the contact points: "
+        "finger_1_distal_link (9 N), palm (8 N)"
     )

@@ -103,14 +103,14 @@ class Monitors(Live):
         type(self).opened = []
         for one in EXPECT:
             type(self).opened.append(Answers())
-            self.open(one, told=self.opened[-1].told)
+            self.open(one, callback=self.opened[-1].told)
 
     def step_started(self, step: str) -> None:
         super().step_started(step)
         if step == "lift_1":
             type(self).of_step = [Answers() for _ in OF_STEP]
             pairs = zip(OF_STEP, self.of_step, strict=True)
-            self.probes = [self.open(one, told=answers.told) for one, answers in pairs]
+            self.probes = [self.open(one, callback=answers.told) for one, answers in pairs]
 
     def step_ended(self, step: str, outcome: str) -> None:
         super().step_ended(step, outcome)

@@ -87,7 +87,7 @@ def test_a_retry_has_other_parameters_also_in_those_made_of_them(run: Run, tmp_p
     assert second.started == pytest.approx(0.4 + REST)
     started = events(tmp_path, "step_started")
     assert [one.text for one in started] == ["attempt 1 of 4", "attempt 2 of 4, with near = 0.2", ""]
-    assert [one.text for one in events(tmp_path, "replanned")] == ["joint 'pitch' is at 0.3 rad and not at 0 rad"]
+    assert [one.text for one in events(tmp_path, "replanned")] == ["joint 'pitch' is at 0.3 rad instead of 0 rad"]
     shown = json.loads(json_report.render_verdict(verdict, "small.mcap"))["steps"][0]
     assert [one["outcome"] for one in shown["attempts"]] == ["timeout", "done"]
     assert len(shown["replanned"]) == 1
@@ -108,11 +108,11 @@ def test_a_failure_that_is_tolerated_does_not_count_and_the_next_step_begins_whe
     late = "  - move: {to: {pitch: 1.0}}\n    timeout: 0.1 s\n"
     verdict = run(f"steps:\n{late}    on_fail: {on_fail}\n  - move: {{to: up}}\n")
     assert verdict.verdict == "passed"
-    assert "1 of 2 steps done, the task tolerates that move_1 failed" in verdict.text
+    assert "1 of 2 steps done, failure of move_1 tolerated" in verdict.text
     assert [(step.outcome, step.tolerated) for step in verdict.steps] == [("timeout", True), ("done", False)]
     (replanned,) = verdict.steps[1].replanned
     assert replanned.startswith("joint 'pitch' is at ")
-    assert replanned.endswith("and not at 1 rad")
+    assert replanned.endswith("instead of 1 rad")
     states = read_recording(tmp_path / "small.mcap").states
     assert np.abs(np.diff(states.velocity[:, 0])).max() < 1.001 * ACCELERATION * PERIOD
     assert abs(states.position[-1, 0]) < 1e-9
@@ -121,9 +121,9 @@ def test_a_failure_that_is_tolerated_does_not_count_and_the_next_step_begins_whe
 def test_what_follows_a_tolerated_failure_where_nothing_differs_says_why_it_is_planned_again(run: Run) -> None:
     never = "  - wait: 0.1 s\n    until: {not: {at_pose: {pose: up}}}\n    timeout: 0.2 s\n    on_fail: %s\n"
     verdict = run(f"steps:\n{never % 'continue'}  - wait: 0.1 s\n  - wait: 0.1 s\n")
-    assert [step.replanned for step in verdict.steps] == [(), ("the step before it failed",), ()]
+    assert [step.replanned for step in verdict.steps] == [(), ("the previous step failed",), ()]
     (step,) = run(f"steps:\n{never % '{retry: 1}'}").steps
-    assert step.replanned == ("it is tried again",)
+    assert step.replanned == ("retry",)
 
 
 WATCH = "watch:\n  - always: {at_pose: {pose: up, within: 0.2}}\n"
@@ -227,7 +227,7 @@ def test_an_interruption_between_attempts_ends_the_run_as_everywhere(run: Run, a
     assert [finding.code for finding in verdict.errors] == ["RUN101"]
     assert verdict.simulated_time == pytest.approx(at, abs=0.11)
     assert len(stopping.heard) == 1
-    assert stopping.heard[0].endswith("it is tried again")
+    assert stopping.heard[0].endswith("; retrying")
 
 
 def test_the_same_attempts_make_the_same_bytes(run: Run, tmp_path: Path) -> None:

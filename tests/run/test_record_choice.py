@@ -45,7 +45,7 @@ def test_an_expectation_that_lacks_its_topic_says_so_and_fails(
         "near", "no_collision", "tracking", "at_pose"
     }  # fmt: skip
     assert found == {
-        name: f"the log holds no {topic}: `record:` of the task leaves it out" for name, topic in unknown.items()
+        name: f"the log has no {topic}: the task's `record:` excludes it" for name, topic in unknown.items()
     }
     assert verdict.verdict == ("failed" if unknown else "passed")
     assert judge_log(log) == verdict

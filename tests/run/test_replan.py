@@ -133,8 +133,8 @@ def test_what_is_within_the_tolerance_does_not_count(world_at: WorldOf, x: float
 @pytest.mark.parametrize(
     ("x", "turn", "text"),
     [
-        (0.1, 0.0, "'block' is 100.0 mm and 0.0 deg from where it was to be"),
-        (0.0, 0.3, "'block' is 0.0 mm and 17.2 deg from where it was to be"),
+        (0.1, 0.0, "'block' is 100.0 mm and 0.0 deg from its planned pose"),
+        (0.0, 0.3, "'block' is 0.0 mm and 17.2 deg from its planned pose"),
     ],
 )
 def test_an_object_that_moved_is_told_and_picked_where_it_is(
@@ -170,7 +170,7 @@ def test_what_slipped_in_the_hand_is_put_down_where_it_belongs(world_at: WorldOf
     slip = Transform.of(xyz=(0.004, -0.003, 0.0), rpy=(0.0, 0.0, 0.05))
     before = world.before(PLACE)
     world.put("block", before.bodies[0] @ slip)
-    assert world.told(PLACE) == ("'block' sits 5.0 mm and 2.9 deg off in the hand",)
+    assert world.told(PLACE) == ("'block' slipped 5.0 mm and 2.9 deg in the hand",)
     now = world.measured.situation(before)
     held = planner.held_in_tool(now)
     np.testing.assert_allclose(held.matrix, (planner.held_in_tool(before) @ slip).matrix, atol=1e-9)
@@ -208,7 +208,7 @@ def test_a_turn_in_the_hand_that_cannot_be_undone_is_left_where_it_does_not_coun
             world.measured.plan(step, before, now)
         return
     again, begins, told = world.measured.plan(step, before, now)
-    assert told == "; the arm cannot undo the 1.1 deg by which 'block' is turned in the hand"
+    assert told == "; the arm cannot correct the rotation of 'block' by 1.1 deg in the hand"
     lowered = next(motion for motion in again.motions if motion.label == "lower")
     assert lowered.trajectory is not None
     q = np.array(begins.position)
@@ -238,7 +238,7 @@ def test_a_trajectory_begins_at_what_is_commanded_and_not_at_the_error_of_the_co
     assert world.told(MOVE) == ()
     world.session.engine.read().position[joint] += 0.08  # it was pushed away
     told = world.told(MOVE)
-    assert told == (f"joint 'panda_joint4' is at {planned[joint] + 0.1:.4f} rad and not at {planned[joint]:.4f} rad",)
+    assert told == (f"joint 'panda_joint4' is at {planned[joint] + 0.1:.4f} rad instead of {planned[joint]:.4f} rad",)
 
 
 def test_a_joint_beyond_a_soft_limit_is_where_it_is_and_one_beyond_a_hard_limit_is_at_it(world_at: WorldOf) -> None:

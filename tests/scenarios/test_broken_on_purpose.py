@@ -166,11 +166,11 @@ def test_a_cup_that_is_too_slippery_is_said_to_have_slipped(run: Run) -> None:
     )
     assert told is not None, verdict.text
     assert float(told[2]) > 50 > 2 * float(told[1])
-    grasp = r"the hand took it with ([\d.]+) N, of which friction 0\.05 \(0\.05 x 1 of the hand\) carries ([\d.]+) N"
+    grasp = r"grip force ([\d.]+) N: friction 0\.05 \(0\.05 x 1 of the hand\) carries ([\d.]+) N"
     force = re.search(grasp, verdict.text)
     assert force is not None, verdict.text
     assert float(force[2]) == pytest.approx(0.05 * float(force[1]), rel=0.01)
-    weight = r"; it alone weighs 1\.47 N, which leaves ([\d.]+) m/s2 to accelerate it with$"
+    weight = r", its weight is 1\.47 N; maximum lift acceleration before slip: ([\d.]+) m/s2$"
     left = re.search(weight, verdict.text)
     assert left is not None, verdict.text
     assert float(left[1]) == pytest.approx((float(force[2]) - 1.47) / 0.15, rel=0.05)
@@ -195,8 +195,8 @@ def test_a_cup_that_was_moved_after_planning_is_picked_where_it_is(
     mover = replace(CUP, heard=[]).watch(monkeypatch)
     verdict = run(f"{TAKEN}  - place: {{object: cup, at: start}}\n  - wait: 0.5 s\n", progress=mover)
     assert outcomes(verdict) == ["done"] * 4, verdict.text
-    assert verdict.steps[0].replanned == ("'cup' is 100.0 mm and 0.0 deg from where it was to be",)
-    assert mover.heard[0] == "planned again: 'cup' is 100.0 mm and 0.0 deg from where it was to be"
+    assert verdict.steps[0].replanned == ("'cup' is 100.0 mm and 0.0 deg from its planned pose",)
+    assert mover.heard[0] == "re-planned: 'cup' is 100.0 mm and 0.0 deg from its planned pose"
     states = read_recording(tmp_path / "log.mcap").states
     assert np.linalg.norm(states.body_position[0, 0] - [0.75, -0.1, 0.4]) < 1e-3
     assert np.linalg.norm(states.body_position[-1, 0] - [0.75, 0.0, 0.4]) < 3e-3  # `at: start`, as the task has it
@@ -210,7 +210,7 @@ def test_where_nothing_is_planned_again_the_hand_is_said_to_have_missed_a_cup_th
     step = verdict.steps[0]
     assert (step.outcome, step.replanned) == ("failed", ())
     assert "the hand closed on nothing" in step.text
-    assert "when it began, 'cup' is 100.0 mm and 0.0 deg from where it was to be" in step.text
+    assert "at its start 'cup' is 100.0 mm and 0.0 deg from its planned pose" in step.text
 
 
 def test_a_controller_with_too_much_damping_is_named_with_its_joint(run: Run) -> None:
@@ -219,7 +219,7 @@ def test_a_controller_with_too_much_damping_is_named_with_its_joint(run: Run) ->
     text = verdict.steps[0].text
     assert "controller 'arm_controller': joint 'joint_6' is outside its" in text
     assert re.search(r"velocity error [+-][\d.]+ rad/s, limit 0\.05 rad/s", text)
-    assert re.search(r"cut at its limits: joint 'joint_6' \(effort.*?\) in \d{4} of \d{4} ticks", text)
+    assert re.search(r"saturated: joint 'joint_6' \(effort.*?\) in \d{4} of \d{4} ticks", text)
 
 
 def test_a_controller_that_is_too_weak_is_named_with_its_joint_and_error(run: Run) -> None:
@@ -262,12 +262,12 @@ def test_an_object_that_comes_into_the_way_is_seen_before_the_step_or_stops_it(
     assert outcomes(verdict) == ["done", "failed"]
     text = verdict.steps[1].text
     if replan == "true":
-        assert text.startswith("it cannot be planned from what is measured, where 'post' is 659.5 mm")
+        assert text.startswith("re-planning from the measured state failed ('post' is 659.5 mm")
         assert re.search(r"'post' would come within 4 mm of 'robot/\w+'", text)
         return
     told = re.search(r"stopped: 'watch_never_collision' is broken at t = ([\d.]+) s by [\d.]+ m?N: (.*)", text)
     assert told is not None, text
-    assert re.match(r"'post' and 'robot/\w+' press with", told[2])
+    assert re.match(r"'post' and 'robot/\w+' touch with", told[2])
     (watched,) = verdict.expectations
     assert (watched.name, watched.outcome) == ("watch_never_collision", "failed")
     assert verdict.simulated_time < float(told[1]) + 1.5

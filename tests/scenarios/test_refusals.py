@@ -229,7 +229,7 @@ def test_a_log_never_replaces_a_file_of_its_task(call: Call, tmp_path: Path) -> 
     link = tmp_path / "link.mcap"
     link.hardlink_to(task)
     for log in (task, link):
-        assert "the task is made from this file" in refused(call("run", task, "--log", log, "--force", "-q"), 4)
+        assert "the task reads this file" in refused(call("run", task, "--log", log, "--force", "-q"), 4)
     assert task.read_bytes() == before
 
 

@@ -352,7 +352,7 @@ def test_names_of_the_scene_are_told_where_the_robot_cannot_be_built(tmp_path: P
         ("TASK231", 2, f"there is no file '{tmp_path / 'nowhere.yaml'}'"),
         ("TASK230", 8, "'cupp' is not a movable body of the scene"),
         ("TASK230", 9, "there is no frame 'dsk'"),
-        ("TASK230", 13, "'cu' is neither a body of the scene nor a part of the robot"),
+        ("TASK230", 13, "'cu' is not a body of the scene or a part of the robot"),
         ("TASK230", 14, "the task has no step 'nowhere'"),
     ]
 

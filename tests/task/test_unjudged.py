@@ -40,7 +40,7 @@ def test_an_until_that_asks_for_references_is_a_warning_where_they_come_true_at_
     steps = "steps=[{wait: 1 s, until: {tracking: {group: arm, within: 0.1}}}]"
     overrides = [f"simulation.engine={engine}", "expect=[]", "record.topics=[tf, controller_state]", steps]
     found = load_task(POUR, overrides=overrides).findings
-    assert any("every reference comes true at once" in one.message for one in found) == doubted
+    assert any("tracking is ideal" in one.message for one in found) == doubted
     assert any(one.code == "TASK237" for one in found) == doubted
 
 

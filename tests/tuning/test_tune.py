@@ -68,7 +68,7 @@ def test_of_two_controllers_on_a_joint_the_active_one_is_tuned(
     controllers.write_text(f"controllers:\n  a: {one.format('false', first)}\n  b: {one.format('true', second)}\n")
     found = tune(robot, controllers, Wish(4.0, 1.0, 1e-3), simulated=simulated)
     assert [each.controller for each in found.joints] == ["b"]
-    assert any(note.startswith("a: its gains stay") and "of b;" in note for note in found.notes)
+    assert any(note.startswith("a: its gains are unchanged") and "with b;" in note for note in found.notes)
     assert found.controllers.controllers["a"].gains["hinge"].p == 7  # type: ignore[attr-defined]
 
 
@@ -96,7 +96,7 @@ def test_the_joint_of_a_hand_presses_with_its_effort_over_its_travel_at_least(
     )
     found = tune(robot, controllers, Wish(bandwidth, 1.0, 1e-3))
     (one,) = found.joints
-    raised = [note for note in found.notes if "presses" in note and "hinge" in note]
+    raised = [note for note in found.notes if "full effort" in note and "hinge" in note]
     assert bool(raised) == (one.frequency > bandwidth)
     assert one.p == pytest.approx(p, rel=5e-3)
     assert one.d == pytest.approx(2.0 * math.sqrt(p * INERTIA), rel=5e-3)
@@ -262,7 +262,7 @@ def test_what_has_no_loop_is_refused(tmp_path: Path) -> None:
     controllers.write_text("controllers:\n  c: {type: computed_torque, joints: [hinge], bandwidth: 5 Hz}\n")
     with pytest.raises(InvalidInput, match="no controller has a loop") as refused:
         tune(robot, controllers, Wish(5.0, 1.0, 1e-3))
-    needs = "c: the type computed_torque needs no gains, its `bandwidth` and `damping_ratio` give them"
+    needs = "c: the type computed_torque needs no gains, its `bandwidth` and `damping_ratio` define them"
     assert refused.value.findings[0].hint == needs
     robot, controllers = pendulum(tmp_path)
     controllers.write_text(controllers.read_text().replace("hinge", "hing"))

@@ -1,4 +1,4 @@
-"""The conditions: one file a family. `CONDITIONS` is the registry that the pipeline hands to the loader."""
+"""The built-in conditions, one file per family, and their registry `CONDITIONS`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manipcli.conditions.members.tracking import TRACKING
 from manipcli.conditions.members.upright import UPRIGHT
 from manipcli.core.registry import Seam
 
-# Any: a seam holds members of different specs; each is only ever called with its own.
+# Any: the members of a seam have different specs; each is called with its own.
 CONDITIONS: Seam[Condition[Any]] = Seam(
     kind="condition",
     members=(

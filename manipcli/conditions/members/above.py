@@ -1,4 +1,4 @@
-"""`above`: an object is over another, with air between."""
+"""`above`: an object is over another body, with a gap between them."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from manipcli.spec.quantity import Length
 
 
 class AboveSpec(Model):
-    """The object is over `of`: higher by at least `by`, and its centre over the other's bounding box."""
+    """The object is above `of` by at least `by`, and its centre is over the bounding box of `of`."""
 
     object: str = Field(description="A body of the scene.")
-    of: str = Field(description="The body that it is over.")
+    of: str = Field(description="The body below it.")
     by: Annotated[Length, Field(ge=0)] = Field(
         default=0.0,
-        description="Least gap between the two, along the world's z [m]. Default 0; what rests on it sinks in a "
-        "little and is asked for by `rests_on`.",
+        description="Least gap between the two, along the world's z [m]. Default 0. For an object in contact use "
+        "`rests_on`: contacts penetrate a little.",
     )
 
 
 def monitor(spec: AboveSpec, world: World) -> Gauge:
-    """The lesser of two lengths [m]: how much the gap exceeds `by`, and how far inside the edge the centre is.
+    """The lesser of two lengths [m]: the gap minus `by`, and the distance of the centre to the edge.
 
-    The gap is from the highest corner of the bounding box of `of` to the lowest of the object's. The edge is that of
-    the bounding box of `of` along its own x and y; of several the worst counts, and beyond it the length is negative.
-    Where units differ, both are compared to half of the lesser side of that box.
+    The gap is from the highest corner of the bounding box of `of` to the lowest corner of the object's. The edge is
+    that of the bounding box of `of` along its own x and y; the nearest edge counts, and the distance is negative
+    outside. Where units differ, both are divided by half of the shorter side of that box.
     """
     scene = world.scene
     body = scene.body(spec.of)
@@ -62,8 +62,8 @@ def monitor(spec: AboveSpec, world: World) -> Gauge:
 
         return least(
             [
-                robustness(gap - spec.by, window.times, unit="m", scale=scale, say=high),
-                robustness(over, window.times, unit="m", scale=scale, say=within),
+                robustness(gap - spec.by, window.times, unit="m", scale=scale, describe=high),
+                robustness(over, window.times, unit="m", scale=scale, describe=within),
             ]
         )
 
@@ -71,7 +71,7 @@ def monitor(spec: AboveSpec, world: World) -> Gauge:
 
 
 def check(spec: AboveSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """Both bodies exist and differ."""
+    """Unknown bodies, or the same body twice."""
     problems = (
         *unknown_body(context.scene, spec.object, ("object",)),
         *unknown_body(context.scene, spec.of, ("of",)),

@@ -20,27 +20,27 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import AngleTolerance, Length
 
 SLIDE: Final = 0.005
-"""[m] within which a joint that slides is to be where nobody says it."""
+"""[m] Default tolerance of prismatic joints."""
 
 
 class AtPoseSpec(Model):
-    """Every joint of the pose (of its `group`, when one is given) is at most `within` from its value there, or `slide`
-    where it slides."""
+    """Every joint of the pose (or of `group`) is at most `within` from its value in the pose, a prismatic joint at most
+    `slide`."""
 
     pose: str = Field(description="A named pose of the robot.")
-    group: str | None = Field(default=None, description="Only this group's joints; default: all that the pose names.")
+    group: str | None = Field(default=None, description="Only joints of this group. Default: all joints of the pose.")
     within: AngleTolerance = Field(default=0.02, description="Largest difference [rad], to pi. Default 0.02.")
     slide: Annotated[Length, Field(gt=0)] | None = Field(
         default=None,
-        description="Largest difference of joints that slide [m]. Default: 5 mm of those that carry the tool; of "
-        "others, as fingers, any.",
+        description="Largest difference of prismatic joints [m]. Default: 5 mm for joints that move the tool; others, "
+        "such as fingers, are not compared.",
     )
 
 
 def monitor(spec: AtPoseSpec, world: World) -> Gauge:
-    """`within` minus the largest |q - q_pose| [rad], or `slide` minus that of the joints that slide [m]; the lesser.
+    """`within` minus the largest |q - q_pose| [rad], or `slide` minus that of prismatic joints [m]; the lesser.
 
-    A joint without limits is off by the short way round.
+    The difference of a continuous joint is wrapped to +-pi.
     """
     turning, sliding = _targets(spec, world.robot)
     bounds = (("rad", spec.within, turning), ("m", spec.slide or SLIDE, sliding))
@@ -53,7 +53,6 @@ def monitor(spec: AtPoseSpec, world: World) -> Gauge:
 
 
 def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[str, float]) -> Gauge:
-    """Of joints of one unit."""
     joints, goal = tuple(wanted), np.array(list(wanted.values()))
     columns = robot.indices(joints)
     endless = np.array([robot.joint(name).type == "continuous" for name in joints], dtype=bool)
@@ -63,18 +62,18 @@ def _part(pose: str, robot: RobotModel, unit: str, most: float, wanted: Mapping[
         off[:, endless] = wrapped(off[:, endless])
         away = np.abs(off)
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             worst = int(np.argmax(away[k]))
             far = readable(float(away[k, worst]), unit)
             return f"joint '{joints[worst]}' is {far} from pose '{pose}'; within {readable(most, unit)}"
 
-        return robustness(most - np.max(away, axis=-1), window.times, unit=unit, scale=most, say=say)
+        return robustness(most - np.max(away, axis=-1), window.times, unit=unit, scale=most, describe=describe)
 
     return look
 
 
 def _targets(spec: AtPoseSpec, robot: RobotModel) -> tuple[dict[str, float], dict[str, float]]:
-    """The joints that are compared, and their values in the pose: those that turn, those that slide."""
+    """The compared joints and their values in the pose: (revolute, prismatic)."""
     pose = robot.pose(spec.pose)
     asked = pose.joints if spec.group is None else robot.group(spec.group).joints
     turning, sliding = {}, {}
@@ -92,7 +91,7 @@ def _carries_tool(robot: RobotModel, joint: Joint) -> bool:
 
 
 def check(spec: AtPoseSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """Pose and group exist, and have joints in common."""
+    """An unknown pose or group, or no joint to compare."""
     robot = context.robot
     problems = []
     poses = [pose.name for pose in robot.poses]
@@ -105,9 +104,9 @@ def check(spec: AtPoseSpec, context: CheckContext) -> tuple[Problem, ...]:
     if not any(_targets(spec, robot)):
         of, loc = ("", "pose") if spec.group is None else (f" of group '{spec.group}'", "group")
         slides = any(_targets(spec.model_copy(update={"slide": SLIDE}), robot))
-        hint = "of joints that slide say how near: `slide: 2 mm`" if slides else None
-        kind = "rotating joint" if slides else "joint"
-        problems.append(Problem((loc,), f"pose '{spec.pose}' names no {kind}{of}", hint))
+        hint = "give a tolerance for prismatic joints: `slide: 2 mm`" if slides else None
+        kind = "revolute joint" if slides else "joint"
+        problems.append(Problem((loc,), f"pose '{spec.pose}' has no {kind}{of}", hint))
     return tuple(problems)
 
 

@@ -1,4 +1,4 @@
-"""`at_rest`: an object does not move."""
+"""`at_rest`: an object moves slower than a limit."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ def monitor(spec: AtRestSpec, world: World) -> Gauge:
             arm = rotate(body_pose(world.scene, window.states, spec.object).quat_xyzw, body.centre)
             speed = np.linalg.norm(linear + cross(angular, arm), axis=-1)
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             return f"'{spec.object}' moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
 
-        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, say=say)
+        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, describe=describe)
 
     return look
 
 
 def check(spec: AtRestSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The body exists."""
+    """An unknown body."""
     return unknown_body(context.scene, spec.object, ("object",))
 
 

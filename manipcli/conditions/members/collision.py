@@ -1,4 +1,4 @@
-"""`collision`, `no_collision`: things press on each other, or do not."""
+"""`collision`, `no_collision`: parts are in contact, or are not."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Pair = tuple[str, str]
 
 
 class PairsSpec(Model):
-    """Which parts, two by two; one pair may stand alone."""
+    """Pairs of parts; a single pair needs no list."""
 
     pairs: tuple[Pair, ...] = Field(
-        min_length=1, description="Each two of: a body, `robot` (any of its links), `robot/LINK`."
+        min_length=1, description="Pairs of parts, each a body, `robot` (any of its links) or `robot/LINK`."
     )
 
     @model_validator(mode="before")
@@ -34,8 +34,8 @@ class PairsSpec(Model):
         if not isinstance(value, list | tuple):
             return value
         if len(value) != 2 or not all(isinstance(part, str) for part in value):
-            hint = "write `[robot, desk]`, or several as `{pairs: [[robot, desk], [cup, desk]]}`"
-            raise problem("count", "expected two names: those of the parts that touch", hint=hint)
+            hint = "write `[robot, desk]` for one pair, `{pairs: [[robot, desk], [cup, desk]]}` for several"
+            raise problem("count", "expected two names, one for each part", hint=hint)
         return {"pairs": [value]}
 
     @classmethod
@@ -45,30 +45,30 @@ class PairsSpec(Model):
 
 
 class NoCollisionSpec(PairsSpec):
-    """None of the pairs presses on each other with more than `below`. Short: `no_collision: [robot, desk]`."""
+    """The contact force of each pair is at most `below`. Short form: `no_collision: [robot, desk]`."""
 
     below: Annotated[Force, Field(ge=0)] = Field(
-        default=0.0, description="Largest normal force [N] that does not count. Default 0: any touch counts."
+        default=0.0, description="Largest allowed normal force [N]. Default 0: no contact at all."
     )
 
 
 class CollisionSpec(PairsSpec):
-    """One of the pairs presses on each other with at least `above`. Short: `collision: [robot, desk]`."""
+    """The contact force of at least one pair is `above` or more. Short form: `collision: [robot, desk]`."""
 
     above: Annotated[Force, Field(gt=0)] = Field(default=0.01, description="Least normal force [N]. Default 10 mN.")
 
 
 def gauge_none(spec: NoCollisionSpec, world: World) -> Gauge:
-    """`below` minus the largest normal force [N] between any of the pairs.
+    """`below` minus the largest normal force [N] of all pairs.
 
-    A pair that does not press has the margin `below`: 0 N to spare when any touch counts, which still passes; where
-    units differ, it is then compared to 1 N.
+    Without contact the margin is `below`: 0 N by default, which passes. Where units differ, the margin is divided by
+    `below`, or by 1 N if that is 0.
     """
     return _monitor(spec.pairs, spec.below, -1.0)
 
 
 def gauge_some(spec: CollisionSpec, world: World) -> Gauge:
-    """The largest normal force between any of the pairs, minus `above` [N]."""
+    """The largest normal force of all pairs, minus `above` [N]."""
     return _monitor(spec.pairs, spec.above, 1.0)
 
 
@@ -84,23 +84,23 @@ def _monitor(pairs: tuple[Pair, ...], limit: float, sign: float) -> Gauge:
     def look(window: StateWindow) -> Robustness:
         force = window.of_contacts(largest)
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             hit = hardest(window.touching(k))
             if hit is None or not hit.force:
-                return "never touched" if sign < 0.0 else "nothing touches"
-            asked = f"; {'at most' if sign < 0.0 else 'at least'} {readable(limit, 'N')}" if limit else ""
-            return f"'{hit.a}' and '{hit.b}' press with {readable(hit.force, 'N')}{asked}"
+                return "no contact"
+            bound = f"; {'at most' if sign < 0.0 else 'at least'} {readable(limit, 'N')}" if limit else ""
+            return f"'{hit.a}' and '{hit.b}' touch with {readable(hit.force, 'N')}{bound}"
 
         def at(k: int) -> float | None:
             return float(window.times[k]) if force[k] else None
 
-        return robustness(sign * (force - limit), window.times, unit="N", scale=limit or 1.0, say=say, at=at)
+        return robustness(sign * (force - limit), window.times, unit="N", scale=limit or 1.0, describe=describe, at=at)
 
     return look
 
 
 def check(spec: NoCollisionSpec | CollisionSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """Every part is a body, the robot, or one of its links, and can touch the other of its pair."""
+    """Unknown parts, and pairs without contacts in the simulation."""
     return tuple(found for k, pair in enumerate(spec.pairs) for found in impossible_pair(context, pair, ("pairs", k)))
 
 

@@ -1,4 +1,4 @@
-"""`contact_force`: how hard parts press on each other."""
+"""`contact_force`: the normal force between two parts, or on one part."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ from manipcli.spec.quantity import Force, Time
 
 
 class ContactForceSpec(Model):
-    """The sum of the normal forces between a pair, or of all on one part, is `below`, `above`, or between the two."""
+    """The sum of the normal forces between a pair, or on one part, is `below` and/or `above` a limit."""
 
-    pair: tuple[str, str] | None = Field(default=None, description="Two of: a body, `robot`, `robot/LINK`.")
-    of: str | None = Field(default=None, description="Instead of `pair`: a body, `robot` or `robot/LINK`.")
+    pair: tuple[str, str] | None = Field(default=None, description="Two parts, each a body, `robot` or `robot/LINK`.")
+    of: str | None = Field(default=None, description="Instead of `pair`: one part, a body, `robot` or `robot/LINK`.")
     below: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Largest force [N].")
     above: Annotated[Force, Field(gt=0)] | None = Field(default=None, description="Least force [N].")
     mean_over: Annotated[Time, Field(ge=1e-4, le=60)] | None = Field(
         default=None,
-        description="The force is averaged over this time up to each tick [s], 0.1 ms to 60 s. Default: it is not.",
+        description="Averaging window up to each tick [s], 0.1 ms to 60 s. Default: no averaging.",
     )
 
     @model_validator(mode="after")
     def _whole(self) -> ContactForceSpec:
         if (self.pair is None) == (self.of is None):
-            raise problem("conflict", "say either `pair: [a, b]` or `of: part`")
+            raise problem("conflict", "give either `pair: [a, b]` or `of: part`")
         if self.below is None and self.above is None:
-            raise problem("conflict", "say how hard: `below`, `above`, or both")
+            raise problem("conflict", "limit missing: give `below`, `above` or both")
         if self.below is not None and self.above is not None and self.above >= self.below:
-            asked = f"no force is below {readable(self.below, 'N')} and above {readable(self.above, 'N')}"
+            message = f"`above` {readable(self.above, 'N')} is not less than `below` {readable(self.below, 'N')}"
             raise problem(
-                "conflict", asked, at=("above",), hint="write the least force under `above`, the largest under `below`"
+                "conflict", message, at=("above",), hint="`above` is the least force, `below` the largest: swap them"
             )
         return self
 
 
 def monitor(spec: ContactForceSpec, world: World) -> Gauge:
-    """`below` minus the force, and the force minus `above` [N]; the lesser where both are given.
+    """`below` minus the force, and the force minus `above` [N]; the lesser if both are given.
 
-    Bodies are rigid: where they meet, a force of one physics step brings them to rest, mass times speed over that step.
-    It grows with the speed: a hand that comes down on something with a few cm/s presses for a tick with 100 N and more.
-    `mean_over: 50 ms` looks past such knocks, as a filtered sensor does; at first it is the mean of what was seen.
+    Bodies are rigid: an impact is stopped within one physics step, by a force of mass times speed over that step. A
+    hand that touches down at a few cm/s presses with 100 N and more for one tick. `mean_over: 50 ms` filters such
+    impacts, as a filtered sensor does; until the window is full it is the mean since the first tick.
     """
 
     def counts(contact: Contact) -> bool:
@@ -66,29 +66,29 @@ def monitor(spec: ContactForceSpec, world: World) -> Gauge:
     kind = "force" if spec.mean_over is None else f"mean force over {readable(spec.mean_over, 's')}"
     what = f"on '{spec.of}'" if spec.pair is None else f"between '{spec.pair[0]}' and '{spec.pair[1]}'"
 
-    def look(moments: StateWindow) -> Robustness:
-        force = moments.of_contacts(pressed) if mean is None else mean.of(moments)
+    def look(window: StateWindow) -> Robustness:
+        force = window.of_contacts(pressed) if mean is None else mean.of(window)
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             limits = [("below", spec.below), ("above", spec.above)]
-            asked = " and ".join(f"{word} {readable(value, 'N')}" for word, value in limits if value is not None)
-            return f"the {kind} {what} is {readable(float(force[k]), 'N')}; {asked}"
+            bounds = " and ".join(f"{word} {readable(value, 'N')}" for word, value in limits if value is not None)
+            return f"the {kind} {what} is {readable(float(force[k]), 'N')}; {bounds}"
 
         readings = []
         if spec.below is not None:
-            readings.append(robustness(spec.below - force, moments.times, unit="N", scale=spec.below, say=say))
+            readings.append(robustness(spec.below - force, window.times, unit="N", scale=spec.below, describe=describe))
         if spec.above is not None:
-            readings.append(robustness(force - spec.above, moments.times, unit="N", scale=spec.above, say=say))
+            readings.append(robustness(force - spec.above, window.times, unit="N", scale=spec.above, describe=describe))
         return least(readings)
 
     return look
 
 
 class _Mean:
-    """The mean over the last `window` [s] of a force, each value of which holds until the next; at the first tick the
-    value. It is that of the force and not of the ticks: of a log that holds fewer of them it is the same.
+    """The mean of a piecewise constant force over the last `window` [s]; at the first tick its value there.
 
-    F(t) = sum of value * how long it held, up to t; the mean is (F(t) - F(t - window)) / window.
+    The mean is over time, not over ticks, so it is the same for a log with fewer ticks:
+    (F(t) - F(t - window)) / window, with F the integral of the force.
     """
 
     def __init__(self, window: float, force: Callable[[Sequence[Contact]], float]) -> None:
@@ -98,16 +98,16 @@ class _Mean:
         self._values: list[float] = []
         self._sums: list[float] = []
 
-    def of(self, moments: StateWindow) -> Array:
-        """(T,) at each of the next ticks."""
-        ticks = moments.times
+    def of(self, window: StateWindow) -> Array:
+        """(T,) the mean at each of the next ticks."""
+        ticks = window.times
         if not self._times:
             self._begin = float(ticks[0])
-            self._append(self._begin, self._force(moments.touching(0)), 0.0)
-        for one in moments.contacts:
-            held = one.time - self._times[-1]
+            self._append(self._begin, self._force(window.touching(0)), 0.0)
+        for change in window.contacts:
+            held = change.time - self._times[-1]
             if held > 0.0:
-                self._append(one.time, self._force(one.contacts), self._sums[-1] + self._values[-1] * held)
+                self._append(change.time, self._force(change.contacts), self._sums[-1] + self._values[-1] * held)
         times, values, sums = np.array([self._times, self._values, self._sums])
 
         def total(at: Array) -> Array:
@@ -129,7 +129,7 @@ class _Mean:
 
 
 def check(spec: ContactForceSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The parts exist, and those of a pair can touch each other."""
+    """Unknown parts, or a pair without contacts in the simulation."""
     if spec.pair is not None:
         return impossible_pair(context, spec.pair, ("pair",))
     return unknown_part(context, spec.of or "", ("of",))

@@ -1,4 +1,4 @@
-"""`duration`: it is over in time."""
+"""`duration`: a run or a step takes less than a limit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manipcli.spec.quantity import Time
 
 
 class TimeTakenSpec(Model):
-    """The simulated time of the whole run, or of the step that is looked at, is `below` this."""
+    """The simulated time of the run, or of the step of `at` or `during`, is less than `below`."""
 
     below: Annotated[Time, Field(gt=0)] = Field(description="Longest simulated time [s].")
 
@@ -23,7 +23,7 @@ class TimeTakenSpec(Model):
 def monitor(spec: TimeTakenSpec, world: World) -> Gauge:
     """`below` minus the time [s] since the first tick.
 
-    A tick of a step lasts until the next one, or until the step ended: with `at: STEP` and `during: STEP` it is the
+    A tick of a step lasts until the next tick or the end of the step: with `at: STEP` and `during: STEP` this is the
     time from the start of the step to its end.
     """
     started: list[float] = []
@@ -39,10 +39,10 @@ def monitor(spec: TimeTakenSpec, world: World) -> Gauge:
                 until[inside] = np.minimum(window.times[inside] + world.period, ended)
         passed = np.round(until - started[0], 9)
 
-        def say(k: int) -> str:
-            return f"{passed[k]:.3f} s of {spec.below:g} s"
+        def describe(k: int) -> str:
+            return f"{passed[k]:.3f} s; below {spec.below:g} s"
 
-        return robustness(spec.below - passed, window.times, unit="s", scale=spec.below, say=say)
+        return robustness(spec.below - passed, window.times, unit="s", scale=spec.below, describe=describe)
 
     return look
 

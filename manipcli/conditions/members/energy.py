@@ -1,4 +1,4 @@
-"""`energy`: the mechanical work that the joints do."""
+"""`energy`: the mechanical work of the joints."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from manipcli.spec.quantity import Energy
 
 
 class EnergySpec(Model):
-    """The joints have done less work than `below` since the time that is looked at began."""
+    """The work of the joints is less than `below`, from the start of the run or of the step of `at` or `during`."""
 
     below: Annotated[Energy, Field(gt=0)] = Field(description="Largest work [J].")
-    group: str | None = Field(default=None, description="Only this group's joints. Default: all that move.")
+    group: str | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
 
 
 def monitor(spec: EnergySpec, world: World) -> Gauge:
-    """`below` minus W [J], the work that the joints have done.
+    """`below` minus the work W [J] of the joints.
 
         W = sum over joints of the integral of max(tau_j qd_j, 0) dt
 
-    by trapezoids over the control ticks, of measured efforts and velocities. Braking takes nothing from it: a drive
-    that does not recuperate gets nothing back.
+    by the trapezoidal rule over the control ticks, from measured efforts and velocities. Braking does not reduce W:
+    drives are assumed not to recuperate.
     """
     robot = world.robot
     columns = robot.indices(robot.joint_names if spec.group is None else robot.group(spec.group).joints)
@@ -42,18 +42,18 @@ def monitor(spec: EnergySpec, world: World) -> Gauge:
         work = _work(states.time, power, *(done[-1] if done else (float(states.time[0]), 0.0, 0.0)))
         done[:] = [(float(states.time[-1]), float(power[-1]), float(work[-1]))]
 
-        def say(k: int) -> str:
-            return f"{readable(float(work[k]), 'J')} of {readable(spec.below, 'J')}"
+        def describe(k: int) -> str:
+            return f"{readable(float(work[k]), 'J')}; below {readable(spec.below, 'J')}"
 
-        return robustness(spec.below - work, window.times, unit="J", scale=spec.below, say=say)
+        return robustness(spec.below - work, window.times, unit="J", scale=spec.below, describe=describe)
 
     return look
 
 
 def _work(times: Array, power: Array, time: float, last_power: float, work: float) -> Array:
-    """(T,) the integral of power since the start, going on from the last tick.
+    """(T,) the integral of power since the start, continued from the last tick.
 
-    Summed one after the other, so that it does not matter where a run is cut into pieces.
+    A running sum, so the result does not depend on how the run is split into windows.
     """
     passed = np.diff(times, prepend=time)
     mean = (power + np.concatenate([[last_power], power[:-1]])) / 2.0
@@ -61,7 +61,7 @@ def _work(times: Array, power: Array, time: float, last_power: float, work: floa
 
 
 def check(spec: EnergySpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The robot has the group."""
+    """An unknown group."""
     return unknown_group(context.robot, spec.group, ("group",))
 
 

@@ -1,4 +1,4 @@
-"""`grasped`: the robot holds an object between two of its links."""
+"""`grasped`: two links of the robot press on an object."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from manipcli.spec.quantity import Force
 
 
 class GraspedSpec(Model):
-    """Two links of the robot at least press on the object, each with at least `above`."""
+    """At least two links of the robot press on the object, each with at least `above`."""
 
-    object: str = Field(description="A body of the scene that can move.")
+    object: str = Field(description="A movable body of the scene.")
     above: Annotated[Force, Field(gt=0)] = Field(
-        default=GRIP_FORCE, description="Least force of each [N]. Default 0.1 N."
+        default=GRIP_FORCE, description="Least force of each link [N]. Default 0.1 N."
     )
 
 
 def monitor(spec: GraspedSpec, world: World) -> Gauge:
-    """The normal force of the link that presses second hardest, minus `above` [N]."""
+    """The second largest normal force of a link on the object, minus `above` [N]."""
 
     def look(window: StateWindow) -> Robustness:
         force = window.of_contacts(lambda contacts: pinch_force(contacts, spec.object))
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             found = [
                 f"'{link}' with {readable(force, 'N')}" for force, link in pressing(window.touching(k), spec.object)
             ]
             by = f"touched by {' and '.join(found[:2])}" if found else "not touched by the robot"
             return f"'{spec.object}' is {by}; two links with at least {readable(spec.above, 'N')}"
 
-        return robustness(force - spec.above, window.times, unit="N", scale=spec.above, say=say)
+        return robustness(force - spec.above, window.times, unit="N", scale=spec.above, describe=describe)
 
     return look
 
 
 def check(spec: GraspedSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The body exists and can move."""
+    """An unknown or fixed body."""
     return unknown_body(context.scene, spec.object, ("object",), movable=True)
 
 

@@ -1,4 +1,4 @@
-"""`inside`, `outside`: an object is in the hollow of a container, or not."""
+"""`inside`, `outside`: the centre of an object is in the hollow of a container, or is not."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from manipcli.spec.base import Model
 class InsideSpec(Model):
     """The object's centre is inside the hollow of the container `of` (a cup, a tray), below its rim."""
 
-    object: str = Field(description="A body of the scene; its centre is what counts.")
+    object: str = Field(description="A body of the scene; its centre counts.")
     of: str = Field(description="A body with a hollow: a cup or a tray.")
 
 
 class OutsideSpec(Model):
     """The object's centre is not inside the hollow of the container `of` (a cup, a tray)."""
 
-    object: str = Field(description="A body of the scene; its centre is what counts.")
+    object: str = Field(description="A body of the scene; its centre counts.")
     of: str = Field(description="A body with a hollow: a cup or a tray.")
 
 
@@ -40,10 +40,10 @@ Spec = InsideSpec | OutsideSpec
 def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
     """Depth [m] of the object's centre in the hollow: the distance to its nearest face, negative outside.
 
-    The faces are the hollow's walls, its floor and the plane of its rim. Outside it is minus the distance to the
-    hollow. The centre of the object's bounding box is taken, for every shape: a ball that lies on the floor of a
-    deep tray has the margin of its radius, and touching a wall takes nothing away. `outside` is the opposite. It is
-    compared, where units differ, to the greatest depth that the hollow has.
+    The faces are the walls and the floor of the hollow and the plane of its rim. Outside, the margin is minus the
+    distance to the hollow. For every shape the centre is that of its bounding box: a ball on the floor of a deep tray
+    has its radius as margin. `outside` is the opposite. Where units differ, the margin is divided by the greatest
+    depth in the hollow.
     """
     shape = _interior(world.scene, spec.of).shape
     deepest = min(shape.radius, shape.length / 2.0) if isinstance(shape, Cylinder) else min(shape.size) / 2.0
@@ -52,7 +52,7 @@ def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
         p_S = _in_hollow(world.scene, window.states, spec)
         depth = np.broadcast_to(_depth(shape, p_S), np.shape(window.states.time))
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             far = readable(abs(float(depth[k])), "m")
             where = f"{far} deep in '{spec.of}'" if depth[k] >= 0.0 else f"{far} outside '{spec.of}'"
             if depth[k] < 0.0 and _over(shape, np.broadcast_to(p_S, (*depth.shape, 3))[k]):
@@ -60,7 +60,7 @@ def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
             at = point_text(centres(world.scene, window.states, spec.object), k)
             return f"'{spec.object}' is {where}, its centre at {at}"
 
-        return robustness(sign * depth, window.times, unit="m", scale=deepest, say=say)
+        return robustness(sign * depth, window.times, unit="m", scale=deepest, describe=describe)
 
     return look
 
@@ -68,12 +68,12 @@ def monitor(spec: Spec, world: World, *, sign: float) -> Gauge:
 def _interior(scene: Scene, name: str) -> Interior:
     interior = scene.body(name).interior
     if interior is None:
-        raise ValueError(f"'{name}' has no inside")
+        raise ValueError(f"'{name}' has no hollow")
     return interior
 
 
 def _in_hollow(scene: Scene, states: WorldState, spec: Spec) -> Array:
-    """p_SC (..., 3): the object's centre in the frame in the middle of the hollow."""
+    """p_SC (..., 3): the object's centre C in the frame S at the centre of the hollow."""
     interior = _interior(scene, spec.of)
     X_WO = body_pose(scene, states, spec.of)
     p_O = rotate_inverse(X_WO.quat_xyzw, centres(scene, states, spec.object) - X_WO.position)
@@ -91,7 +91,7 @@ def _depth(shape: Cylinder | Box, p_S: Array) -> Array:
 
 
 def _beyond(shape: Cylinder | Box, p_S: Array) -> Array:
-    """How far points (..., 3) are beyond each pair of faces [m], the last of which are floor and rim."""
+    """Distance of points (..., 3) beyond each pair of faces [m]; the last pair is floor and rim."""
     if isinstance(shape, Cylinder):
         radial = np.hypot(p_S[..., 0], p_S[..., 1]) - shape.radius
         return np.stack([radial, np.abs(p_S[..., 2]) - shape.length / 2.0], axis=-1)
@@ -99,12 +99,12 @@ def _beyond(shape: Cylinder | Box, p_S: Array) -> Array:
 
 
 def _over(shape: Cylinder | Box, p_S: Array) -> bool:
-    """Whether a point (3,) outside is between the walls, as one that would be inside were the container deeper."""
+    """Whether a point (3,) outside is above the rim and between the walls."""
     return bool(p_S[2] > 0.0 and (_beyond(shape, p_S)[:-1] <= 0.0).all())
 
 
 def check(spec: Spec, context: CheckContext) -> tuple[Problem, ...]:
-    """Both bodies exist, differ, and the container has a hollow."""
+    """Unknown bodies, the same body twice, or a container without a hollow."""
     scene = context.scene
     problems = [*unknown_body(scene, spec.object, ("object",)), *unknown_body(scene, spec.of, ("of",))]
     if problems:
@@ -112,7 +112,7 @@ def check(spec: Spec, context: CheckContext) -> tuple[Problem, ...]:
     container = scene.body(spec.of)
     if container.interior is None:
         hollow = [body.name for body in scene.bodies if body.interior is not None]
-        message = f"'{spec.of}' is a {container.kind} and has no inside"
+        message = f"'{spec.of}' is a {container.kind} and has no hollow"
         problems.append(Problem(("of",), message, did_you_mean(spec.of, hollow)))
     elif spec.of == spec.object:
         problems.append(Problem(("of",), f"'{spec.of}' cannot be inside itself"))

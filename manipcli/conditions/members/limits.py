@@ -1,4 +1,4 @@
-"""`limits`: joints keep their limits."""
+"""`limits`: joints stay within their position, velocity and effort limits."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from manipcli.spec.base import Model
 from manipcli.spec.quantity import Share
 
 SLACK: Final = 1e-4
-"""[rad or m] An engine meets a stop at the end of a step only: 50 um behind it at 5 cm/s and 1 ms."""
+"""[rad or m] An engine detects a stop at the end of a step: up to 50 um beyond it at 5 cm/s and 1 ms."""
 MOST_DIGITS: Final = 9
-"""With which a value and its limit are told, where they do not differ in fewer."""
+"""Largest number of digits for a value and its limit, to make them differ."""
 
 Quantity = Literal["position", "velocity", "effort"]
 ALL: tuple[Quantity, ...] = ("position", "velocity", "effort")
@@ -28,24 +28,24 @@ _UNITS = {
     "velocity": ("rad/s", "m/s"),
     "effort": ("N m", "N"),
 }
-"""Of a joint that turns, and of one that slides."""
+"""Units of (revolute, prismatic) joints."""
 
 
 class LimitsSpec(Model):
     """Measured positions, velocities and efforts stay inside the limits of the joints."""
 
-    group: str | None = Field(default=None, description="Only this group's joints. Default: all that move.")
+    group: str | None = Field(default=None, description="Only joints of this group. Default: all moving joints.")
     of: tuple[Quantity, ...] = Field(
         default=ALL, min_length=1, description="Which limits. Default [position, velocity, effort]."
     )
     spare: Annotated[Share, Field(ge=0, lt=1)] = Field(
-        default=0.0, description="Share of each limit (of half of its range, for positions) to be left. Default 0."
+        default=0.0, description="Share of each limit to keep free; for positions, of half the range. Default 0."
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Bound:
-    """One limit of one joint: |value - middle| is at most `half`; `column` of position, velocity, effort abreast."""
+    """A limit of a joint: |value - middle| <= `half`; `column` in the stacked positions, velocities and efforts."""
 
     joint: str
     what: Quantity
@@ -56,12 +56,11 @@ class _Bound:
 
 
 def monitor(spec: LimitsSpec, world: World) -> Gauge:
-    """The distance of a measured position, velocity or effort to its limit: of that with the least share of it left.
+    """The least distance of a measured position, velocity or effort to its limit, relative to the limit.
 
-    The unit is that of the quantity and of the joint that decide. A quantity without a limit does not count.
-    A position up to 0.1 mm or 1e-4 rad beyond its limit is at its limit, with a margin of 0: a joint that leans on its
-    stop keeps it, and engines find a stop at the end of a step only.
-    Where the engine has no physics there are no efforts: say `of: [position, velocity]`.
+    The unit is that of the deciding quantity and joint. A quantity without a limit is not compared. A position up to
+    0.1 mm or 1e-4 rad beyond its limit has a margin of 0: engines detect a stop only at the end of a step. An engine
+    without physics has no efforts: use `of: [position, velocity]`.
     """
     bounds = _bounds(spec, world.robot)
     columns = [bound.column for bound in bounds]
@@ -81,11 +80,11 @@ def monitor(spec: LimitsSpec, world: World) -> Gauge:
 
         def found(k: int) -> Measured:
             j = int(worst[k])
-            one = bounds[j]
-            least, most = one.middle - float(allowed[j]), one.middle + float(allowed[j])
-            value, low, high = _apart((float(values[k, j]), least, most), one.unit)
-            text = f"{one.what} of joint '{one.joint}' is {value}; allowed {low} to {high}"
-            return Measured(float(margins[k, j]), one.unit, float(window.times[k]), text)
+            bound = bounds[j]
+            least, most = bound.middle - float(allowed[j]), bound.middle + float(allowed[j])
+            value, low, high = _apart((float(values[k, j]), least, most), bound.unit)
+            text = f"{bound.what} of joint '{bound.joint}' is {value}; allowed {low} to {high}"
+            return Measured(float(margins[k, j]), bound.unit, float(window.times[k]), text)
 
         everywhere = np.ones(len(ticks), dtype=bool)
         return Robustness(margins[ticks, worst], relative[ticks, worst], units, everywhere, "", found)
@@ -94,12 +93,12 @@ def monitor(spec: LimitsSpec, world: World) -> Gauge:
 
 
 def _apart(values: tuple[float, float, float], unit: str) -> tuple[str, str, str]:
-    """A value and the two ends of what is allowed, with as many digits as it takes to see that it is at neither."""
-    value, low, high = (readable(one, unit) for one in values)
+    """A value and its two limits as text, with enough digits to tell them apart."""
+    value, low, high = (readable(each, unit) for each in values)
     for digits in range(4, MOST_DIGITS + 1):
         if value not in (low, high):
             break
-        value, low, high = (readable(one, unit, digits=digits) for one in values)
+        value, low, high = (readable(each, unit, digits=digits) for each in values)
     return value, low, high
 
 
@@ -125,20 +124,20 @@ def _bounds(spec: LimitsSpec, robot: RobotModel) -> list[_Bound]:
 
 
 def check(spec: LimitsSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The group exists, and one of its joints has a limit."""
+    """An unknown group, or joints without limits."""
     unknown = unknown_group(context.robot, spec.group, ("group",))
     if not unknown and not _bounds(spec, context.robot):
-        return (Problem((), f"no joint has a limit of its {' or '.join(spec.of)}"),)
+        return (Problem((), f"no joint has a {' or '.join(spec.of)} limit"),)
     return unknown
 
 
 def absent(spec: LimitsSpec, world: World) -> str | None:
-    """A limit of an effort is asked for, and nothing has efforts."""
+    """Effort limits need an engine with efforts."""
     reason = effortless(world)
     if reason is None or all(bound.what != "effort" for bound in _bounds(spec, world.robot)):
         return None
     others = [what for what in spec.of if what != "effort"]
-    return f"{reason}; `of: [{', '.join(others)}]` asks for the rest" if others else reason
+    return f"{reason}; use `of: [{', '.join(others)}]`" if others else reason
 
 
 LIMITS = Condition(

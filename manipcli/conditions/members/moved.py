@@ -1,4 +1,4 @@
-"""`moved`, `unmoved`: an object was displaced, or stayed, since the time that is looked at began."""
+"""`moved`, `unmoved`: displacement of an object since the start of the run or of the step of `at` or `during`."""
 
 from __future__ import annotations
 
@@ -19,38 +19,37 @@ from manipcli.spec.quantity import AngleTolerance, Length
 
 
 class MovedSpec(Model):
-    """The object's centre is at least `by` away from where it was, or the object rotated by at least
-    `rotation`; both where both are given."""
+    """The object's centre moved by at least `by`, and the object rotated by at least `rotation`, where given."""
 
     renamed: ClassVar = {"turn": "rotation"}
 
-    object: str = Field(description="A body of the scene that can move.")
+    object: str = Field(description="A movable body of the scene.")
     by: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="Least distance [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Least angle [rad], to pi.")
 
     @model_validator(mode="after")
     def _something(self) -> MovedSpec:
         if self.by is None and self.rotation is None:
-            raise problem("conflict", "say how far: `by` (a length), `rotation` (an angle), or both")
+            raise problem("conflict", "limit missing: give `by` (a length), `rotation` (an angle) or both")
         return self
 
 
 class UnmovedSpec(Model):
-    """The object's centre is at most `within` away from where it was, and the object rotated by at most `rotation`."""
+    """The object's centre moved by at most `within`, and the object rotated by at most `rotation`."""
 
     renamed: ClassVar = {"turn": "rotation"}
 
-    object: str = Field(description="A body of the scene that can move.")
+    object: str = Field(description="A movable body of the scene.")
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
     rotation: AngleTolerance | None = Field(default=None, description="Largest angle [rad], to pi. Default: any.")
 
 
 Change = tuple[Array, Array]
-"""(T,) how far the centre moved [m], and by how much the body rotated [rad]."""
+"""(T,) displacement of the centre [m], and rotation of the body [rad]."""
 
 
 def since_first(world: World, name: str) -> Callable[[StateWindow], Change]:
-    """How a body was displaced since the first tick that is shown."""
+    """The change of a body's pose since the first tick of the first window."""
     scene = world.scene
     k = scene.movable.index(scene.body(name))
     first: list[Change] = []
@@ -66,7 +65,7 @@ def since_first(world: World, name: str) -> Callable[[StateWindow], Change]:
 
 
 def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
-    """How far the centre is from where it was, minus `by` [m]; its rotation minus `rotation` [rad]; the lesser."""
+    """The displacement of the centre minus `by` [m]; the rotation minus `rotation` [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
     def look(window: StateWindow) -> Robustness:
@@ -74,39 +73,43 @@ def gauge_moved(spec: MovedSpec, world: World) -> Gauge:
         readings = []
         if spec.by is not None:
             text = f"at least {readable(spec.by, 'm')}"
-            say = _say(spec.object, "moved by", far, "m", text)
-            readings.append(robustness(far - spec.by, window.times, unit="m", scale=spec.by, say=say))
+            describe = _text(spec.object, "moved by", far, "m", text)
+            readings.append(robustness(far - spec.by, window.times, unit="m", scale=spec.by, describe=describe))
         if spec.rotation is not None:
             text = f"at least {readable(spec.rotation, 'rad')}"
-            say = _say(spec.object, "rotated by", rotated, "rad", text)
-            readings.append(robustness(rotated - spec.rotation, window.times, unit="rad", scale=spec.rotation, say=say))
+            describe = _text(spec.object, "rotated by", rotated, "rad", text)
+            readings.append(
+                robustness(rotated - spec.rotation, window.times, unit="rad", scale=spec.rotation, describe=describe)
+            )
         return least(readings)
 
     return look
 
 
 def gauge_unmoved(spec: UnmovedSpec, world: World) -> Gauge:
-    """`within` minus the distance of the centre from where it was [m]; `rotation` minus its rotation [rad]."""
+    """`within` minus the displacement of the centre [m]; `rotation` minus the rotation [rad]; the lesser."""
     changed = since_first(world, spec.object)
 
     def look(window: StateWindow) -> Robustness:
         far, rotated = changed(window)
-        say = _say(spec.object, "moved by", far, "m", f"at most {readable(spec.within, 'm')}")
-        readings = [robustness(spec.within - far, window.times, unit="m", scale=spec.within, say=say)]
+        describe = _text(spec.object, "moved by", far, "m", f"at most {readable(spec.within, 'm')}")
+        readings = [robustness(spec.within - far, window.times, unit="m", scale=spec.within, describe=describe)]
         if spec.rotation is not None:
-            say = _say(spec.object, "rotated by", rotated, "rad", f"at most {readable(spec.rotation, 'rad')}")
-            readings.append(robustness(spec.rotation - rotated, window.times, unit="rad", scale=spec.rotation, say=say))
+            describe = _text(spec.object, "rotated by", rotated, "rad", f"at most {readable(spec.rotation, 'rad')}")
+            readings.append(
+                robustness(spec.rotation - rotated, window.times, unit="rad", scale=spec.rotation, describe=describe)
+            )
         return least(readings)
 
     return look
 
 
-def _say(name: str, verb: str, values: Array, unit: str, limit: str) -> Callable[[int], str]:
+def _text(name: str, verb: str, values: Array, unit: str, limit: str) -> Callable[[int], str]:
     return lambda k: f"'{name}' {verb} {readable(float(values[k]), unit)}; {limit}"
 
 
 def check(spec: MovedSpec | UnmovedSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The body exists and can move."""
+    """An unknown or fixed body."""
     return unknown_body(context.scene, spec.object, ("object",), movable=True)
 
 

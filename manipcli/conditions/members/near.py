@@ -1,4 +1,4 @@
-"""`near`: an object is close to where it started, to a body, a named frame, or a point."""
+"""`near`: an object is close to its start, a body, a named frame, or a point."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class NearSpec(Model):
 
     object: str = Field(description="A body of the scene.")
     to: str | Vector3 = Field(
-        description="`start` (where the object was at time 0), a body or a named frame (its origin, which may move), "
+        description="`start` (the object's position at time 0), a body or a named frame (its origin, which may move), "
         "or a point [x, y, z] in the world."
     )
     within: Annotated[Length, Field(gt=0)] = Field(description="Largest distance [m].")
@@ -43,12 +43,12 @@ def monitor(spec: NearSpec, world: World) -> Gauge:
         target = _target(spec, world, window.states)
         distance = np.broadcast_to(np.linalg.norm(p_WO - target, axis=-1), np.shape(window.times))
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             away = readable(float(distance[k]), "m")
-            where = f"'{spec.object}' is at {point_text(p_WO, k)}, {away} from {called} at {point_text(target, k)}"
-            return f"{where}; within {readable(spec.within, 'm')}"
+            where = f"it is at {point_text(p_WO, k)}, the target at {point_text(target, k)}"
+            return f"'{spec.object}' is {away} from {called}: {where}; within {readable(spec.within, 'm')}"
 
-        return robustness(spec.within - distance, window.times, unit="m", scale=spec.within, say=say)
+        return robustness(spec.within - distance, window.times, unit="m", scale=spec.within, describe=describe)
 
     return look
 
@@ -69,21 +69,25 @@ def _target(spec: NearSpec, world: World, state: WorldState) -> Array:
 
 
 def check(spec: NearSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The body exists, and so does the target, which is another."""
+    """An unknown body or target, or the same body twice."""
     scene = context.scene
     problems = unknown_body(scene, spec.object, ("object",))
     if isinstance(spec.to, str):
         known = (START, *(frame.name for frame in scene.frames), *(body.name for body in scene.bodies))
         if spec.to not in known:
-            message = f"'{spec.to}' is neither `start` nor a frame or body of the scene"
+            message = f"'{spec.to}' is not `start`, a frame or a body of the scene"
             return (*problems, Problem(("to",), message, did_you_mean(spec.to, known)))
         if spec.to == spec.object != START:
-            return (Problem(("to",), f"'{spec.object}' is always near itself", "`to: start` is where it was at first"),)
+            return (
+                Problem(
+                    ("to",), f"'{spec.object}' is always near itself", "use `to: start` for its position at time 0"
+                ),
+            )
     return problems
 
 
 def bodies(spec: NearSpec, scene: Scene) -> tuple[str, ...]:
-    """The object, and the body that the target is or hangs on."""
+    """The object, and the body that the target is or is attached to."""
     parents = {frame.name: frame.parent for frame in scene.frames}
     if not isinstance(spec.to, str) or spec.to == START or parents.get(spec.to) == "world":
         return (spec.object,)

@@ -1,4 +1,4 @@
-"""`rests_on`: an object is carried by another."""
+"""`rests_on`: an object rests on another body."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manipcli.spec.quantity import Share
 class RestsOnSpec(Model):
     """The object presses on `of` with at least `share` of its own weight."""
 
-    object: str = Field(description="A body of the scene that can move.")
+    object: str = Field(description="A movable body of the scene.")
     of: str = Field(description="The body that carries it.")
     share: Annotated[Share, Field(gt=0)] = Field(default=0.5, description="Least share of its weight. Default 50 %.")
 
@@ -27,8 +27,8 @@ class RestsOnSpec(Model):
 def monitor(spec: RestsOnSpec, world: World) -> Gauge:
     """The normal force between the two minus `share` m g [N], g the scene's gravity.
 
-    Contacts are known by their normal force alone: what is pressed against a wall hard enough rests on it, too.
-    Where units differ, the margin is compared to that share.
+    Contacts have only a normal force, without direction: an object pressed hard against a wall also counts as resting
+    on it. Where units differ, the margin is divided by `share` m g.
     """
     weight = world.scene.body(spec.object).mass * float(np.linalg.norm(world.scene.gravity))
     wanted = spec.share * weight
@@ -37,17 +37,17 @@ def monitor(spec: RestsOnSpec, world: World) -> Gauge:
     def look(window: StateWindow) -> Robustness:
         force = window.of_contacts(lambda contacts: sum(c.force for c in contacts if between(pair, c)))
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             presses = f"'{spec.object}' presses on '{spec.of}' with {readable(float(force[k]), 'N')}"
-            return f"{presses}; at least {readable(wanted, 'N')} of its weight of {readable(weight, 'N')}"
+            return f"{presses}, its weight is {readable(weight, 'N')}; at least {readable(wanted, 'N')}"
 
-        return robustness(force - wanted, window.times, unit="N", scale=wanted or 1.0, say=say)
+        return robustness(force - wanted, window.times, unit="N", scale=wanted or 1.0, describe=describe)
 
     return look
 
 
 def check(spec: RestsOnSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """Both bodies exist and differ, and the first can move."""
+    """Unknown bodies, the same body twice, a fixed object, or no gravity."""
     problems = (
         *unknown_body(context.scene, spec.object, ("object",), movable=True),
         *unknown_body(context.scene, spec.of, ("of",)),

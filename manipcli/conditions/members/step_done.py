@@ -1,4 +1,4 @@
-"""`step_done`: a step was done."""
+"""`step_done`: a step is done."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ class StepDoneSpec(Model):
 
 
 def monitor(spec: StepDoneSpec, world: World) -> Gauge:
-    """1 from the moment on at which the step is done, -1 otherwise; there is no half a step."""
+    """1 from the time at which the step is done, -1 before and if it fails; without unit."""
 
     def look(window: StateWindow) -> Robustness:
-        step = next(one for one in window.steps if one.id == spec.step)
+        step = next(step for step in window.steps if step.id == spec.step)
         done = step.outcome == "done" and step.ended is not None
         since = step.ended if done and step.ended is not None else np.inf
         margins = np.where(window.times >= since - ROUNDING, 1.0, -1.0)
 
         def ahead(k: int) -> bool:
-            """Whether it ended, and after this tick."""
+            """Whether the step ends after tick `k`."""
             return step.ended is not None and step.ended - ROUNDING > window.times[k]
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             ran = step.outcome or ("not run" if step.started is None else "not ended")
             if ahead(k):
                 ran = f"not done before {step.ended:.2f} s" if done else "not ended yet"
@@ -40,13 +40,13 @@ def monitor(spec: StepDoneSpec, world: World) -> Gauge:
         def at(k: int) -> float | None:
             return float(window.times[k]) if ahead(k) else step.ended
 
-        return robustness(margins, window.times, unit="", scale=1.0, say=say, at=at)
+        return robustness(margins, window.times, unit="", scale=1.0, describe=describe, at=at)
 
     return look
 
 
 def check(spec: StepDoneSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The task has the step."""
+    """An unknown step."""
     if context.steps is None or spec.step in context.steps:
         return ()
     return (Problem(("step",), f"the task has no step '{spec.step}'", did_you_mean(spec.step, context.steps)),)
@@ -58,7 +58,7 @@ STEP_DONE = Condition(
     units=("",),
     open=monitor,
     check=check,
-    absent=lambda spec, world: None if spec.step in world.steps else f"the recording knows no step '{spec.step}'",
+    absent=lambda spec, world: None if spec.step in world.steps else f"the recording has no step '{spec.step}'",
     example="step_done: {step: lift_1}",
     stateless=True,
 )

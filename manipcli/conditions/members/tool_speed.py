@@ -1,4 +1,4 @@
-"""`tool_speed`: the tool, or another link, moves slowly enough."""
+"""`tool_speed`: the tool, or another link, moves slower than a limit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ToolSpeedSpec(Model):
     """The origin of the tool frame (or of `link`) moves slower than `below`."""
 
     below: Annotated[Speed, Field(gt=0)] = Field(description="Largest speed in the world [m/s].")
-    link: str | None = Field(default=None, description="Another link than the tool's; its origin counts.")
+    link: str | None = Field(default=None, description="A link instead of the tool frame; its origin counts.")
 
 
 def monitor(spec: ToolSpeedSpec, world: World) -> Gauge:
@@ -35,23 +35,23 @@ def monitor(spec: ToolSpeedSpec, world: World) -> Gauge:
         velocity = world.kinematics.point_velocity
         speed = np.linalg.norm([velocity(q[k], v[k], link, X_LT) for k in range(len(q))], axis=-1)
 
-        def say(k: int) -> str:
+        def describe(k: int) -> str:
             return f"{name} moves at {readable(float(speed[k]), 'm/s')}; below {readable(spec.below, 'm/s')}"
 
-        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, say=say)
+        return robustness(spec.below - speed, window.times, unit="m/s", scale=spec.below, describe=describe)
 
     return look
 
 
 def _frame(spec: ToolSpeedSpec, robot: RobotModel) -> tuple[str, Transform | None]:
-    """The link, and the frame in it."""
+    """The link, and the pose of the measured point in it; None: its origin."""
     if spec.link is not None:
         return spec.link, None
     return (robot.root, None) if robot.tool is None else (robot.tool.link, robot.tool.X_LT)
 
 
 def check(spec: ToolSpeedSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The link exists; without one, the robot has a tool."""
+    """An unknown link, or a robot without a tool."""
     robot = context.robot
     links = [link.name for link in robot.links]
     if spec.link is not None and spec.link not in links:
@@ -59,7 +59,7 @@ def check(spec: ToolSpeedSpec, context: CheckContext) -> tuple[Problem, ...]:
         return (Problem(("link",), message, did_you_mean(spec.link, links)),)
     if spec.link is None and robot.tool is None:
         message = f"robot '{robot.name}' has no tool"
-        return (Problem((), message, "name a `link` here, or a `tool` in the robot file"),)
+        return (Problem((), message, "name a `link` here, or add a `tool` to the robot file"),)
     return ()
 
 

@@ -1,4 +1,4 @@
-"""`tracking`: the joints of a group follow their references."""
+"""`tracking`: the joints of a group follow their references within a tolerance."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from manipcli.spec.quantity import JointTolerance
 
 
 class TrackingSpec(Model):
-    """No joint of the group is further than `within` from its controller's reference."""
+    """Every joint of the group is at most `within` from its controller's reference."""
 
     group: str = Field(description="A group of the robot; each of its joints must have a controller.")
     within: JointTolerance = Field(description="Largest difference of a joint [rad or m], to pi.")
 
 
 def monitor(spec: TrackingSpec, world: World) -> Gauge:
-    """`within` minus the largest |reference - measured| [rad, or m where the worst joint slides] of the joints.
+    """`within` minus the largest |reference - measured| of the joints [rad, or m if the worst joint is prismatic].
 
-    A joint without limits errs the short way round. While no controller of a joint is active, nothing is said.
+    The error of a continuous joint is wrapped to +-pi. Ticks at which a joint has no active controller are ignored.
     """
     robot = world.robot
     joints = robot.group(spec.group).joints
@@ -58,18 +58,18 @@ def monitor(spec: TrackingSpec, world: World) -> Gauge:
 
 
 def _references(window: StateWindow, joints: tuple[str, ...]) -> Array:
-    """(T, k) what the joints should follow: of each, that of the controller that is active."""
+    """(T, k) the references of the joints, each from its active controller; NaN without one."""
     found = np.full((len(window.times), len(joints)), np.nan)
-    for one in window.references:
+    for reference in window.references:
         for k, name in enumerate(joints):
-            if name in one.joints:
-                position = one.position[:, one.joints.index(name)]
+            if name in reference.joints:
+                position = reference.position[:, reference.joints.index(name)]
                 found[:, k] = np.where(np.isnan(found[:, k]), position, found[:, k])
     return found
 
 
 def check(spec: TrackingSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The robot has the group, and the group has joints."""
+    """An unknown or empty group."""
     unknown = unknown_group(context.robot, spec.group, ("group",))
     if not unknown and not context.robot.group(spec.group).joints:
         return (Problem(("group",), f"group '{spec.group}' has no joints"),)
@@ -77,12 +77,12 @@ def check(spec: TrackingSpec, context: CheckContext) -> tuple[Problem, ...]:
 
 
 def absent(spec: TrackingSpec, world: World) -> str | None:
-    """References come true by definition, or none of one of the joints is recorded."""
+    """Tracking is ideal by definition, or a joint has no recorded reference."""
     if not world.physics:
-        return "the engine has no physics, so every reference comes true at once"
+        return "the engine has no physics, so tracking is ideal"
     for name in world.robot.group(spec.group).joints:
         if name not in world.referenced:
-            return world.unrecorded.get("references") or f"the recording holds no reference of joint '{name}'"
+            return world.unrecorded.get("references") or f"the recording has no reference of joint '{name}'"
     return None
 
 

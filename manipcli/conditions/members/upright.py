@@ -1,4 +1,4 @@
-"""`upright`: an object stands, its z axis up."""
+"""`upright`: the z axis of an object points up."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from manipcli.spec.quantity import AngleTolerance
 
 
 class UprightSpec(Model):
-    """The object's z axis is at most `within` from the world's."""
+    """The angle between the object's z axis and the world's is at most `within`."""
 
     object: str = Field(description="A body of the scene.")
     within: AngleTolerance = Field(description="Largest tilt [rad], to pi.")
 
 
 def monitor(spec: UprightSpec, world: World) -> Gauge:
-    """`within` minus the tilt [rad], the angle between the object's z axis and the world's, 0 to pi."""
+    """`within` minus the tilt [rad]: the angle between the object's z axis and the world's, 0 to pi."""
 
     def look(window: StateWindow) -> Robustness:
         z_W = rotate(body_pose(world.scene, window.states, spec.object).quat_xyzw, np.array([0.0, 0.0, 1.0]))
@@ -33,17 +33,17 @@ def monitor(spec: UprightSpec, world: World) -> Gauge:
         tilt = np.arctan2(np.hypot(z_W[..., 0], z_W[..., 1]), z_W[..., 2])
         tilts = np.broadcast_to(tilt, np.shape(window.times))
 
-        def say(k: int) -> str:
-            leans, within = told_apart(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
-            return f"'{spec.object}' leans {leans} deg; within {within} deg"
+        def describe(k: int) -> str:
+            tilted, within = told_apart(math.degrees(tilts[k]), math.degrees(spec.within), form=".3g")
+            return f"'{spec.object}' is tilted {tilted} deg; within {within} deg"
 
-        return robustness(spec.within - tilts, window.times, unit="rad", scale=spec.within, say=say)
+        return robustness(spec.within - tilts, window.times, unit="rad", scale=spec.within, describe=describe)
 
     return look
 
 
 def check(spec: UprightSpec, context: CheckContext) -> tuple[Problem, ...]:
-    """The body exists."""
+    """An unknown body."""
     return unknown_body(context.scene, spec.object, ("object",))
 
 

@@ -1,1 +1,1 @@
-"""What a recording contains in numbers beyond its verdict: errors, limits, work, grasps, the cost of each step."""
+"""Measurements of a recording beyond its verdict: tracking errors, limits, work, grasps, steps."""

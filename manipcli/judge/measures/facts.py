@@ -1,6 +1,6 @@
-"""What a recording says in numbers beyond its verdict: errors, limits, work and power, grasps. Knows no HTML.
+"""Measurements of a whole run: tracking errors, use of limits, work, power, and grasps.
 
-Two passes over the spans, one span in memory at a time: the first finds what was held, the second measures.
+Two passes over the spans, with one span in memory: the first finds the grasps, the second measures.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from manipcli.record.recording import Recording, Span
 from manipcli.scene.scene import Scene
 
 BUCKETS = 240
-"""Parts of the run of each of which the largest error is kept."""
+"""Number of equal parts of the run; the largest error of each is kept."""
 
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """A greatest value, and when [s] it was first met."""
+    """The largest value, and the first time [s] at which it was reached."""
 
     value: float
     at: float
@@ -34,12 +34,12 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """How near something came to a limit.
+    """The largest use of a limit.
 
     Attributes:
-        share: of the limit that was used, 1 at the limit; of a position: of the way from the middle to its limit.
-        value, limit: what was measured then, and the limit on that side.
-        at: [s] when.
+        share: of the limit, 1 at the limit; for a position, of the distance from the middle of its range to its limit.
+        value, limit: the measured value, and the limit on its side.
+        at: [s] time.
     """
 
     share: float
@@ -50,16 +50,17 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class JointFacts:
-    """One joint over the whole run; rad or m, N m or N.
+    """A joint over the whole run; rad or m, N m or N.
 
     Attributes:
-        name, unit: of its position.
-        error: the largest |reference - measured|; None where no controller told a reference.
-        error_rms: the root of the mean square of that.
-        position, velocity, effort: how near it came to each limit; None where there is no such limit.
-        given, taken: [J] the integrals of its power where that is positive, and (positive, too) where it is negative.
+        name: of the joint.
+        unit: of its position.
+        error: the largest |reference - measured|; None without a recorded reference.
+        error_rms: its root mean square.
+        position, velocity, effort: use of each limit; None without that limit.
+        given, taken: [J] the integrals of its positive and of its negative power, both as positive numbers.
         power: the largest |power| [W].
-        saturated: ticks in which its command was cut at its limits.
+        saturated: ticks in which its command was limited.
     """
 
     name: str
@@ -77,14 +78,14 @@ class JointFacts:
 
 @dataclass(frozen=True, slots=True)
 class StepFacts:
-    """One step that was begun.
+    """A step that started.
 
     Attributes:
         id: of the step.
         started: [s].
         given, taken: (n,) [J] of each joint; see `JointFacts`.
         power: (n,) [W] the largest |power| of each joint.
-        total: the largest sum of the joints' powers [W] that are positive, and when.
+        total: the largest sum of the positive powers of the joints [W], and its time.
     """
 
     id: str
@@ -97,16 +98,16 @@ class StepFacts:
 
 @dataclass(frozen=True, slots=True)
 class RunFacts:
-    """A run in numbers.
+    """The measurements of a run.
 
     Attributes:
         joints: in the order of `RobotModel.moving_joints`.
-        steps: those that were begun, in their order.
-        holds: what was held, in the order of time.
-        actuators: ticks in which an actuator had no more to give, by name, those that never happened left out.
+        steps: those that started, in order of time.
+        holds: grasps, in order of time.
+        actuators: saturated ticks by actuator, without actuators that never saturated.
         times: (B,) [s] the middles of equal parts of the run.
-        errors: (B, n) the largest |reference - measured| of each joint in each part; NaN where there is none.
-        period: [s] of a tick.
+        errors: (B, n) the largest |reference - measured| of each joint in each part; NaN without a reference.
+        period: [s] control period.
         start, end: [s] of the recording.
     """
 
@@ -125,9 +126,9 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
     """Measure a recording.
 
     Args:
-        recording: the log; it holds every joint of the robot and every movable body of the scene.
-        robot, scene: built from it.
-        steps: how they went.
+        recording: a log with every joint of the robot and every movable body of the scene.
+        robot, scene: built from the log.
+        steps: their outcomes.
     """
     joints = [recording.joint_names.index(name) for name in robot.joint_names]
     bodies = {name: k for k, name in enumerate(recording.body_names)}
@@ -175,17 +176,17 @@ def run_facts(recording: Recording, robot: RobotModel, scene: Scene, steps: Sequ
 
 
 class _Limits:
-    """How near each joint comes to its limits: rows are position, velocity, effort."""
+    """The largest use of the limits of each joint; rows are position, velocity, effort."""
 
     def __init__(self, robot: RobotModel) -> None:
         nan = float("nan")
         limits = [joint.limits for joint in robot.moving_joints]
-        both = [one.lower is not None and one.upper is not None for one in limits]
-        # A joint that turns without end states limits that it does not have.
+        both = [each.lower is not None and each.upper is not None for each in limits]
+        # The limits of a continuous joint have no effect.
         both = [had and joint.type != "continuous" for had, joint in zip(both, robot.moving_joints, strict=True)]
-        lower = np.array([one.lower if had else nan for one, had in zip(limits, both, strict=True)], dtype=np.float64)
-        upper = np.array([one.upper if had else nan for one, had in zip(limits, both, strict=True)], dtype=np.float64)
-        stated = [[one.velocity or nan for one in limits], [one.effort or nan for one in limits]]
+        lower = np.array([each.lower if had else nan for each, had in zip(limits, both, strict=True)], dtype=np.float64)
+        upper = np.array([each.upper if had else nan for each, had in zip(limits, both, strict=True)], dtype=np.float64)
+        stated = [[each.velocity or nan for each in limits], [each.effort or nan for each in limits]]
         self._middle = np.stack([(lower + upper) / 2.0, np.zeros(len(limits)), np.zeros(len(limits))])
         self._half = np.vstack([(upper - lower) / 2.0, np.array(stated, dtype=np.float64).reshape(2, -1)])
         self._half[self._half <= 0.0] = nan
@@ -235,7 +236,7 @@ class _Errors:
         if not self._begun:
             self.start, self._begun = float(times[0]), True
         error = references(span.controllers, self._names, len(times)) - position
-        # A joint without limits errs the short way round.
+        # The error of a continuous joint is wrapped to +-pi.
         error[:, self._endless] = wrapped(error[:, self._endless])
         known = np.isfinite(error)
         size = np.where(known, np.abs(error), -np.inf)
@@ -266,7 +267,7 @@ class _Errors:
 class _Powers:
     """Power of each joint, P = effort * velocity, and its integral by the trapezoidal rule, by step.
 
-    Row s of the tables is step s of those begun; the last row is what belongs to none.
+    Row s of the tables is the s-th started step; the last row is the time outside of steps.
     """
 
     def __init__(self, joints: int, steps: Sequence[StepOutcome], end: float) -> None:
@@ -305,7 +306,7 @@ class _Powers:
                 self._total[each] = Peak(float(together[k]), float(times[k]))
 
     def _rows(self, times: Array) -> npt.NDArray[np.intp]:
-        """The step that is on at each time; the last row where none is."""
+        """(T,) the row of the step at each time; the last row outside of steps."""
         if not len(self._starts):
             return np.zeros(len(times), dtype=np.intp)
         row = np.searchsorted(self._starts, times, side="right") - 1

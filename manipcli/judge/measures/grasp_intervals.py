@@ -1,8 +1,8 @@
-"""How well things were held: from when to when the robot touched a body, how hard, and how it moved in the hand.
+"""Grasp intervals of a recording: when a body was held, contact forces, and its slip in the hand.
 
-A body is held while links of the robot touch it, and carried while, besides, it stands on nothing: neither on a body
-that is fixed nor, through others, on one that stands on it. Both come from the recorded contacts alone, whatever the
-step was called. What was touched and never carried was held only if the hand closed meanwhile: else it was pushed.
+A body is held while links of the robot touch it. It is carried while it is held and has no support: no contact with a
+fixed body, directly or through other bodies. Both come from the recorded contacts alone, not from the steps. A body
+that was touched and never carried counts as held only if the hand closed meanwhile; else it was pushed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from manipcli.record.recording import ContactSnapshot, Recording, Span, TaskEven
 from manipcli.scene.scene import Scene
 
 SHORTEST = 0.1
-"""[s] of a hold, and of a time without support."""
+"""[s] Least duration of a hold, and of a time without support."""
 
 Ending = Literal["set down", "lost", "let go", "held to the end"]
 
@@ -36,10 +36,10 @@ class Hold:
 
     Attributes:
         body: its name.
-        grasped: [s] when the motion that closed the hand was over: from here on slip counts.
-        lifted: [s] when it stood on nothing any more; None where it always did.
-        until: [s] when it stood again, or was not touched any more.
-        ended: `set down`: while held; `lost`: it was in the air when the last contact ended; `let go`: it was never
+        grasped: [s] end of the motion that closed the hand; slip counts from here.
+        lifted: [s] when it lost its support; None if it never did.
+        until: [s] when it was supported again, or no longer touched.
+        ended: `set down`: supported while held; `lost`: without support when the last contact ended; `let go`: never
             lifted.
     """
 
@@ -52,7 +52,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Least, greatest and, weighted by time, mean of a number."""
+    """Least, time-weighted mean and greatest value of a number."""
 
     least: float
     mean: float
@@ -61,7 +61,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """How far something moved: the most, when [s], and at the end; m or rad."""
+    """Displacement [m or rad]: the largest, its time [s], and the last."""
 
     most: float
     at: float
@@ -73,12 +73,12 @@ class GraspFacts:
     """A hold, measured from `grasped` to `until`.
 
     Attributes:
-        hold: what, and when.
+        hold: the body and its times.
         force: sum of the normal forces [N] of the robot's links on the body.
-        touching: number of links that touch it.
-        links: their names, the one with the largest force first.
-        slip: of the middle of the body in the tool frame since `grasped` [m]; None where that is not known.
-        rotation: of the body in the tool frame since then [rad].
+        touching: number of links in contact with it.
+        links: their names, the largest force first.
+        slip: of the body's centre in the tool frame since `grasped` [m]; None if unknown.
+        rotation: of the body in the tool frame since `grasped` [rad]; None if unknown.
     """
 
     hold: Hold
@@ -90,11 +90,11 @@ class GraspFacts:
 
 
 def find_grasps(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], float]:
-    """Every hold of a recording, in the order of time, in one pass; and the time [s] of its last tick."""
+    """All holds of a recording in order of time, in one pass, and the time [s] of its last tick."""
     movable = [body.name for body in scene.movable]
-    standing = {body.name for body in scene.bodies if body.fixed}
-    touched = {name: _Stretches() for name in movable}
-    free = {name: _Stretches() for name in movable}
+    fixed = {body.name for body in scene.bodies if body.fixed}
+    touched = {name: _Intervals() for name in movable}
+    free = {name: _Intervals() for name in movable}
     start, end = 0.0, 0.0
     first = True
     for span in recording.spans:
@@ -103,17 +103,17 @@ def find_grasps(recording: Recording, scene: Scene) -> tuple[tuple[Hold, ...], f
             first, end = False, float(span.states.time[-1])
         for snapshot in span.contacts:
             on_robot = {name for pair in _pressing(snapshot.contacts, robot=True) for name in pair}
-            stands = _supported(snapshot.contacts, standing)
+            supported = _supported(snapshot.contacts, fixed)
             for name in movable:
-                touched[name].tell(snapshot.time, name in on_robot)
-                free[name].tell(snapshot.time, name not in stands)
+                touched[name].add(snapshot.time, name in on_robot)
+                free[name].add(snapshot.time, name not in supported)
     found = []
     for name in movable:
         for begin, stop in touched[name].finish(end):
             if stop - begin >= SHORTEST:
-                one = _hold(name, begin, stop, free[name].finish(end), recording.events, end)
-                if one.lifted is not None or _closed_within(begin, stop, recording.events):
-                    found.append(one)
+                hold = _hold(name, begin, stop, free[name].finish(end), recording.events, end)
+                if hold.lifted is not None or _closed_within(begin, stop, recording.events):
+                    found.append(hold)
     return tuple(sorted(found, key=lambda hold: hold.grasped)), end
 
 
@@ -131,43 +131,39 @@ def _hold(
 
 
 def _closed_within(begin: float, stop: float, events: Sequence[TaskEvent]) -> bool:
-    """Whether the hand closed at any time between these, as far as is known: a recording without steps does not say."""
+    """Whether the hand closed between these times; True for a recording without phases, where this is unknown."""
     phases = [event for event in events if event.kind in ("phase_started", "step_ended")]
     closing = [(phase.time, after.time) for phase, after in pairwise([*phases, *phases[-1:]]) if phase.text == CLOSING]
     return not phases or any(since <= stop and until >= begin for since, until in closing)
 
 
 def _pressing(contacts: Iterable[Contact], *, robot: bool) -> list[tuple[str, str]]:
-    """Pairs that press on each other, with a link of the robot among them or without."""
-    return [
-        (one.a, one.b)
-        for one in contacts
-        if one.force > 0.0 and (one.a.startswith(LINK) or one.b.startswith(LINK)) == robot
-    ]
+    """Pairs in contact, either with a link of the robot (`robot`) or without."""
+    return [(c.a, c.b) for c in contacts if c.force > 0.0 and (c.a.startswith(LINK) or c.b.startswith(LINK)) == robot]
 
 
-def _supported(contacts: Iterable[Contact], standing: set[str]) -> set[str]:
-    """Everything that a fixed body carries, also through others; what is no body of the scene (the floor) is fixed."""
+def _supported(contacts: Iterable[Contact], fixed: set[str]) -> set[str]:
+    """Every body supported by a fixed body or by the floor, directly or through others."""
     pairs = _pressing(contacts, robot=False)
-    carried = {name for pair in pairs for name in pair if name in standing or name == "floor"}
+    carried = {name for pair in pairs for name in pair if name in fixed or name == "floor"}
     while more := {name for pair in pairs if carried & set(pair) for name in pair} - carried:
         carried |= more
     return carried
 
 
-class _Stretches:
-    """From when to when something was so; gaps of `BRIDGED` are closed while it is told."""
+class _Intervals:
+    """Time intervals in which a value is true; gaps up to `BRIDGED` are closed."""
 
     def __init__(self) -> None:
         self._done: list[tuple[float, float]] = []
         self._since: float | None = None
 
-    def tell(self, time: float, so: bool) -> None:
-        if so and self._since is None:
+    def add(self, time: float, value: bool) -> None:
+        if value and self._since is None:
             self._since = time
             if self._done and time - self._done[-1][1] <= BRIDGED:
                 self._since = self._done.pop()[0]
-        elif not so and self._since is not None:
+        elif not value and self._since is not None:
             self._done.append((self._since, time))
             self._since = None
 
@@ -177,12 +173,12 @@ class _Stretches:
 
 
 class GraspMeter:
-    """Measures one hold while the spans of the recording go by.
+    """Measures a hold over successive spans of the recording.
 
     Args:
-        hold: which.
+        hold: the hold to measure.
         robot, scene: of the log.
-        joints: where the robot's joints stand in the recorded arrays.
+        joints: indices of the robot's joints in the recorded arrays.
     """
 
     def __init__(self, hold: Hold, robot: RobotModel, scene: Scene, joints: Sequence[int]) -> None:
@@ -199,7 +195,7 @@ class GraspMeter:
         self._origin: tuple[Array, Array] | None = None
 
     def add(self, span: Span, bodies: Mapping[str, int]) -> None:
-        """The next span; `bodies`: where each body stands in the recorded arrays."""
+        """Add the next span; `bodies`: indices of bodies in the recorded arrays."""
         for snapshot in span.contacts:
             self._contacts(snapshot)
         times = span.states.time
@@ -228,7 +224,7 @@ class GraspMeter:
         self._now = (snapshot.time, {link.removeprefix(LINK): force for force, link in found})
 
     def _pass(self, time: float) -> None:
-        """What held until now, for as long as it held."""
+        """Weight the current contacts by their duration up to `time`."""
         if self._now is None:
             return
         since, forces = self._now
@@ -240,7 +236,7 @@ class GraspMeter:
                 self._links[link] = max(force, self._links.get(link, 0.0))
 
     def finish(self) -> GraspFacts:
-        """What was measured."""
+        """The measurements of the hold."""
         self._pass(self._hold.until)
         return GraspFacts(
             self._hold,

@@ -1,4 +1,4 @@
-"""What each step of a recording took: how far joints and tool went, the hardest contact, and the work."""
+"""Measurements per step: joint and tool travel, largest contact force, work."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from manipcli.record.recording import ContactSnapshot, Recording, Span
 
 @dataclass(frozen=True, slots=True)
 class StepMeasures:
-    """One step; None where the log does not say.
+    """The measurements of a step; None where unknown.
 
     Attributes:
         id, verb, outcome: of the step.
         duration: [s] simulated.
-        turned, slid: sum over the joints of how far each went there and back, [rad] and [m]; None without such joints.
+        turned, slid: total travel of the revolute [rad] and prismatic [m] joints; None without such joints.
         tool: [m] length of the path of the tool's origin.
-        force: [N] the greatest normal force between two parts.
-        touching: which two.
-        work: [J] sum over the joints of the integral of effort times velocity, where that is positive.
+        force: [N] the largest normal force between two parts.
+        touching: these two parts.
+        work: [J] sum over the joints of the integral of max(effort * velocity, 0).
     """
 
     id: str
@@ -48,19 +48,19 @@ def step_measures(recording: Recording, robot: RobotModel, steps: Sequence[StepO
     for span in recording.spans:
         if len(span.states.time):
             whole = joints.add(span)
-            for one in sums:
-                one.add(*whole)
+            for step_sums in sums:
+                step_sums.add(*whole)
         for change in span.contacts:
-            for one in sums:
-                one.touch(held, until=change.time)
+            for step_sums in sums:
+                step_sums.touch(held, until=change.time)
             held = change
-    for one in sums:
-        one.touch(held, until=np.inf)
-    return tuple(one.measures(joints) for one in sums)
+    for step_sums in sums:
+        step_sums.touch(held, until=np.inf)
+    return tuple(step_sums.measures(joints) for step_sums in sums)
 
 
 class _Joints:
-    """Ticks of a recording as what is summed up: per tick and the one before it."""
+    """Increments of travel and work between successive ticks."""
 
     def __init__(self, recording: Recording, robot: RobotModel) -> None:
         self._order = [recording.joint_names.index(name) for name in robot.joint_names]
@@ -71,13 +71,13 @@ class _Joints:
         self._last: tuple[Array, ...] | None = None
 
     def add(self, span: Span) -> tuple[Array, Array]:
-        """Times (T,) at which intervals end, and (T, 5): their begin, and what was turned, slid, moved and done."""
+        """Interval ends (T,) [s], and (T, 5): starts [s], revolute, prismatic and tool travel, work."""
         states = span.states
         q, power = states.position[:, self._order], (states.effort * states.velocity)[:, self._order]
         point = tool_poses(self._robot, q)[0] if self.has_tool else np.zeros((len(q), 3))
         now = (states.time, q, np.maximum(power, 0.0).sum(axis=1), point)
         if self._last is not None:
-            # Of four arrays four: mypy does not know how long this tuple is.
+            # mypy does not know that the tuple keeps its length of four.
             now = tuple(np.concatenate([a, b]) for a, b in zip(self._last, now, strict=True))  # type: ignore[assignment]
         self._last = tuple(a[-1:] for a in now)
         time, q, power, point = now
@@ -94,7 +94,7 @@ class _Joints:
 
 
 class _Sums:
-    """One step on its way."""
+    """Sums over the ticks of a step."""
 
     def __init__(self, step: StepOutcome) -> None:
         self._step = step
@@ -111,7 +111,7 @@ class _Sums:
             self._newest = float(ends[inside][-1])
 
     def touch(self, held: ContactSnapshot | None, *, until: float) -> None:
-        """What touched until then."""
+        """Contacts `held`, valid until `until` [s]."""
         if held is not None and held.time < self._end and until > self._start:
             for contact in held.contacts:
                 if contact.force > self._force:

@@ -1,4 +1,4 @@
-"""Hands whose references move faster than a joint may."""
+"""Closing speeds of hands above the velocity limit of a joint."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manipcli.preflight.preflight import Check, Subject
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Hands whose references are to move faster than a joint may; the default never is."""
+    """Hands with a `speed` above the velocity limit of a joint; the default speed keeps the limits."""
     task = subject.task
     for name, spec in task.controllers.controllers.items():
         hand = CONTROLLERS[spec.type].hand
@@ -20,14 +20,18 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
         if speed is None:
             continue
         limits = {joint: task.robot.joint(joint).limits.velocity for joint in spec.joints}
-        limit, joint = min((limit or math.inf, joint) for joint, limit in limits.items())
+        limit, joint = min((most or math.inf, joint) for joint, most in limits.items())
         if speed > limit:
             unit = f"{task.robot.joint(joint).unit}/s"
-            swift, most = told_apart(speed, limit, form=".3g")
-            message = f"{joint}: its references move at {swift} {unit}, its velocity limit is {most} {unit}"
+            closing, most = told_apart(speed, limit, form=".3g")
+            message = f"{joint}: closing speed {closing} {unit} exceeds its velocity limit {most} {unit}"
             place = task.controllers_file.place("controllers", name, "speed")
             yield Diagnostic(
-                "CTRL167", message, place, "without `speed` they move as fast as all joints may", "warning"
+                "CTRL167",
+                message,
+                place,
+                "remove `speed`: the default keeps the velocity limits of all joints",
+                "warning",
             )
 
 

@@ -1,4 +1,4 @@
-"""Timeouts of steps that end before the planned motions do."""
+"""Timeouts of steps that are shorter than their planned motions."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from manipcli.preflight.preflight import Check, Subject
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Steps whose `timeout` is over before their motions can be."""
+    """Steps whose `timeout` is shorter than their motions."""
     task, plan = subject.task, subject.plan
     for k, (step, planned) in enumerate(zip(task.spec.steps, plan.steps, strict=True)):
         least = sum(_least(motion) for motion in planned.plan.motions)
         if step.timeout is not None and least > step.timeout:
             takes, given = told_apart(least, step.timeout, form=".3g")
-            message = f"step '{planned.id}' is planned to take {takes} s, and times out after {given} s"
-            hint = f"give it more than {takes} s"
+            message = f"step '{planned.id}' times out after {given} s, its plan takes {takes} s"
+            hint = f"set `timeout` to more than {takes} s"
             yield Diagnostic("TASK243", message, task.file.place("steps", k, "timeout"), hint, "warning")
 
 
 def _least(motion: Motion) -> float:
-    """How long [s] it takes at least: nobody knows when a hand has closed, or what is guarded comes upon something."""
+    """[s] Least duration: a closing hand and a guarded motion can end early."""
     if motion.guarded:
         return 0.0
     if motion.grip is not None:

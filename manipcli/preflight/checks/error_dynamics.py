@@ -1,4 +1,4 @@
-"""Stability of controllers of inverse dynamics: the error e'' = -p e - d e' - i z, z its sum, updated once per tick."""
+"""Stability of inverse dynamics controllers: the error e'' = -p e - d e' - i z, z its integral, updated per tick."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Final
 from manipcli.control.control_loop import InverseDynamicsLoop, error_gains
 from manipcli.control.stability import Loop, boundary, is_stable
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import digits
+from manipcli.core.text import digits, number_of
 from manipcli.preflight.preflight import Check, ControlledJoint, Subject
 from manipcli.spec.controllers import GainsSpec
 from manipcli.task.task import Task
 
 SLOWEST: Final = 1e-6
-"""[rad per tick] A natural frequency that is stable with any latency of a motor."""
+"""[rad per tick] A natural frequency that is stable with any latency of an actuator."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Errors that do not come to rest: one finding for a bandwidth, which all joints of a controller share."""
+    """Unstable error dynamics; one finding per bandwidth, which all joints of a controller share."""
     reported = set()
     for shift in subject.shifts:
         joints = shift.other_efforts
@@ -49,15 +49,17 @@ def _unstable(task: Task, joint: ControlledJoint, law: InverseDynamicsLoop, *, l
         return None
     slowest = SLOWEST / (math.tau * period)
     most = slowest * boundary(lambda factor: loop(error_gains(factor * slowest, law.damping_ratio)))
-    at = f"unstable above {digits(most)} Hz" if own is None else "unstable"
-    at += f" at {1e3 * period:.3g} ms" + (f" and {late} ticks of latency" if late else "")
+    at = f"at {1e3 * period:.3g} ms" + (f" and {number_of(late, 'tick')} of latency" if late else "")
     if own is None:
         place = task.controllers_file.place("controllers", joint.controller, "bandwidth")
-        message = f"{joint.controller}: a bandwidth of {digits(law.bandwidth)} Hz is {at}"
-        return Diagnostic("CTRL150", message, place, f"stay below half of that: {digits(0.5 * most)} Hz", "warning")
+        message = f"{joint.controller}: bandwidth {digits(law.bandwidth)} Hz is unstable, "
+        message += f"the limit is {digits(most)} Hz {at}"
+        hint = f"lower it to at most half the limit: {digits(0.5 * most)} Hz"
+        return Diagnostic("CTRL150", message, place, hint, "warning")
     place = task.controllers_file.place("controllers", joint.controller, "gains", joint.name)
-    message = f"{joint.name}: p {digits(own.p)}, i {digits(own.i)} and d {digits(own.d)}, of accelerations, are {at}"
-    hint = f"leave them out: a `bandwidth` chooses them, {digits(0.5 * most)} Hz at most"
+    gains = f"p {digits(own.p)}, i {digits(own.i)} and d {digits(own.d)}"
+    message = f"{joint.name}: {gains} (on acceleration) are unstable {at}"
+    hint = f"remove these gains and set a `bandwidth` of at most {digits(0.5 * most)} Hz"
     return Diagnostic("CTRL150", message, place, hint, "warning")
 
 

@@ -1,4 +1,4 @@
-"""Stability of PID loops on efforts: each alone at the least inertia that it meets, then all of them together."""
+"""Stability of PID loops on effort: each alone at its least inertia, then all loops coupled."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from manipcli.control.stability import (
     unstable_share,
 )
 from manipcli.core.errors import Diagnostic
-from manipcli.core.text import digits
+from manipcli.core.text import digits, number_of
 from manipcli.preflight.preflight import Check, ControlledJoint, Shift, Subject, once
 from manipcli.spec.controllers import GainsSpec
 
 TOGETHER: Final = 16
-"""Configurations at which all loops are examined together: those in which they are tightest."""
+"""Number of configurations for the check of all loops together, those with the least margins."""
 SWINGING: Final = 0.1
-"""The least damping ratio without a warning: it overshoots by 73 %."""
+"""Least damping ratio without a warning: an overshoot of 73 %."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Loops that diverge, ring, or swing with little damping."""
+    """Loops that are unstable, ring, or are poorly damped."""
     yield from once(found for shift in subject.shifts for found in _of_shift(subject, shift))
 
 
@@ -58,10 +58,10 @@ def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Diagnostic]
             delay=math.ceil(load.latency[k] / joint.ticks),
         )
         unit = subject.task.robot.joint(joint.name).inertia_unit
-        found = _unstable(joint.name, loop, f"inertia {least:.2g} {unit}, the least over the {subject.kind}")
+        found = _unstable(joint.name, loop, f"least inertia {least:.2g} {unit} over the {subject.kind}")
         if found is None:
             slow = Loop.of_joint(most, p=gains.p, d=gains.d, damping=float(load.damping[k]), period=loop.period)
-            found = _swings(joint.name, slow, f"inertia {most:.2g} {unit}, the most over the {subject.kind}")
+            found = _swings(joint.name, slow, f"largest inertia {most:.2g} {unit} over the {subject.kind}")
         else:
             stable = False
         if found is not None:
@@ -72,37 +72,38 @@ def _of_shift(subject: Subject, shift: Shift) -> Iterator[tuple[str, Diagnostic]
 
 
 def _unstable(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
-    """(code, message, hint) of a loop that diverges or rings."""
+    """(code, message, hint) of a loop that is unstable or rings; None of others."""
     p, d, i = float(loop.p[0]), float(loop.d[0]), float(loop.i[0])
     kp, kd, ki = f"p {digits(p)}", f"d {digits(d)}", f"i {digits(i)}"
     at = f"at {1e3 * loop.period:.3g} ms"
     if loop.delay is not None and loop.delay[0]:
-        at += f" and {int(loop.delay[0])} ticks of latency"
+        at += f" and {number_of(int(loop.delay[0]), 'tick')} of latency"
     if is_stable(loop):
         worst = next((z for z in poles(loop) if z.real < 0.0 and abs(z.imag) < 1e-9), 0.0)
         if abs(worst) <= RINGING:
             return None
         most = largest_damping(loop)
-        message = f"{joint}: {kd} rings {at}: its effort turns round every tick; {inertia}"
-        return "CTRL150", message, f"it is unstable above {digits(most)}; stay below half of that"
+        message = f"{joint}: {kd} rings {at}: its effort changes sign every tick; {inertia}"
+        return "CTRL150", message, f"the stability limit is d {digits(most)}: lower d to at most half of it"
     most = largest_damping(loop)
     if 0.0 < most < d:
-        message = f"{joint}: {kd} is unstable above {digits(most)} {at}; {inertia}"
-        return "CTRL150", message, f"stay below half of that: d {digits(0.5 * most)}"
+        message = f"{joint}: {kd} is unstable, the limit is {digits(most)} {at}; {inertia}"
+        return "CTRL150", message, f"lower it to at most half the limit: d {digits(0.5 * most)}"
     most_integral = largest_integral(loop)
     if 0.0 < most_integral < i:
-        message = f"{joint}: {ki} with {kp} and {kd} is unstable above {digits(most_integral)} {at}; {inertia}"
-        return "CTRL150", message, f"stay below half of that: i {digits(0.5 * most_integral)}"
+        limit = f"the limit is {digits(most_integral)} {at}"
+        message = f"{joint}: {ki} with {kp} and {kd} is unstable, {limit}; {inertia}"
+        return "CTRL150", message, f"lower it to at most half the limit: i {digits(0.5 * most_integral)}"
     if most == 0.0:
         stiffest = largest_stiffness(loop)
         if 0.0 < stiffest < p:
-            message = f"{joint}: {kp} with {kd} is unstable above {digits(stiffest)} {at}; {inertia}"
-            return "CTRL150", message, "lower p; `manipcli tune` proposes both"
+            message = f"{joint}: {kp} with {kd} is unstable, the limit is {digits(stiffest)} {at}; {inertia}"
+            return "CTRL150", message, "lower p, or take both gains from `manipcli tune`"
         message = f"{joint}: {kp}, {ki} and {kd} are unstable {at}; {inertia}"
-        return "CTRL150", message, "`manipcli tune` proposes gains that are not"
+        return "CTRL150", message, "take stable gains from `manipcli tune`"
     need = 1.4 * math.sqrt(p * float(loop.mass[0, 0]))
-    message = f"{joint}: {kp}{f', {ki}' if i else ''} with {kd} swings up {at}; {inertia}"
-    return "CTRL150", message, f"d {digits(min(need, 0.5 * most))} damps it"
+    message = f"{joint}: {kp}{f', {ki}' if i else ''} with {kd} is unstable (growing oscillation) {at}; {inertia}"
+    return "CTRL150", message, f"set d to {digits(min(need, 0.5 * most))}"
 
 
 def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None] | None:
@@ -115,16 +116,20 @@ def _swings(joint: str, loop: Loop, inertia: str) -> tuple[str, str, str | None]
     if ratio >= SWINGING:
         return None
     message = (
-        f"{joint}: p {digits(p)} with d {digits(d)} swings at {abs(s) / math.tau:.2g} Hz with a damping ratio of "
-        f"{ratio:.2g}; {inertia}"
+        f"{joint}: p {digits(p)} with d {digits(d)} oscillates at {abs(s) / math.tau:.2g} Hz, "
+        f"damping ratio {ratio:.2g}; {inertia}"
     )
-    return "CTRL153", message, f"d {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} gives 0.7"
+    return (
+        "CTRL153",
+        message,
+        f"set d to {digits(1.4 * math.sqrt(p * float(loop.mass[0, 0])))} for a damping ratio of 0.7",
+    )
 
 
 def _together(
     joints: tuple[ControlledJoint, ...], gains: list[GainsSpec], load: JointSpaceLoad, period: float, substeps: int
 ) -> Iterator[tuple[str, Diagnostic]]:
-    """Loops that are stable alone and not together, at the configurations in which they are tightest."""
+    """Loops that are stable alone and unstable together, at the configurations with the least margins."""
     if any(joint.ticks != 1 for joint in joints):
         return  # loops of different rates have no common tick
     p, d, i = (np.array([getattr(each, key) for each in gains]) for key in ("p", "d", "i"))
@@ -138,8 +143,8 @@ def _together(
         worst = [j for j in np.argsort(-share) if share[j] > 0.1][:3]
         names = ", ".join(f"{joints[j].name} (d {digits(d[j])})" for j in worst)
         message = (
-            f"each loop is stable, all together are not at {1e3 * period:.3g} ms: a pole at {abs(pole):.3g}, "
-            f"mostly of {names}"
+            f"coupled loops are unstable at {1e3 * period:.3g} ms, each alone is stable: "
+            f"pole magnitude {abs(pole):.3g}, mainly from {names}"
         )
         yield "", Diagnostic("CTRL154", message, joints[worst[0]].place, "lower their d", "warning")
         return

@@ -1,4 +1,4 @@
-"""Grasps with more force than a sliding finger can press with."""
+"""Grasp forces above the largest force of a prismatic finger."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from manipcli.preflight.preflight import Check, Subject
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Grasps with more force than a finger that slides can press with, also once it is reduced for a light object."""
+    """Grasps whose force, reduced for light objects, exceeds the largest force of a prismatic finger."""
     task, plan = subject.task, subject.plan
-    for one in grasps(plan):
-        for name in one.joints:
+    for grasp in grasps(plan):
+        for name in grasp.joints:
             most = largest_force(subject, name)
-            if sensible_force(task, one.end, one.force) > most:
-                message = f"step '{one.step}': a grasp with {one.force:.3g} N; {name} presses with {most:.3g} N at most"
-                hint = "lower `force`, or raise what limits it: the joint's effort, or `max_effort`"
-                yield Diagnostic("TASK238", message, task.file.place("steps", one.index), hint, "warning")
+            if sensible_force(task, grasp.end, grasp.force) > most:
+                message = f"step '{grasp.step}': force {grasp.force:.3g} N exceeds the {most:.3g} N of {name}"
+                hint = "lower `force`, or raise the limit: the joint's effort, or `max_effort`"
+                yield Diagnostic("TASK238", message, task.file.place("steps", grasp.index), hint, "warning")
 
 
 CHECK = Check(name="grip_force_limit", codes=("TASK238",), findings=findings, needs_plan=True)

@@ -1,4 +1,4 @@
-"""Objects lifted by friction alone that are too heavy for it."""
+"""Objects lifted by friction alone that are too heavy for the grip force."""
 
 from __future__ import annotations
 
@@ -24,58 +24,60 @@ from manipcli.preflight.grips import (
 from manipcli.preflight.preflight import Check, Subject
 
 RESERVE: Final = 2.0
-"""So many times its weight friction is to carry: it also accelerates what is carried, and keeps it from turning.
-Measured with blocks between two fingers, lifted 10 cm: up to 1.6 none stays in the hand, at 2 few do, at 2.5 most."""
+"""Least ratio of friction to weight: friction also accelerates the object and keeps it from rotating. Measured with
+blocks between two fingers, lifted 10 cm: up to 1.6 none stays in the hand, at 2 few do, at 2.5 most."""
 LEVEL: Final = 0.1
-"""A finger whose way climbs less than this carries by friction alone."""
+"""Largest slope of the motion of a finger that carries by friction alone."""
 LIFTED: Final = 5e-3
-"""[m] from which on what is held no longer rests."""
+"""[m] Least rise of a lifted object."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """What is lifted between two level fingers that slide, where their friction, 2 mu F, is not clearly more than its
-    weight.
+    """Objects lifted between two level prismatic fingers whose friction 2 mu F is less than `RESERVE` times the weight.
 
-    Of hands of more fingers, and of fingers that close from below, nothing is said: those also hold by their form.
+    Hands with more fingers, and fingers that close from below, also hold by form closure and are not checked.
     """
     task, plan = subject.task, subject.plan
     gravity = task.scene.gravity
     g = float(np.linalg.norm(gravity))
     if not g:
         return
-    for one in grasps(plan):
-        if one.end.carried is None:
+    for grasp in grasps(plan):
+        if grasp.end.carried is None:
             continue
-        body = task.scene.body(one.end.carried.body)
-        ends = [step.plan.end for step in plan.steps[one.index :]]
+        body = task.scene.body(grasp.end.carried.body)
+        ends = [step.plan.end for step in plan.steps[grasp.index :]]
         carrying = itertools.takewhile(lambda end: end.carried is not None, ends)
         heights = [-float(plan.planner.body_pose(end, body.name).p @ gravity) / g for end in carrying]
-        if max(heights) < heights[0] + LIFTED or not _between_two(plan.planner, one.end, one.joints, gravity / g):
+        if max(heights) < heights[0] + LIFTED or not _between_two(plan.planner, grasp.end, grasp.joints, gravity / g):
             continue
-        force = min(_held_force(subject, name, one.force) for name in one.joints)
+        force = min(_held_force(subject, name, grasp.force) for name in grasp.joints)
         friction = body.friction * task.robot.friction
         carried, weight = 2.0 * friction * force, body.mass * g
         if carried < RESERVE * weight:
-            message = f"step '{one.step}': two fingers with {force:.3g} N each and a friction of {friction:.3g} carry "
-            message += f"{carried:.3g} N; '{body.name}' of {readable(body.mass, 'kg')} weighs {weight:.3g} N"
-            hint = "it will slip"
+            message = f"step '{grasp.step}': friction carries {carried:.3g} N, '{body.name}' "
+            message += (
+                f"({readable(body.mass, 'kg')}) weighs {weight:.3g} N: two fingers press with {force:.3g} N each, "
+            )
+            message += f"coefficient of friction {friction:.3g}"
+            hint = "it will slip: raise the friction"
             if carried >= weight:
-                twice = f"{weight / friction:.3g} N a finger carry it twice"
-                hint = f"it may slip while it is accelerated, or turn: {twice}"
+                enough = f"{weight / friction:.3g} N per finger carries twice its weight"
+                hint = f"it may slip or rotate while accelerated: {enough}"
             elif friction:
-                hint += f", it takes more than {0.5 * weight / friction:.3g} N a finger or more friction"
-            yield Diagnostic("TASK241", message, task.file.place("steps", one.index), hint, "warning")
+                hint = f"it will slip: use more than {0.5 * weight / friction:.3g} N per finger, or raise the friction"
+            yield Diagnostic("TASK241", message, task.file.place("steps", grasp.index), hint, "warning")
 
 
 def _held_force(subject: Subject, name: str, force: float) -> float:
-    """[N] of a finger that slides: commanded by position it is all that it has, else no more than is asked."""
+    """[N] Force of a prismatic finger: under position commands its largest force, else at most `force`."""
     most, hand = largest_force(subject, name), subject.hand_joints.get(name)
     by_position = hand is not None and hand.settings.interface == "position"
     return most if by_position else min(force, most)
 
 
 def _between_two(planner: Planner, end: PlanningState, joints: tuple[str, ...], down: Array) -> bool:
-    """Whether two links that slide, level and against each other, touch what is carried, and nothing else does."""
+    """Whether exactly two level, opposed links with prismatic joints touch the carried object."""
     robot, kinematics = planner.robot, planner.kinematics
     if any(robot.joint(name).type != "prismatic" for name in joints):
         return False
@@ -85,9 +87,9 @@ def _between_two(planner: Planner, end: PlanningState, joints: tuple[str, ...], 
     q = np.array(end.position)
     q[list(robot.indices(joints))] += NUDGE
     nudged = with_mimics(robot, q)
-    ways = [kinematics.forward(nudged, link).p - kinematics.forward(end.position, link).p for link in links]
-    one, other = (way / np.linalg.norm(way) for way in ways)
-    return abs(float(one @ down)) < LEVEL and float(one @ other) < LEVEL - 1.0
+    motions = [kinematics.forward(nudged, link).p - kinematics.forward(end.position, link).p for link in links]
+    first, second = (motion / np.linalg.norm(motion) for motion in motions)
+    return abs(float(first @ down)) < LEVEL and float(first @ second) < LEVEL - 1.0
 
 
 CHECK = Check(name="grip_friction", codes=("TASK241",), findings=findings, needs_plan=True)

@@ -1,4 +1,4 @@
-"""Grasps with more force than the springs of the fingers' gains give."""
+"""Grasp forces above what the p gains of the fingers give."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ from manipcli.preflight.grips import (
 from manipcli.preflight.preflight import Check, Subject
 
 ENOUGH: Final = 1.01
-"""A force that is asked beyond this share of what there is is not met."""
+"""Largest ratio of the asked to the available force without a warning."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Grasps with more force than the spring of a finger's gain gives, all the way from the object to the posture.
+    """Grasps with more force than the p gain of a finger gives between the object and the posture.
 
-    A finger of one joint, alone or with others that mimic it, gives p |q_posture - q_object| of effort, and by virtual
-    work that over `_closing` of force. It is asked for what a light object and the force limit leave of the force.
+    A finger of one joint, with or without mimic joints, has the effort p |q_posture - q_object|, and by virtual work
+    this over the closing rate as force. The needed force is that of the step, reduced for light objects and by the
+    largest force of the finger.
     """
     task, plan = subject.task, subject.plan
-    for one in grasps(plan):
-        if one.end.carried is None:
+    for grasp in grasps(plan):
+        if grasp.end.carried is None:
             continue
-        touched = touched_parts(plan.planner, one.end)
-        for name, target in zip(one.joints, one.target, strict=True):
+        touched = touched_parts(plan.planner, grasp.end)
+        for name, target in zip(grasp.joints, grasp.target, strict=True):
             hand = subject.hand_joints.get(name)
             if hand is None or hand.settings.interface != "effort":
                 continue
-            if (one.joints.index(name),) not in fingers(task.robot, one.joints):
+            if (grasp.joints.index(name),) not in fingers(task.robot, grasp.joints):
                 continue
             gains = hand.gains
-            closing = closing_rate(plan.planner, one.end, name, touched)
-            way = abs(float(target) - float(one.end.position[task.robot.joint_names.index(name)]))
-            asked = min(sensible_force(task, one.end, one.force), largest_force(subject, name))
-            if not closing or not way or gains.i or asked <= ENOUGH * gains.p * way / closing:
+            closing = closing_rate(plan.planner, grasp.end, name, touched)
+            travel = abs(float(target) - float(grasp.end.position[task.robot.joint_names.index(name)]))
+            asked = min(sensible_force(task, grasp.end, grasp.force), largest_force(subject, name))
+            if not closing or not travel or gains.i or asked <= ENOUGH * gains.p * travel / closing:
                 continue
-            given = f"p {digits(gains.p)} gives about {gains.p * way / closing:.2g} N"
-            message = f"{name}: step '{one.step}' grasps with {one.force:.3g} N; {given}"
-            than = "that" if asked == one.force else f"{asked:.3g} N"
-            hint = f"p {digits(1.2 * asked * closing / way)} gives a fifth more than {than}"
+            given = f"p {digits(gains.p)} gives about {gains.p * travel / closing:.2g} N"
+            message = f"{name}: {given}, step '{grasp.step}' asks for {grasp.force:.3g} N"
+            hint = f"raise p to {digits(1.2 * asked * closing / travel)} for 20 % more than {asked:.3g} N"
             place = task.controllers_file.place("controllers", hand.controller, "gains", name)
             yield Diagnostic("CTRL168", message, place, hint, "warning")
 

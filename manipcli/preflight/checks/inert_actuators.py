@@ -16,16 +16,15 @@ from manipcli.spec.controllers import Interface
 from manipcli.task.task import Task
 
 FASTER: Final = 1.0 + 1e-6
-"""From this share of an actuator's velocity limit on a plan is beyond it."""
+"""Ratio to the velocity limit of an actuator above which a plan exceeds it."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Actuators whose settings have no effect, by controller."""
+    """Actuator settings without effect, one finding per controller."""
     yield from once(found for shift in subject.shifts if shift.servos for found in _of_shift(subject.task, shift))
 
 
 def _of_shift(task: Task, shift: Shift) -> Iterator[tuple[str, Diagnostic]]:
-    """One finding for each controller."""
     velocity = shift.configurations.velocity
     train = Drivetrain.of(task.robot)
     speeds = np.abs(velocity[:, list(train.joints)] @ train.transmission.maps.actuator_motion.T).max(
@@ -39,20 +38,22 @@ def _of_shift(task: Task, shift: Shift) -> Iterator[tuple[str, Diagnostic]]:
             groups.setdefault((owner.controller, owner.interfaces[0]), []).append(row)
     for (controller, interface), rows in groups.items():
         own = [train.actuators[row] for row in rows]
-        *most, last = (word for word in _WORDS if any(word in _inert(one) for one in own))
+        *most, last = (word for word in _WORDS if any(word in _inert(actuator) for actuator in own))
         words = f"{', '.join(most)} and {last}" if most else last
-        names = listed([f"'{one.name}'" for one in own])
-        message = f"{'actuator' if len(own) == 1 else 'actuators'} {names}: {words} {'act' if most else 'acts'} on "
-        message += f"effort commands alone, and '{controller}' commands by {interface}"
+        names = listed([f"'{actuator.name}'" for actuator in own])
+        message = (
+            f"{'actuator' if len(own) == 1 else 'actuators'} {names}: {words} {'have' if most else 'has'} no effect "
+        )
+        message += f"under the {interface} commands of '{controller}'"
         fast = [
-            f"'{one.name}' at {speeds[row]:.3g} (limit {one.velocity:.3g})"
-            for one, row in zip(own, rows, strict=True)
-            if one.velocity is not None and speeds[row] > FASTER * one.velocity
+            f"'{actuator.name}' at {speeds[row]:.3g} (limit {actuator.velocity:.3g})"
+            for actuator, row in zip(own, rows, strict=True)
+            if actuator.velocity is not None and speeds[row] > FASTER * actuator.velocity
         ]
-        hint = "command by effort to have them act"
+        hint = "use effort commands"
         if fast:
-            message += f"; the plan turns {listed(fast, most=3)} per second"
-            hint += ", or narrow the velocities of the joints (robot file, limits)"
+            message += f"; the plan moves {listed(fast, most=3)} per second"
+            hint += ", or lower the velocity limits of the joints (robot file, limits)"
         place = task.robot_file.place("actuators", own[0].name)
         yield "", Diagnostic("CTRL158", message, place, hint, "warning")
 
@@ -61,13 +62,13 @@ _WORDS: Final = ("velocity limit", "friction", "latency")
 
 
 def _inert(actuator: Actuator) -> tuple[str, ...]:
-    """What of an actuator does not act on joints that are commanded by position or velocity."""
-    said = (
+    """The settings of an actuator that act only on joints commanded by effort."""
+    given = (
         actuator.velocity is not None,
         actuator.viscous_friction > 0.0 or actuator.coulomb_friction > 0.0,
         actuator.latency > 0,
     )
-    return tuple(word for word, there in zip(_WORDS, said, strict=True) if there)
+    return tuple(word for word, there in zip(_WORDS, given, strict=True) if there)
 
 
 CHECK = Check(name="inert_actuators", codes=("CTRL158",), findings=findings)

@@ -1,4 +1,4 @@
-"""Grasps of objects that are too light for the force, which the engine lets creep in the hand."""
+"""Grasps of objects too light for the grip force, which creep in the hand."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from manipcli.preflight.preflight import Check, Subject
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Grasps of objects of next to no mass beside the force, by which the engine lets them creep, whatever gravity is.
+    """Grasps with more than `LIGHT` times the mass of the object, which creeps in the hand, with or without gravity.
 
-    Its solver stops after a number of iterations, each of which carries an impulse from one finger through the object
-    to the other: of two that are heavy beside what is between them, an error of their forces is left, and moves it.
+    The iterative contact solver of the engine passes an impulse from one finger through the object to the other. For
+    heavy fingers and a light object it stops before the forces balance, and the remaining error moves the object.
     """
     task, plan = subject.task, subject.plan
-    for one in grasps(plan):
-        if one.end.carried is None:
+    for grasp in grasps(plan):
+        if grasp.end.carried is None:
             continue
-        body = task.scene.body(one.end.carried.body)
-        if one.force > LIGHT * body.mass:
-            message = f"step '{one.step}': {one.force:.3g} N are much for '{body.name}' of "
-            message += f"{readable(body.mass, 'kg')}: it may creep in the hand by millimetres"
-            hint = f"a force below {digits(LIGHT * body.mass)} N, or more mass: the contact solver of the engine "
-            hint += "leaves errors that move light things between heavy ones"
-            yield Diagnostic("TASK239", message, task.file.place("steps", one.index), hint, "warning")
+        body = task.scene.body(grasp.end.carried.body)
+        if grasp.force > LIGHT * body.mass:
+            most = digits(LIGHT * body.mass)
+            message = f"step '{grasp.step}': force {grasp.force:.3g} N exceeds {most} N for '{body.name}' "
+            message += f"({readable(body.mass, 'kg')}): it may creep in the hand by millimetres"
+            hint = (
+                f"lower the force below {most} N, or raise the mass: errors of the contact solver move light objects "
+            )
+            hint += "between heavy fingers"
+            yield Diagnostic("TASK239", message, task.file.place("steps", grasp.index), hint, "warning")
 
 
 CHECK = Check(name="light_objects", codes=("TASK239",), findings=findings, needs_plan=True)

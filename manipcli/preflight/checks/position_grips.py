@@ -1,4 +1,4 @@
-"""Hands commanded by position that press with more force than a grasp asks for."""
+"""Position-commanded hands that press with more force than a grasp asks for."""
 
 from __future__ import annotations
 
@@ -21,38 +21,42 @@ from manipcli.task.plan_task import Plan
 from manipcli.task.task import Task
 
 MUCH: Final = 1.1
-"""So many times the force that is asked, and a hand that cannot be told it is told of."""
+"""Largest ratio of the pressed to the asked force without a warning."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Hands that are commanded by position and asked for less force than their motors press with.
+    """Grasps with less force than the motors of a position-commanded hand press with.
 
-    Such a motor follows its reference with all the effort that it may have. The reference stops where a finger feels
-    the force, and there it is within the object already: what the finger presses with is the limit of its effort.
+    Such a motor follows its reference with up to its effort limit. The reference stops where a finger measures the
+    force, which is already inside the object, so the finger presses with its effort limit.
     """
     task, plan = subject.task, subject.plan
-    told: set[str] = set()
-    for one in grasps(plan):
-        for name in one.joints:
+    reported: set[str] = set()
+    for grasp in grasps(plan):
+        for name in grasp.joints:
             hand = subject.hand_joints.get(name)
-            if hand is None or hand.settings.interface != "position" or name in told:
+            if hand is None or hand.settings.interface != "position" or name in reported:
                 continue
-            shared = _effort_each(task, plan, one, name)
+            shared = _effort_each(task, plan, grasp, name)
             limit = task.robot.joint(name).limits.effort or math.inf
-            if not shared or limit / shared <= MUCH * one.force:
+            if not shared or limit / shared <= MUCH * grasp.force:
                 continue
-            told.add(name)
-            given = f"{limit / shared:.3g} N, its effort limit" if limit < math.inf else "no limit of its effort"
-            message = f"{name}: step '{one.step}' grasps with {one.force:.3g} N; commanded by position it presses "
-            message += f"with {given}: `force` only says at which contact force it stops"
-            least = f"limits.{name}.effort: {digits(1.05 * shared * one.force)}"
-            hint = f"command it by effort, or limit that (robot file, {least})"
+            reported.add(name)
+            given = (
+                f"{limit / shared:.3g} N (its effort limit)"
+                if limit < math.inf
+                else "unlimited force (no effort limit)"
+            )
+            message = f"{name}: presses with {given}, step '{grasp.step}' asks for {grasp.force:.3g} N: "
+            message += "under position commands `force` is only the contact force at which it stops"
+            lower = f"limits.{name}.effort: {digits(1.05 * shared * grasp.force)}"
+            hint = f"use effort commands, or lower the effort limit (robot file, {lower})"
             place = task.controllers_file.place("controllers", hand.controller, "command_interface")
             yield Diagnostic("CTRL171", message, place, hint, "warning")
 
 
 def _effort_each(task: Task, plan: Plan, grasp: Grasp, name: str) -> float:
-    """The effort of a joint [N m or N] for each newton of its finger; 0 where that is not known."""
+    """The effort of a joint [N m or N] per newton of its finger; 0 if unknown."""
     if task.robot.joint(name).type == "prismatic":
         return effort_per_force(task, name)
     if grasp.end.carried is None or (grasp.joints.index(name),) not in fingers(task.robot, grasp.joints):

@@ -1,4 +1,4 @@
-"""Round objects between two fingers, which may turn about the line through the two contacts."""
+"""Round objects between two fingers, which may rotate about the line through the two contacts."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from manipcli.core.errors import Diagnostic
 from manipcli.preflight.preflight import Check, Subject
 
 ROUND: Final = ("cylinder", "cup")
-"""Kinds that are round and not the same from all sides."""
+"""Round bodies other than spheres."""
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Round things that two links hold by a point each, about which they turn.
+    """Round objects held by two links with a point contact each.
 
-    Measured with two flat fingers and 8 N: upright cylinders of 60 g turn by 28 to 180 degrees while they are carried,
-    by less than one with a `spinning_friction` of 0.01.
+    Measured with two flat fingers and 8 N: upright cylinders of 60 g rotate by 28 to 180 degrees while they are
+    carried, and by less than one degree with a `spinning_friction` of 0.01.
     """
     task, plan = subject.task, subject.plan
     for k, step in enumerate(plan.steps):
@@ -29,9 +29,9 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
         hits = plan.planner.grasping(end, body.name).every(end.position)
         if len({part for hit in hits for part in (hit.a, hit.b)} - {body.name}) == 2:
             message = (
-                f"step '{step.id}': two fingers hold '{body.name}', a {body.kind}, by a point each: it may turn there"
+                f"step '{step.id}': '{body.name}' ({body.kind}) may rotate between the point contacts of two fingers"
             )
-            hint = f"`spinning_friction: 0.01` of '{body.name}' stands for the area of real fingertips"
+            hint = f"set `spinning_friction: 0.01` on '{body.name}' to model the contact area of real fingertips"
             yield Diagnostic("TASK240", message, task.file.place("steps", k), hint, "warning")
 
 

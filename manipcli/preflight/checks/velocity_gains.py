@@ -1,4 +1,4 @@
-"""Stability of PID loops on velocities, whose commands the engine's own motors follow: no inertia is in such a loop."""
+"""Stability of PID loops on velocity, whose commands the motors of the engine follow without inertia."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manipcli.spec.controllers import GainsSpec
 
 
 def findings(subject: Subject) -> Iterator[Diagnostic]:
-    """Velocity loops that diverge or ring."""
+    """Velocity loops that are unstable or ring."""
     period = subject.task.spec.simulation.control_period
     yield from once(
         (joint.name, finding)
@@ -24,7 +24,7 @@ def findings(subject: Subject) -> Iterator[Diagnostic]:
 
 
 def _unstable(joint: ControlledJoint, gains: GainsSpec, period: float) -> Iterator[Diagnostic]:
-    """A velocity loop that diverges, or turns round every tick."""
+    """A velocity loop that is unstable, or changes sign every tick."""
     if gains.p == 0.0:
         return
     p, d, i = gains.p, gains.d, gains.i
@@ -33,18 +33,20 @@ def _unstable(joint: ControlledJoint, gains: GainsSpec, period: float) -> Iterat
     at = f"at {1e3 * period:.3g} ms"
     if abs(poles[0]) >= 1.0:
         if p >= most > 0.0:
-            message = f"{joint.name}: p {digits(p)} on the velocity interface is unstable above {digits(most)} {at}"
-            hint = f"stay below half of that: p {digits(0.5 * most)}"
+            message = (
+                f"{joint.name}: p {digits(p)} on the velocity interface is unstable, the limit is {digits(most)} {at}"
+            )
+            hint = f"lower it to at most half the limit: p {digits(0.5 * most)}"
         else:
             message = f"{joint.name}: p {digits(p)}, i {digits(i)} and d {digits(d)} on the velocity interface are "
             message += f"unstable {at}"
-            hint = "lower d, which is to stay well below 1, and i"
+            hint = "lower i, and d to well below 1"
     elif any(pole.real < -RINGING and abs(pole.imag) < 1e-9 for pole in poles):
         message = (
             f"{joint.name}: p {digits(p)}{f' with d {digits(d)}' if d else ''} on the velocity interface rings {at}: "
         )
-        message += "it turns round every tick"
-        hint = f"p is unstable above {digits(most)}; stay below half of that"
+        message += "its command changes sign every tick"
+        hint = f"the stability limit is p {digits(most)}: lower p to at most half of it"
     else:
         return
     yield Diagnostic("CTRL157", message, joint.place, hint, "warning")
