@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from manipcli.judge.verdict import Verdict
-    from manipcli.task.task import Task
+    from manipcli.pipeline import Task
 
 ReportFile = Annotated[
     Path | None,

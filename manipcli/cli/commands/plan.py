@@ -48,9 +48,8 @@ def plan(
         if format_ != "json":
             raise
         from manipcli.report.json import render_verdict
-        from manipcli.task.plan_task import refused
 
-        console.result(render_verdict(refused(loaded, refusal)))
+        console.result(render_verdict(pipeline.refused(loaded, refusal)))
         return refusal.exit_code
     if csv is not None:
         from manipcli.core.whole_file import whole_file

@@ -73,15 +73,14 @@ def tune(
     kind, control_period = _checked(robot, output, write, force=force), seconds(period)
     if not 1e-6 <= control_period <= 1.0:
         raise InvalidInput([Diagnostic("USE071", f"a control period of {period}; expected 1 us to 1 s")])
-    from manipcli.control.tuning import Wish
     from manipcli.core.whole_file import write_whole
     from manipcli.report.tuning import render_json, render_text
-    from manipcli.tuning import tune as flow
+    from manipcli.tuning import tune as gains
 
-    tuning = flow.tune(
+    tuning = gains.tune(
         robot,
         controllers,
-        Wish(hertz(bandwidth), damping, control_period),
+        gains.Wish(hertz(bandwidth), damping, control_period),
         joints=tuple(joint or ()),
         step=step,
         package_path=tuple(package_path or ()),
@@ -93,10 +92,10 @@ def tune(
     if output is not None and kind is not None:
         from manipcli.replay.figure import render as draw
 
-        write_whole(output, draw(flow.chart_of(tuning), kind))
+        write_whole(output, draw(gains.chart_of(tuning), kind))
         console.talk(f"drawn: {output}")
     if write is not None:
-        write_whole(write, flow.written(tuning, controllers).encode())
+        write_whole(write, gains.written(tuning, controllers).encode())
         console.talk(f"written: {write}")
     return ExitCode.PASSED
 
