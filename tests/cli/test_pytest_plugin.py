@@ -172,7 +172,7 @@ def test_a_number_that_means_nothing_is_wrong_usage(pytester: pytest.Pytester, w
     result = pytester.runpytest_inprocess(*LOADED, *ALONE, words)
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(
-        [f"*error: argument {words.partition('=')[0]}: '{words.partition('=')[2]}' is no number*"]
+        [f"*error: argument {words.partition('=')[0]}: '{words.partition('=')[2]}' is not a*n*"]
     )
 
 

@@ -31,7 +31,7 @@ def view(
 ) -> ExitCode:
     """Show a robot, or a task's scene at its start, in the browser.
 
-    Joints by sliders, named poses, collision shapes, frames, inertia boxes. Ctrl-C ends it.
+    With joint sliders, named poses, collision shapes, frames, inertia boxes. Press Ctrl-C to stop.
     """
     with Interrupts():
         given = xacro_arguments(arguments or [])
