@@ -64,9 +64,9 @@ class Change:
 
     @property
     def word(self) -> str:
-        """The comparison, to be followed by "the baseline" or "before"."""
+        """The comparison, to be followed by "the baseline"."""
         if self.new is not None and self.new.unit != self.old.unit:
-            return "unlike"
+            return "not comparable with"
         return "worse than" if self.worse else "better than"
 
     def __str__(self) -> str:
@@ -78,7 +78,7 @@ class Change:
             return f"{name} is missing; its baseline is {old}; `manipcli bless` writes a new baseline"
         if self.new.unit != self.old.unit:
             reason = "another part of the condition decides; `manipcli bless` writes a new baseline"
-            return f"{name} {verb} {self.new}; its baseline is {old}: not comparable, {reason}"
+            return f"{name} {verb} {self.new}; its baseline is {old}: {reason}"
         share = abs(self.new.value / self.old.value - 1.0) if self.old.value else math.inf
         by = f"{100.0 * share:{'.0f' if share > 0.1 else '.2g'}} % " if share < 10.0 else ""
         word = more if self.new.value > self.old.value else less

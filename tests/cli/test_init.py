@@ -128,8 +128,8 @@ def test_a_folder_below_the_top_of_a_repository_is_told_where_its_workflow_belon
     assert main(["init", "--", "-sub"]) == 0
     note, following = capsys.readouterr().err.splitlines()
     top = tmp_path / ".github" / "workflows" / "manipcli.yml"
-    assert note.startswith("note: GitHub runs workflows only from the top of a repository: move -sub/.github/workflows/")
-    assert f"manipcli.yml to {top}, begin its job" in note
+    assert note.startswith("note: GitHub runs workflows only from the top of a repository: move -sub/.github/")
+    assert f"manipcli.yml to {top}, add to its job" in note
     assert "`defaults: {run: {working-directory: -sub}}`" in note
     assert following == "next: cd ./-sub && manipcli test"
 

@@ -113,4 +113,4 @@ def _blessed(job: Job, done: CaseReport) -> Sequence[str]:
     changes = compared(old, new, exact) if old is not None else ()
     if old is not None and not changes:
         return [*lines, f"  unchanged within {', '.join(quantity(floor, unit) for unit, floor in FLOORS.items())}"]
-    return [*lines, *(f"  {change.word} before: {change}" for change in changes)]
+    return [*lines, *(f"  {change.word} the old baseline: {change}" for change in changes)]
