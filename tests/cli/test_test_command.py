@@ -137,7 +137,7 @@ def test_logs_go_where_something_can_be_written(folder: Path, capsys: pytest.Cap
     assert main(["test"]) == 4
     told = capsys.readouterr()
     assert (told.out, "error[USE086]: --logs 'runs/test': " in told.err) == ("", True)
-    assert "hint: --logs DIR names another place" in told.err
+    assert "hint: name another folder with --logs DIR" in told.err
     assert main(["test", "--logs", "else/where"]) == 4
     assert "✗ 1 invalid" in capsys.readouterr().out
     assert (folder / "else" / "where" / ".cache").is_dir()
